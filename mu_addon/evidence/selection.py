@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import MuError
+from .curved_reading import curved_reading
 from .effect import Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .record import KNOWN
@@ -143,7 +144,12 @@ def select(
         taken = base.chi2 - chosen.chi2
         ps.append(p)
         levels.append(pool)
-    doubted = doubted or sudden(table_base, base, chosen) or _too_large(chosen)
+    doubted = (
+        doubted
+        or sudden(table_base, base, chosen)
+        or _too_large(chosen)
+        or curved_reading(fitter, base, chosen)
+    )
     causes = causes_of(fitter, effects, base, chosen, ps, levels)
     if len(causes) == 1 and CAMERA.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
@@ -259,7 +265,7 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
                 doubted or f"{e.name} gives no significant gain at the noise that remains with the causes"
             )
     table_base = tuple(dependence_table(fitter, base))
-    doubted = doubted or sudden(table_base, base, chosen)
+    doubted = doubted or sudden(table_base, base, chosen) or curved_reading(fitter, base, chosen)
     effects = [f.effects[0] for f in singles]
     causes = causes_of(fitter, effects, base, chosen, ps, [singles])
     table = tuple(strict_table(fitter, chosen))
@@ -294,7 +300,11 @@ def one_more(
     ):
         return found
     table = tuple(strict_table(fitter, best))
-    if structure(table) or sudden(found.table_base, found.base, best):
+    if (
+        structure(table)
+        or sudden(found.table_base, found.base, best)
+        or curved_reading(fitter, found.base, best)
+    ):
         return found
     causes = causes_of(fitter, effects, found.base, best, [*(c.p_value for c in found.causes), p], [pool])
     return attrs.evolve(found, chosen=best, causes=causes, table=table)
@@ -324,7 +334,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     shares = _share_by_experiment(fitter, best)
     if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
         return None
-    if sudden(found.table_base, base, best):
+    if sudden(found.table_base, base, best) or curved_reading(fitter, base, best):
         return None
     cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, ())
     table = tuple(strict_table(fitter, best))
@@ -336,6 +346,12 @@ def at_a_bound(fit: Fit) -> bool:
     return any(
         _bounded(p, fit.values[key]) for e in fit.effects for key, p in zip(e.keys, e.parameters, strict=True)
     )
+
+
+def size_at_bound(fit: Fit) -> bool:
+    """Whether the size of the last effect, its first parameter, lies at a bound that is not its null."""
+    last = fit.effects[-1]
+    return _bounded(last.parameters[0], fit.values[last.keys[0]])
 
 
 def _bounded(p: Parameter, value: float) -> bool:
@@ -562,7 +578,7 @@ def causes_of(
     """
     found = []
     for e in chosen.effects:
-        others = [o for o in chosen.effects if o.name != e.name]
+        others = [o for o in chosen.effects if o.keys != e.keys]
         tried = [f for f in levels[0] if f.names != chosen.names]
         if others:
             tried = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,14 @@ OBSTACLE_MPa, OBSTACLE_mm = 0.005, 0.02
 OBSTACLE_HALVINGS = 2
 
 
+@lru_cache(maxsize=2)
+def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
+    """A unit's mesh, kept: a process makes many runs of one unit, and moves this mesh for most others."""
+    from ..resolved.unit import mesh_of
+
+    return mesh_of(unit, settings, cache=cache)
+
+
 @attrs.frozen
 class Body:
     """What a run of the unit is made from, before it has a mesh.
@@ -82,7 +91,7 @@ class Body:
         if self.mesh.resolved:
             # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
             return mesh_of(self.unit, self.mesh, cache=cache)
-        mesh = mesh_of(self.drawn or self.unit, self.mesh, cache=cache)
+        mesh = _mesh_kept(self.drawn or self.unit, self.mesh, cache)
         return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
 
     @property

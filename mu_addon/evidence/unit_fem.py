@@ -37,9 +37,9 @@ Progress = Callable[[str, float], None]
 ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"
 # Kinds of a unit that bends freely.
 FREE = (KIND, step.KIND, pose.KIND)
-# Of the pressures' range: the most that a step to which its ends are rounded may be, so that what rounding
-# takes away lies well within the margin. Steps are 1 and 5 times powers of ten: few protocols end half way.
-ROUND = 0.03
+# Of the pressures' range: the most that a step to which its ends are rounded may be. The quarter of it that
+# rounding may take away lies well within the margin. Steps are 1 and 5 times powers of ten.
+ROUND = 0.06
 # Fewer pressures make no cubic spline.
 FEWEST = 4
 # Along the meridian as fine as the default: there a coarser mesh misses most.
@@ -119,6 +119,8 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
 
     >>> pressures(np.array([0.02, 29.98]), 4, 0.05) == pressures(np.array([-0.02, 30.02]), 4, 0.05)
     True
+    >>> pressures(np.array([-25.0, 12.46]), 4, 0.05) == pressures(np.array([-25.0, 12.54]), 4, 0.05)
+    True
     """
     low, high = min(0.0, float(np.min(readings_kPa))), max(0.0, float(np.max(readings_kPa)))
     if low == high:
@@ -126,7 +128,8 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
     # A gauge's noise moves the ends of a protocol to either side of a round number: its runs stay the same.
     whole = 10.0 ** math.floor(math.log10(ROUND * (high - low)))
     step = 5.0 * whole if 5.0 * whole <= ROUND * (high - low) else whole
-    low, high = (step * round(end / step) for end in (low, high))
+    # Protocols end at steps and half way between them: both far from a quarter, where rounding changes.
+    low, high = (math.copysign(step * math.floor(abs(end) / step + 0.75), end) for end in (low, high))
     beyond = margin * (high - low)
     low, high = _outward(low, -beyond), _outward(high, beyond)
     below = int(np.clip(round((count - 1) * low / (low - high)), 1, count - 2))

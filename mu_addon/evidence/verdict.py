@@ -17,7 +17,7 @@ from .fit import Fit, Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
-from .owned import select_owned
+from .owned import further_owners, select_owned
 from .plausibility import require_plausible
 from .pooled import select_pooled
 from .record import Record, record
@@ -40,6 +40,8 @@ Array = np.ndarray[Any, Any]
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # A nuisance this many spreads from what was known of it is no longer only a nuisance.
 UNLIKELY = 3.0
+# So many, and it stands in for what differs among owners: three leaks as one, with valves shut late.
+STRAINED = 5.0
 # Noise around the causes this many times larger or smaller than around the base model is believed instead.
 RENEWED = 1.5
 
@@ -211,8 +213,9 @@ def diagnose(
             chosen = reselected(fitter, seen, chosen)
     if _kind(fitter, chosen) == "unexplained":
         chosen, seen = select_owned(fitter, seen, chosen, progress)
-    if _kind(fitter, chosen) == "unexplained":
+    if _kind(fitter, chosen) == "unexplained" or (chosen.causes and _strained(fitter, chosen.chosen)):
         chosen = select_pooled(fitter, chosen, progress)
+    chosen = further_owners(fitter, chosen, progress)
     if chosen.causes and not chosen.causes[0].effect.among:
         progress("noise around the causes")
         # What is left of a large cause once its linear part is set aside had counted as noise.
@@ -282,6 +285,11 @@ def _apart(one: Source, other: Source) -> bool:
     """Whether two estimates of one noise differ more than such estimates do."""
     total = [math.hypot(s.white, s.slow) for s in (one, other)]
     return max(total) > RENEWED * min(total)
+
+
+def _strained(fitter: Fitter, fit: Fit) -> bool:
+    """Whether a nuisance is much farther from what was known of it than a nuisance is."""
+    return any(abs(fit.values[p.name] - p.null) > STRAINED * p.spread for p in fitter.known)
 
 
 def _kind(fitter: Fitter, found: Selection) -> str:

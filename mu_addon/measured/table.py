@@ -19,6 +19,8 @@ from .kinds import Kind, markers, may_be_missing, named, quantity_of, units_of
 
 Array = np.ndarray[Any, Any]
 
+# Of a reading in any unit that is read; loggers write the largest number they have where there is none.
+LARGEST = 1e15
 # A gap is an interval this many times as long as the usual one.
 GAP = 5.0
 # A spike leaves its neighbours' line by this many times the usual scatter about such lines, and by this
@@ -185,6 +187,12 @@ def _numbers(body: Sequence[tuple[int, list[str]]], place: int, name: str, width
             values[i] = np.nan
         elif _is_number(cell):
             values[i] = float(cell)
+            if abs(values[i]) > LARGEST:
+                raise InputError(
+                    f"{cell} is no reading",
+                    _at(path, row, name),
+                    "correct it, or leave the cell empty where nothing was read",
+                )
         else:
             raise InputError(
                 f"{cell!r} is not a number", _at(path, row, name), "correct it, or leave the row out"

@@ -127,3 +127,26 @@ def test_leaks_of_several_chambers_are_each_their_own():
     np.testing.assert_allclose(each, losses, rtol=0.05, atol=1e-5)
     # Of the tight ones the interval begins at none.
     assert [verdict.intervals[k][0] > 0.0 for k in keys] == [True, True, False, True, False]
+
+
+@pytest.mark.slow
+def test_a_small_leak_beside_a_large_one_is_no_slow_noise():
+    """A gauge's slow noise would be in the tight chambers' records, too."""
+    found = judged(chambers([0.0, 1e-3, 0.0, 3e-4]))
+    assert (found.kind, found.names) == ("named", ("leak", "leak"))
+    owners = [c.effect.whose for c in found.selection.causes]
+    assert owners == ["specimen B", "specimen D"]
+    value = found.selection.chosen.values["leak.loss_per_s of specimen D"]
+    assert value == pytest.approx(3e-4, rel=0.05)
+    assert sentence(found)[0] == "leak of specimen B and leak of specimen D"
+
+
+@pytest.mark.slow
+def test_leaks_that_differ_are_not_one_with_valves_shut_late():
+    losses = [5e-4, 1e-3, 1.5e-3]
+    found = judged(chambers(losses))
+    assert (found.kind, found.names) == ("named", ("leak",))
+    (cause,) = found.selection.causes
+    assert cause.effect.among == "specimen"
+    each = [found.selection.chosen.values[key] for key, _ in sizes_of(cause.effect)]
+    np.testing.assert_allclose(each, losses, rtol=0.1)

@@ -134,6 +134,9 @@ def test_no_advice_asks_for_what_a_kind_cannot_do():
 
     assert "valve" not in shown("leak", "pressure_hold")
     assert "mass" not in shown("gravity", "unit_pressure")
+    # A column of temperatures is not read, and a rigid block has no modulus that a specimen can have.
+    assert "recorded" not in shown("temperature_drift", "pressure_hold")
+    assert "rigid" not in shown("frame_compliance", "coupon")
     assert shown("gravity", "unit_pressure", "beam_deadweight").count("; or ") == 1
     # Both laws of one mechanism ask for the same experiment.
     block = LatticeStress([experiment("lattice_compression", {"time_s": TIME, "strain": STRAIN}, **BLOCK)])

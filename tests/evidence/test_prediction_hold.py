@@ -174,3 +174,14 @@ def test_creep_and_cooling_differ_over_two_decades_of_time():
     right = recovered(simulator, [seen], creep, 0.1)[2]
     assert right < 300 + 5 * np.sqrt(600)
     assert wrong > right + 100
+
+
+def test_warmth_of_compression_grows_with_the_pressure():
+    """Compression without loss to 2 and 4 atmospheres warms gas by 64.8 and 143.9 K; then it cools."""
+    time = np.array([0.0, 20.0, 200.0])
+    for ratio, kelvin in ((2.0, 64.83), (4.0, 143.86)):
+        first = (ratio - 1.0) * 101.325
+        p = 101.325 + chamber_pressure(time, first, warmth=0.1, cools_s=20.0)
+        hot = 296.0 + 0.1 * kelvin
+        cooled = (296.0 + 0.1 * kelvin * np.exp(-time / 20.0)) / hot
+        np.testing.assert_allclose(p, ratio * 101.325 * cooled, rtol=1e-4)

@@ -189,6 +189,7 @@ def test_rows_that_a_logger_wrote_twice_are_left_out(tmp_path):
             "'inf' is not a number",
             "row 4, column stress_kPa",
         ),
+        ({}, "strain,stress_kPa\n0,0\n0.1,-1e308\n", "-1e308 is no reading", "row 3, column stress_kPa"),
         ({}, "strain,stress_kPa\n0,0\n0.1,1_0\n", "'1_0' is not a number", "row 3"),
         ({}, "strain,stress_kPa\n0,0\n0,1,2\n", "3 values under 2 columns", "row 3"),
         ({}, "strain,stress_kPa\n0,0\n0.1\n", "1 values under 2 columns", "row 3"),

@@ -87,6 +87,15 @@ EFFECTS = (
         (KIND,),
         "the gas cools to the temperature of the wall, and its pressure with it",
     ),
+    Effect(
+        "temperature_drift",
+        (
+            Parameter("warmth", "", 0.0, 1.0, 0.0, (0.05,), "share of what compression without loss warms"),
+            Parameter("cools_s", "s", 0.5, 3600.0, 30.0, (10.0, 60.0), "to the temperature of the wall"),
+        ),
+        (KIND,),
+        "gas cools that was compressed faster than it gives off its heat, the more the higher its pressure",
+    ),
     *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("pressure_offset", "pressure_gain")),
 )
 
@@ -144,6 +153,8 @@ class ChamberPressure:
             begins_s=get("viscoelasticity.begins_s", 30.0),
             cooling_K=get("temperature_drift.cooling_K", 0.0),
             cooling_s=get("temperature_drift.cooling_s", 30.0),
+            warmth=get("temperature_drift.warmth", 0.0),
+            cools_s=get("temperature_drift.cools_s", 30.0),
             compliance_per_kPa=self._compliance,
         )
         p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
@@ -156,14 +167,19 @@ def _warmed(experiments: Sequence[Experiment], effect: Effect) -> Effect:
 
     Without any heat lost on the way (adiabatic): T / T0 = (P / P0)^((gamma - 1) / gamma), gamma of air.
     """
-    if effect.name != "temperature_drift":
+    if effect.parameters[0].name != "cooling_K":
         return effect
     begun = [0.0, *(beginning_kPa(e) for e in experiments if e.kind == KIND)]
     ratio = np.array([max(1.0 + p / ATMOSPHERE_kPa, 0.05) for p in (min(begun), max(begun))])
     # A few kelvin more: supplies and rooms differ.
-    low, high = ROOM_K * (ratio ** (1.0 - 1.0 / AIR_GAMMA) - 1.0) + np.array([-SUPPLY_K, SUPPLY_K])
+    low, high = _adiabatic_K(ratio) + np.array([-SUPPLY_K, SUPPLY_K])
     cooling, lasts = effect.parameters
     return attrs.evolve(effect, parameters=(cooling.narrowed(float(low), float(high)), lasts))
+
+
+def _adiabatic_K(ratio: Any) -> Any:
+    """Warming in K of the room's air by compression to `ratio` times its pressure, without loss of heat."""
+    return ROOM_K * (ratio ** (1.0 - 1.0 / AIR_GAMMA) - 1.0)
 
 
 def beginning_kPa(experiment: Experiment) -> float:
@@ -193,6 +209,8 @@ def chamber_pressure(
     begins_s: float = 30.0,
     cooling_K: float = 0.0,
     cooling_s: float = 30.0,
+    warmth: float = 0.0,
+    cools_s: float = 30.0,
     compliance_per_kPa: float = 0.0,
 ) -> Array:
     """Gauge pressure (n,) in kPa at times (n,) in s after the valve was shut.
@@ -200,8 +218,10 @@ def chamber_pressure(
     Up to then it is initial_kPa. loss_per_s: k in 1/s; inertia: b, Forchheimer's, no unit; creep_per_kPa: c
     in 1/kPa; onset_s: onset of creep; growth_per_kPa, begins_s: creep as the logarithm of time, g and its
     onset s; cooling_K, cooling_s: excess temperature of the gas at the start and
-    its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the atmosphere, V and T relative to
-    the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
+    its time constant; warmth, cools_s: that excess as a share of what compression to this pressure without
+    loss of heat makes, and its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the
+    atmosphere, V and T relative to the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where
+    x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
     that a small overpressure falls by exp(-k t), and a large b makes it nearly the flow of an orifice.
     hole_per_s: h in 1/s of such a flow itself, P_i dm/dt = -h P0 f(P/P0) (`_through_a_hole`). The volume is
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
@@ -210,7 +230,7 @@ def chamber_pressure(
     from scipy.interpolate import CubicSpline
 
     end = float(time_s[-1])
-    if not (loss_per_s or hole_per_s or creep_per_kPa or growth_per_kPa or cooling_K) or end <= 0:
+    if not (loss_per_s or hole_per_s or creep_per_kPa or growth_per_kPa or cooling_K or warmth) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
     start = initial_kPa + ATMOSPHERE_kPa
     # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
@@ -219,6 +239,9 @@ def chamber_pressure(
     warm = np.ones_like(t)
     if cooling_K:
         warm += cooling_K * np.expm1(-t / cooling_s) / (ROOM_K + cooling_K)
+    if warmth:
+        excess_K = warmth * _adiabatic_K(start / ATMOSPHERE_kPa)
+        warm += excess_K * np.expm1(-t / cools_s) / (ROOM_K + excess_K)
     p, grown = np.full_like(t, initial_kPa), np.zeros_like(t)
     for _ in range(50):
         before = p
