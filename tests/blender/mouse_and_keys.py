@@ -64,7 +64,6 @@ def session():
             yield 3.0
     dragged = wall()
     assert abs(dragged - 0.9) > 1e-4, "no slider was found"
-    assert abs(dragged - 0.9) < 0.5, f"24 pixels changed the wall from 0.9 to {dragged:.4g} mm"
     yield from settled()
     dragged = wall()
     (root,) = unit_object.roots()

@@ -23,8 +23,8 @@ def shown():
 
 def session():
     yield 3.0
-    # In the metres of a new scene, where a step of Blender's would be 10 mm.
-    assert called(bpy.ops.mu.add) == {"FINISHED"}
+    # In metres Blender's smallest step of a drag is 1 mm a pixel.
+    assert called(bpy.ops.mu.add, millimetres=True) == {"FINISHED"}
     assert called(bpy.ops.mu.path, name="alpha4") == {"FINISHED"}
     yield 4.0
     whole = shown()

@@ -87,8 +87,8 @@ def redo_fields(operator):
     return [name for name in shown if "_mm" in name]
 
 
-def test_a_drag_goes_by_hundredths_of_a_millimetre_in_any_scene():
-    """Blender's steps are hundredths of its unit: in a scene of metres those would be 10 mm."""
+def test_the_step_that_is_asked_for_is_of_hundredths_of_a_millimetre_in_any_scene():
+    """Blender rounds it to a unit of length: in a scene of metres a drag goes by 1 mm a pixel, not by 10."""
     root = add(preset="mu-0.75x")
     units = bpy.context.scene.unit_settings
     for system, scale_length in (("METRIC", 1.0), ("METRIC", 0.001), ("IMPERIAL", 1.0), ("NONE", 1.0)):
