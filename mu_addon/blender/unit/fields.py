@@ -95,8 +95,8 @@ def true_lengths(name: str, title: str, text: str, scales: bool, step: float) ->
 
     Typed or dragged, each sets that length, within its bounds. Blender shows fields of lengths in the unit of
     the scene, and of numbers in Blender units; so these are in those. A drag goes by steps that a field has
-    for good, hundredths of a Blender unit: `step` in one field, a thousandth of it in the other, which Blender
-    rounds to 1 mm in a scene of metres.
+    for good, hundredths of a Blender unit: `step` in one field, a thousandth of it in the other, which
+    Blender rounds to 1 mm in a scene of metres.
     """
 
     def read(group) -> float:
