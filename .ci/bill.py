@@ -80,8 +80,10 @@ def _pedigree(name: str, version: str, purl: str, change: Slimmed) -> dict[str, 
         "purl": purl,
         "hashes": [{"alg": "SHA-256", "content": change.sha256}],
     }
+    compiled = f"{', '.join(change.replaced)} compiled anew from this wheel's sources without CUDA; "
     notes = (
         f"{change.files} files, {change.bytes} bytes, left out: {', '.join(change.patterns)}; "
+        f"{compiled if change.replaced else ''}"
         "all others unchanged but RECORD and the build tag in WHEEL"
     )
     return {"ancestors": [ancestor], "notes": notes}

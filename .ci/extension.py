@@ -3,6 +3,7 @@
     python .ci/extension.py FOLDER            check it and write its .zip, without wheels
     python .ci/extension.py FOLDER --bundle   one .zip a platform and Python with its wheels inside, and
                                               index.json: FOLDER can then be hosted as it is
+    python .ci/extension.py FOLDER --bundle --cuda   the same with CUDA in Warp, for a folder of its own
     python .ci/extension.py FOLDER --install  install bpy into this Python first, where it is missing
 
 The tool needs bpy, which a plain `pip install -e .` leaves out: without it this says so before any work.
@@ -11,7 +12,8 @@ Beside them it puts sample.blend and sample-NAME.blend, the sample scenes.
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
 is an ordinary package. What ships is copied together first. Wheels come from pip, each with the SHA-256 that
 wheels.csv pins, and are kept in FOLDER/wheels; five are slimmed (slim.py). numpy is never among them, since
-Blender has its own and a second one would replace it. sbom.cdx.json in the archive lists what it holds.
+Blender has its own and a second one would replace it. For Linux, Warp's library is compiled without its CUDA
+part, 114 MB of the archive (warp_cpu.py). sbom.cdx.json in the archive lists what it holds.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from pathlib import Path
 
 from bill import write_bill
 from slim import slim
-from wheels import BLENDERS, PLATFORMS, PYTHONS, download, not_as_pinned, pinned
+from warp_cpu import library
+from wheels import BLENDERS, PLATFORMS, PYTHONS, download, not_as_pinned, pinned, replaced
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -109,7 +112,7 @@ def bundle(source: Path, wheels: list[Path], platform: str, python: str) -> None
     manifest.write_text(f"{head}\n\n{permissions}{rest}", encoding="utf-8")
 
 
-def build(tool: Path, out: Path, platform: str | None = None, python: str = "") -> int:
+def build(tool: Path, out: Path, platform: str | None = None, python: str = "", cuda: bool = False) -> int:
     """Stage, validate and build one .zip into `out`; the exit status of the first step that fails."""
     slimmed = []
     with tempfile.TemporaryDirectory() as scratch:
@@ -118,13 +121,18 @@ def build(tool: Path, out: Path, platform: str | None = None, python: str = "") 
         target = ["--output-dir", str(out)]
         if platform is not None:
             wheels = []
-            for pinned_wheel in download(out / "wheels", platform, python):
-                wheel, change = slim(pinned_wheel, out / "wheels" / platform / python / "slim")
+            wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
+            for pin, pinned_wheel in zip(wanted, download(out / "wheels", platform, python), strict=True):
+                new = {name: library(pinned_wheel, out / "wheels" / "warp") for name in replaced(pin, cuda)}
+                wheel, change = slim(pinned_wheel, out / "wheels" / platform / python / "slim", new)
                 wheels.append(wheel)
                 slimmed += [change] if change else []
             bundle(source, wheels, platform, python)
             version = tomllib.loads((source / "blender_manifest.toml").read_text(encoding="utf-8"))["version"]
-            archive = out / f"mu_addon-{version}-{platform}-py{python.replace('.', '')}.zip"
+            archive = (
+                out
+                / f"mu_addon-{version}-{platform}-py{python.replace('.', '')}{'-cuda' if cuda else ''}.zip"
+            )
             target = ["--output-filepath", str(archive)]
         write_bill(source, slimmed)
         for arguments in (["validate", str(source)], ["build", "--source-dir", str(source), *target]):
@@ -132,8 +140,7 @@ def build(tool: Path, out: Path, platform: str | None = None, python: str = "") 
             if status:
                 return status
     if platform is not None:
-        wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
-        wrong = not_as_pinned(archive, wanted, out / "wheels")
+        wrong = not_as_pinned(archive, wanted, out / "wheels", cuda)
         if wrong:
             archive.unlink()
             sys.stderr.write("\n".join(wrong) + "\n")
@@ -150,6 +157,7 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--platform", nargs="+", choices=PLATFORMS, default=list(PLATFORMS))
     parser.add_argument("--python", nargs="+", choices=PYTHONS, default=list(PYTHONS))
+    parser.add_argument("--cuda", action="store_true", help="keep the CUDA part of Warp's library for Linux")
     parser.add_argument("--install", action="store_true", help="install bpy first, where it is missing")
     options = parser.parse_args(arguments)
     tool = blender_ext()
@@ -168,9 +176,12 @@ def main(arguments: list[str]) -> int:
         return build(tool, out)
     for platform, python in product(options.platform, options.python):
         try:
-            status = build(tool, out, platform, python)
+            status = build(tool, out, platform, python, options.cuda)
         except subprocess.CalledProcessError as error:
-            sys.stderr.write(f"pip did not find the wheels of {platform} as pinned: {error}\n")
+            sys.stderr.write(f"the wheels of {platform} could not be got as pinned: {error}\n")
+            status = 1
+        except RuntimeError as error:
+            sys.stderr.write(f"{error}\n")
             status = 1
         if status:
             return status

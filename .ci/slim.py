@@ -1,9 +1,10 @@
 """Wheels without what no module imports: tests, examples, manuals, headers, sources of compiled code.
 
 A slimmed wheel is made from the pinned one and no other: every file that stays is the same to the byte, but
-for the list of files (RECORD) and the build tag in WHEEL. Nothing is left out that another extension of
-Blender's could import, since all extensions share one folder of packages; licences stay. `sbom.cdx.json`
-names the wheel that it was made from, with its SHA-256, and what was left out.
+for the list of files (RECORD), the build tag in WHEEL, and Warp's library for Linux, which is compiled anew
+without CUDA (warp_cpu.py). Nothing is left out that another extension of Blender's could import, since all
+extensions share one folder of packages; licences stay. `sbom.cdx.json` names the wheel that it was made from,
+with its SHA-256, and what was left out or replaced.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import csv
 import hashlib
 import io
 import zipfile
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
@@ -32,7 +34,7 @@ BUILD = "0slim"
 
 
 class Slimmed(NamedTuple):
-    """A wheel that was slimmed: its name, the wheel it was made from, and what was left out."""
+    """A wheel that was slimmed: its name, the wheel it was made from, what was left out and replaced."""
 
     name: str
     original: str
@@ -40,6 +42,7 @@ class Slimmed(NamedTuple):
     patterns: tuple[str, ...]
     files: int
     bytes: int
+    replaced: tuple[str, ...] = ()
 
 
 def slimmed_name(name: str) -> str:
@@ -48,11 +51,14 @@ def slimmed_name(name: str) -> str:
     return "-".join([package, rest[0], BUILD, rest[1]]) if package.lower() in PARTS else name
 
 
-def slim(wheel: Path, folder: Path) -> tuple[Path, Slimmed | None]:
+def slim(
+    wheel: Path, folder: Path, replaced: Mapping[str, bytes] | None = None
+) -> tuple[Path, Slimmed | None]:
     """Make the slimmed wheel of a pinned one in `folder`; the wheel itself and None where it stays whole.
 
-    Equal wheels give equal bytes.
+    replaced: other content of files, by name. Equal wheels give equal bytes.
     """
+    replaced = replaced or {}
     patterns = PARTS.get(wheel.name.split("-")[0].lower(), ())
     if not patterns:
         return wheel, None
@@ -62,25 +68,34 @@ def slim(wheel: Path, folder: Path) -> tuple[Path, Slimmed | None]:
     with zipfile.ZipFile(wheel) as source, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as target:
         left_out = [i for i in source.infolist() if _left_out(i.filename, patterns)]
         names = {i.filename for i in left_out}
-        changed = _changed(source, names)
+        changed = {**replaced, **_changed(source, names, replaced)}
         for info in source.infolist():
             if info.filename not in names:
                 target.writestr(info, changed.get(info.filename) or source.read(info), zipfile.ZIP_DEFLATED)
     beside.replace(made)
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
     size = sum(i.file_size for i in left_out)
-    return made, Slimmed(made.name, wheel.name, digest, patterns, len(left_out), size)
+    return made, Slimmed(made.name, wheel.name, digest, patterns, len(left_out), size, tuple(replaced))
 
 
-def differences(made: zipfile.ZipFile, original: zipfile.ZipFile) -> list[str]:
-    """What a slimmed wheel has otherwise than PARTS says: a file too many or too few, other content."""
+def differences(
+    made: zipfile.ZipFile, original: zipfile.ZipFile, replaced: Mapping[str, str] | None = None
+) -> list[str]:
+    """What a slimmed wheel has otherwise than PARTS says: a file too many or too few, other content.
+
+    replaced: SHA-256 of each file that is another than in the original, by name.
+    """
+    replaced = replaced or {}
     package = Path(str(original.filename)).name.split("-")[0].lower()
     expected = {n for n in original.namelist() if not _left_out(n, PARTS.get(package, ()))}
     names = set(made.namelist())
     wrong = [f"{name} was added" for name in sorted(names - expected)]
     wrong += [f"{name} was lost" for name in sorted(expected - names)]
     own = _own(original)
-    for name in sorted(names & expected - set(own)):
+    for name in sorted(names & replaced.keys()):
+        if hashlib.sha256(made.read(name)).hexdigest() != replaced[name]:
+            wrong.append(f"{name} has another SHA-256 than pinned")
+    for name in sorted(names & expected - set(own) - replaced.keys()):
         if made.getinfo(name).CRC != original.getinfo(name).CRC or made.read(name) != original.read(name):
             wrong.append(f"{name} was changed")
     return wrong
@@ -98,19 +113,21 @@ def _own(package: zipfile.ZipFile) -> tuple[str, str]:
     return record, record.removesuffix("RECORD") + "WHEEL"
 
 
-def _changed(source: zipfile.ZipFile, left_out: set[str]) -> dict[str, bytes]:
-    """RECORD without what is left out, and WHEEL with the build tag."""
+def _changed(source: zipfile.ZipFile, left_out: set[str], replaced: Mapping[str, bytes]) -> dict[str, bytes]:
+    """RECORD without what is left out and with what is replaced, and WHEEL with the build tag."""
     record, wheel = _own(source)
     lines = source.read(wheel).decode().rstrip("\n").splitlines()
     tagged = (
         "\n".join([*(x for x in lines if not x.startswith("Build:")), f"Build: {BUILD}"]) + "\n"
     ).encode()
-    digest = base64.urlsafe_b64encode(hashlib.sha256(tagged).digest()).rstrip(b"=").decode()
+    new = {**replaced, wheel: tagged}
     rows = io.StringIO()
     write = csv.writer(rows, lineterminator="\n").writerow
     for row in csv.reader(io.StringIO(source.read(record).decode())):
-        if row and row[0] == wheel:
-            write([wheel, f"sha256={digest}", len(tagged)])
+        if row and row[0] in new:
+            content = new[row[0]]
+            digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+            write([row[0], f"sha256={digest}", len(content)])
         elif row and row[0] not in left_out:
             write(row)
     return {record: rows.getvalue().encode(), wheel: tagged}

@@ -53,7 +53,7 @@ class SolverChoice:
             raise InputError(
                 f"Warp sees no device {self.device} on this machine",
                 "--device",
-                f"it sees {', '.join(seen)}" if seen else "give cpu; for CUDA install NVIDIA's driver",
+                f"it sees {', '.join(seen)}" if seen else _without_cuda(),
             )
 
     def resolved(self, mesh: Mesh, needs_factor: bool = False) -> tuple[str, str]:
@@ -94,6 +94,15 @@ def free_memory_bytes() -> float | None:
         return float(os.sysconf("SC_AVPHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def _without_cuda() -> str:
+    """What to do where Warp sees no CUDA device."""
+    import warp as wp
+
+    if wp.get_cuda_toolkit_version() is None:
+        return "give cpu; this Warp is built without CUDA: install the extension's archive that ends in -cuda"
+    return "give cpu; for CUDA install NVIDIA's driver"
 
 
 def cuda_devices() -> list[str]:

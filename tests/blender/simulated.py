@@ -26,7 +26,8 @@ def parts():
 
 def event(kind, value, **rest):
     """One event where the mouse is."""
-    parts()[0].event_simulate(type=kind, value=value, x=int(place[0]), y=int(place[1]), **rest)
+    window = bpy.context.window_manager.windows[0]
+    window.event_simulate(type=kind, value=value, x=int(place[0]), y=int(place[1]), **rest)
 
 
 def key(kind, **rest):
@@ -39,6 +40,27 @@ def move(x, y):
     """Move the mouse to a place in the window, in pixels from its lower left."""
     place[:] = [x, y]
     event("MOUSEMOVE", "NOTHING")
+
+
+def click(x, y):
+    """A click of the left button, once Blender has seen the mouse there."""
+    move(x, y)
+    yield 1.0
+    key("LEFTMOUSE")
+    yield 1.5
+
+
+def drag(start, end, steps=6):
+    """From one place to another with the left button held."""
+    move(*start)
+    yield 1.0
+    event("LEFTMOUSE", "PRESS")
+    yield 0.5
+    for k in range(1, steps + 1):
+        move(*(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
+        yield 0.3
+    event("LEFTMOUSE", "RELEASE")
+    yield 1.5
 
 
 def called(operator, how="EXEC_DEFAULT", **settings):

@@ -23,7 +23,7 @@ def shown():
 
 def session():
     yield 3.0
-    # In metres a drag moves a length by 10 mm a step.
+    # In metres Blender's smallest step of a drag is 1 mm a pixel.
     assert called(bpy.ops.mu.add, millimetres=True) == {"FINISHED"}
     assert called(bpy.ops.mu.path, name="alpha4") == {"FINISHED"}
     yield 4.0
@@ -53,6 +53,7 @@ def session():
             break
     dragged = unit().chambers.wall_mm
     assert abs(dragged - 0.9) > 1e-4, "no field was found in the redo panel"
+    assert abs(dragged - 0.9) < 0.5, f"24 pixels changed the wall from 0.9 to {dragged:.4g} mm"
     assert not unit_object.behind(unit_object.roots()[0])
     key("ESC")
     yield 3.0

@@ -2,7 +2,8 @@
 
 MU_BLENDER is the command of a Blender (`blender`, or several words); MU_BLENDER_UI one that opens a window:
 it is given a Python file, a .png for a picture of the screen and a number of seconds, and starts that Blender
-with --enable-event-simulate.
+with --enable-event-simulate. MU_ARCHIVE is an archive that is built already, for its Python; without it one
+is built here, which compiles Warp's library.
 """
 
 import json
@@ -53,6 +54,8 @@ def call(home, *arguments, command=BLENDER):
 
 @pytest.fixture(scope="module")
 def archive(home, tmp_path_factory):
+    if os.environ.get("MU_ARCHIVE"):
+        return Path(os.environ["MU_ARCHIVE"])
     output = call(home, "-b", "--python-expr", "import sys; print('Python %d.%d.' % sys.version_info[:2])")
     python = output.split("Python ")[1].split(".\n")[0]
     out = tmp_path_factory.mktemp("built")
@@ -127,7 +130,9 @@ def test_an_upgrade_keeps_the_users_presets(installed, home, archive):
 
 
 @pytest.mark.skipif(not WINDOW, reason="NOT TESTED with mouse and keys: set MU_BLENDER_UI")
-@pytest.mark.parametrize("script", ["mouse_and_keys.py", "steps_by_mouse.py", "gestures_in_window.py"])
+@pytest.mark.parametrize(
+    "script", ["mouse_and_keys.py", "steps_by_mouse.py", "trees_by_mouse.py", "gestures_in_window.py"]
+)
 def test_mouse_and_keys(script, installed, home, tmp_path):
     os.environ["MU_TEST_FOLDER"] = str(tmp_path)
     call(home, HERE / script, tmp_path / "screen.png", 900, command=WINDOW)

@@ -53,4 +53,16 @@ def test_names_that_are_not_known_are_refused():
     if not wp.get_cuda_devices():
         with pytest.raises(InputError, match="sees no device cuda:0"):
             SolverChoice(device="cuda:0").require_device()
+
+
+def test_a_warp_without_cuda_says_where_it_is(monkeypatch):
+    monkeypatch.setattr(solver, "cuda_devices", list)
+    for version, remedy in ((None, "archive that ends in -cuda"), ((13, 4), "NVIDIA's driver")):
+        monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda version=version: version)
+        with pytest.raises(InputError) as caught:
+            SolverChoice(device="cuda:0").require_device()
+        assert remedy in caught.value.remedy
+
+
+def test_free_memory_is_known_or_not_asked_for():
     assert solver.free_memory_bytes() is None or solver.free_memory_bytes() > 0

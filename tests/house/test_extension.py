@@ -190,6 +190,79 @@ def test_another_change_of_a_slimmed_wheel_is_refused(tmp_path, ci, published):
     assert f"wheels/{made.name} has another SHA-256 than pinned" in found
 
 
+WARP = {
+    "warp/bin/warp.so": "all of it",
+    "warp/native/warp.cpp": "int x;",
+    "warp_lang-1.dist-info/METADATA": "Name: warp-lang\nVersion: 1\n",
+    "warp_lang-1.dist-info/WHEEL": "Wheel-Version: 1.0\n",
+}
+
+
+def test_warps_library_is_replaced_by_the_pinned_one_alone(tmp_path, ci, published, monkeypatch):
+    slim, wheels, bill = ci("slim"), ci("wheels"), ci("bill")
+    whole = published.with_name("warp_lang-1-py3-none-any.whl")
+    record = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in WARP.items()]
+    with zipfile.ZipFile(whole, "w") as stream:
+        for name, text in WARP.items():
+            stream.writestr(name, text)
+        stream.writestr("warp_lang-1.dist-info/RECORD", "".join(record))
+    sha = hashlib.sha256(whole.read_bytes()).hexdigest()
+    pin = wheels.Wheel("linux-x64", "3.11", "warp-lang", "1", whole.name, sha)
+    library = b"for the processor"
+    monkeypatch.setattr(wheels.warp_cpu, "SHA256", hashlib.sha256(library).hexdigest())
+    made, change = slim.slim(whole, tmp_path / "slim", {"warp/bin/warp.so": library})
+    held = {made.name: made.read_bytes()}
+    with zipfile.ZipFile(made) as package:
+        assert package.read("warp/bin/warp.so") == library
+        rows = package.read("warp_lang-1.dist-info/RECORD").decode().splitlines()
+    assert f"warp/bin/warp.so,sha256={digest(library)},{len(library)}" in rows
+    assert wheels.not_as_pinned(archive_of(tmp_path, held), [pin], tmp_path) == []
+    # With CUDA the published library has to be there, and no other is taken for the pinned one.
+    (wrong,) = wheels.not_as_pinned(archive_of(tmp_path, held), [pin], tmp_path, cuda=True)
+    assert wrong == f"wheels/{made.name}: warp/bin/warp.so was changed"
+    other, _ = slim.slim(whole, tmp_path / "slim", {"warp/bin/warp.so": b"another"})
+    (wrong,) = wheels.not_as_pinned(archive_of(tmp_path, {other.name: other.read_bytes()}), [pin], tmp_path)
+    assert wrong == f"wheels/{made.name}: warp/bin/warp.so has another SHA-256 than pinned"
+    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    slim.slim(whole, tmp_path / "wheels", {"warp/bin/warp.so": library})
+    bill.write_bill(tmp_path, [change])
+    (component,) = json.loads((tmp_path / "sbom.cdx.json").read_text())["components"]
+    assert "warp/bin/warp.so compiled anew" in component["pedigree"]["notes"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="an ELF library")
+def test_warps_library_for_the_processor_refuses_what_it_lacks(ci):
+    warp_cpu = ci("warp_cpu")
+    folder = Path(importlib.util.find_spec("warp").origin).parent
+    names = warp_cpu.exported((folder / "bin" / "warp.so").read_bytes())
+    assert {"wp_init", "wp_volume_create_host", "wp_nanovdb_version", "wp_mesh_create_host"} <= names
+    assert all(name.startswith("wp_") for name in names)
+    lines = warp_cpu.refusals({n for n in names if n.startswith("wp_volume_")}).splitlines()
+    assert len(lines) == 1 + len({n for n in names if n.startswith("wp_volume_")})
+    assert 'wp_volume_create_host() { wp::set_error_string("wp_volume_create_host: ' in "".join(lines)
+    # What is compiled lies in the wheel, without the sources that need what it lacks.
+    sources = {p.name for p in (folder / "native").glob("*.cpp")}
+    assert {"warp.cpp", "mesh.cpp", "bvh_cubql.cpp", *warp_cpu._VOLUMES} <= sources
+
+
+def test_a_library_of_other_bytes_than_pinned_is_refused(tmp_path, ci, monkeypatch):
+    warp_cpu = ci("warp_cpu")
+    made = []
+
+    def compiled(wheel, packages):
+        made.append(wheel)
+        return b"what came out"
+
+    monkeypatch.setattr(warp_cpu, "_compiler", lambda folder: folder)
+    monkeypatch.setattr(warp_cpu, "_compiled", compiled)
+    with pytest.raises(RuntimeError, match=r"has SHA-256 .*, pinned is"):
+        warp_cpu.library(tmp_path / "warp.whl", tmp_path)
+    monkeypatch.setattr(warp_cpu, "SHA256", hashlib.sha256(b"what came out").hexdigest())
+    for _ in range(2):
+        assert warp_cpu.library(tmp_path / "warp.whl", tmp_path) == b"what came out"
+    assert len(made) == 1, "the one that was refused is the pinned one now, and is kept"
+
+
 def test_the_bill_says_what_a_slimmed_wheel_was_made_from(tmp_path, ci, published):
     (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
     made, change = ci("slim").slim(published, tmp_path / "wheels")

@@ -12,7 +12,7 @@ from ...design.rigid_body import FRICTION
 from ..shared import displays, scene_units
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.fields import exact, generated_fields, true_length
+from ..unit.fields import FINE, TRUE, distance, exact, generated_fields, true_lengths
 from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()
@@ -83,15 +83,19 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             max=199.0,
             update=_changed,
         ),
-        "cube_mm_true": true_length("cube_mm", "Cube", "Side of the cube that is grasped", scales=False),
-        "cube_height": FloatProperty(
-            name="Its Height",
-            description="Of the middle of the cube above the plate",
-            subtype="DISTANCE",
-            get=_cube_height,
-            set=_put_cube,
-            options={"SKIP_SAVE"},
-        ),
+        **true_lengths("cube_mm", "Cube", "Side of the cube that is grasped", scales=False, step=10),
+        **{
+            name: distance(
+                10,
+                end,
+                name="Its Height",
+                description="Of the middle of the cube above the plate",
+                get=_cube_height,
+                set=_put_cube,
+                options={"SKIP_SAVE"},
+            )
+            for name, end in (("cube_height", TRUE), ("cube_height_fine", FINE))
+        },
         "density_g_per_ml": FloatProperty(
             name="Density (g/ml)",
             description="Of the cube, which decides its weight. The default is solid PLA, assumed",

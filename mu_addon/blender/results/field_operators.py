@@ -40,6 +40,13 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
         name="Jump to the Largest", description="Go to the frame of the field's largest value", default=True
     )
 
+    @classmethod
+    def description(cls, context, properties):
+        root = unit_object.active_root(context)
+        reason = lacking(root, properties.field) if root is not None else ""
+        text = next(f.text for f in field_colours.FIELDS if f.name == properties.field)
+        return f"{text}. Not here: {reason}" if reason else f"{cls.__doc__}: {text}"
+
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
@@ -67,6 +74,18 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
         if self.frame:
             frame_in_view(context, root)
         return {"FINISHED"}
+
+
+def lacking(root, field: str) -> str:
+    """Why the shown run has no such field; empty where it has."""
+    motion = motion_parts.motion_of(root)
+    if motion is None:
+        return "there is no motion yet"
+    try:
+        whose(root, motion, field)
+    except InputError as error:
+        return error.what
+    return ""
 
 
 def whose(root, motion, field: str) -> str:

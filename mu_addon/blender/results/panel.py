@@ -12,7 +12,7 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import field_colours, legend_object, run_motions, thumbnails
+from . import field_colours, field_operators, legend_object, run_motions, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION
 
@@ -76,22 +76,25 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
                 text=f"{best['length_mm']:.0f} mm long, {search['checked']} of {search['paths']} solved"
             )
         if motion_parts.motion_of(root) is not None:
-            _look_buttons(layout, root)
+            _look_buttons(layout, root, bool(ranking))
         row = layout.row(align=True)
         row.operator("mu.open", text="Report", icon="URL").what = "report"
         row.operator("mu.open", text="Folder", icon="FILE_FOLDER").what = "folder"
 
 
-def _look_buttons(layout, root) -> None:
-    """What is looked at most, one click each."""
+def _look_buttons(layout, root, ranked: bool) -> None:
+    """What is looked at most, one click each; grey is what the shown run has not."""
     grid = layout.grid_flow(columns=2, align=True, even_columns=True, row_major=True)
     settings = root.mu_motion
     for name, text in BUTTONS:
         on = unit_object.shows_result(root) and settings.field == name
-        grid.operator("mu.field_show", text=text, depress=on).field = name
+        cell = grid.row(align=True)
+        cell.active = not field_operators.lacking(root, name)
+        cell.operator("mu.field_show", text=text, depress=on).field = name
     row = layout.row()
     row.use_property_split = False
-    row.prop(root.mu_unit, "candidates", text="Ranking on the Lattice", toggle=True, icon="CURVE_PATH")
+    text = "Ranking on the Lattice" if ranked else "Candidates on the Lattice"
+    row.prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
 
 
 class _OfResults(UnitPanel):

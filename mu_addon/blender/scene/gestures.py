@@ -210,6 +210,9 @@ def _after_import(imported: Any) -> None:
     for obj in objects:
         if displays.editable(obj) and displays.uuid_of(obj):
             own(obj)
+            if obj.mu_unit.uuid and obj.type == "MESH":
+                # Blender may reuse a mesh that it brought in before.
+                unit_object.separate(obj)
             if all(obj.lock_scale):
                 # Its place is for who brings it in to choose: only its size is that of the other file.
                 obj.scale = (scene_units.mm(bpy.context.scene),) * 3

@@ -4,7 +4,7 @@
 
 import attrs
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...design.nearest import tied
 from ...design.parameters import SECTIONS
@@ -14,7 +14,18 @@ from ..shared import updates
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.fields import TRUE, blender_property, exact, in_scene, label, tooltip
+from ..unit.fields import (
+    FINE,
+    TRUE,
+    blender_property,
+    distance,
+    exact,
+    in_scene,
+    label,
+    step_of,
+    tooltip,
+    true_end,
+)
 from ..unit.properties import from_unit, to_unit
 from . import state as stack
 
@@ -32,9 +43,8 @@ def _annotations(step: Step) -> dict:
             found[d.name] = blender_property(d, options={"SKIP_SAVE"})
             if d.unit == "mm":
                 # Scripts set it in mm at scale 1; the redo panel has it as it is, in the scene's unit.
-                found[d.name] = blender_property(d, options={"SKIP_SAVE", "HIDDEN"})
-                shared = {"name": label(d), "description": tooltip(d), "subtype": "DISTANCE"}
-                found[d.name + TRUE] = FloatProperty(precision=6, options={"SKIP_SAVE"}, **shared)
+                shared = {"name": label(d), "description": tooltip(d), "options": {"SKIP_SAVE"}}
+                found |= {d.name + end: distance(step_of(d.high), end, **shared) for end in (TRUE, FINE)}
     if step.muting:
         found["muted"] = BoolProperty(
             name="Mute", description=f"Leave this step out: {step.muting}", options={"SKIP_SAVE"}
@@ -62,12 +72,13 @@ class _OfStep(UnitOperator):
         unit = to_unit(props)
         given: dict[str, dict] = {}
         for section, name in stack.own_parameters(self.step):
-            if self.properties.is_property_set(name) or self._has_true(name):
+            true = self._true_given(name)
+            if true or self.properties.is_property_set(name):
                 value = getattr(self, name)
-                if self._has_true(name):
-                    # In a scene of metres a drag of one step is longer than most lengths: it ends at a bound.
+                if true:
+                    # What is dragged past a bound ends there.
                     d = stack.description(section, name)
-                    value = getattr(self, name + TRUE) / self._in_scene(props, section, name)
+                    value = getattr(self, true) / self._in_scene(props, section, name)
                     value = min(max(value, d.low), d.high)
                 value = exact(value) if isinstance(value, float) else value
                 if value != getattr(getattr(unit, section), name):
@@ -90,8 +101,20 @@ class _OfStep(UnitOperator):
         self.report({"INFO"}, f"Updated: {', '.join(made)}; all other steps unchanged")
         return {"FINISHED"}
 
-    def _has_true(self, name: str) -> bool:
-        return hasattr(self, name + TRUE) and self.properties.is_property_set(name + TRUE)
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for _, name in stack.own_parameters(self.step):
+            shown = name + true_end(context.scene)
+            layout.prop(self, shown if hasattr(self, shown) else name)
+        if self.step.muting:
+            layout.prop(self, "muted")
+
+    def _true_given(self, name: str) -> str:
+        """The field of a true length that is given: that of the redo panel before a script's."""
+        end = true_end(bpy.context.scene)
+        fields = [name + end, name + TRUE, name + FINE]
+        return next((f for f in fields if hasattr(self, f) and self.properties.is_property_set(f)), "")
 
     def _in_scene(self, props, section: str, name: str) -> float:
         return in_scene(props, not stack.description(section, name).fixed)
@@ -101,8 +124,9 @@ class _OfStep(UnitOperator):
         for section, name in stack.own_parameters(self.step):
             value = getattr(getattr(props, section), name)
             setattr(self, name, value)
-            if hasattr(self, name + TRUE):
-                setattr(self, name + TRUE, exact(value) * self._in_scene(props, section, name))
+            for end in (TRUE, FINE):
+                if hasattr(self, name + end):
+                    setattr(self, name + end, exact(value) * self._in_scene(props, section, name))
 
 
 def _generated(step: Step) -> type:

@@ -79,17 +79,24 @@ def blender_property(d: Description, update=None, options=frozenset()):
         min=d.low,
         max=d.high,
         precision=3 if d.high < 1000 else 1,
-        step=10 if d.high > 20 else 1,
+        step=step_of(d.high),
         **length,
         **shared,
     )
 
 
-def true_length(name: str, title: str, text: str, scales: bool):
-    """A field for the length `name`, in mm at scale 1 where it `scales`, as it is: true, in the scene's unit.
+def step_of(high_mm: float) -> int:
+    """Hundredths of a millimetre by which a drag of one pixel changes a length of up to so many mm."""
+    return 10 if high_mm > 20 else 1
 
-    Typed or dragged, it sets that length, within its bounds. Blender shows fields of lengths in the unit of
-    the scene, and of numbers in Blender units; so this one is in those.
+
+def true_lengths(name: str, title: str, text: str, scales: bool, step: float) -> dict[str, Any]:
+    """Two fields for the length `name`, in mm at scale 1 where it `scales`: as it is, in the scene's unit.
+
+    Typed or dragged, each sets that length, within its bounds. Blender shows fields of lengths in the unit of
+    the scene, and of numbers in Blender units; so these are in those. A drag goes by steps that a field has
+    for good, hundredths of a Blender unit: `step` in one field, a thousandth of it in the other, which
+    Blender rounds to 1 mm in a scene of metres.
     """
 
     def read(group) -> float:
@@ -98,8 +105,15 @@ def true_length(name: str, title: str, text: str, scales: bool):
     def write(group, value: float) -> None:
         setattr(group, name, exact(value / in_scene(group.id_data.mu_unit, scales)))
 
-    shared = {"name": title, "description": text, "subtype": "DISTANCE", "precision": 6}
-    return FloatProperty(get=read, set=write, options={"SKIP_SAVE"}, **shared)
+    shared = {"name": title, "description": text, "get": read, "set": write, "options": {"SKIP_SAVE"}}
+    return {name + end: distance(step, end, **shared) for end in (TRUE, FINE)}
+
+
+def distance(step: float, end: str, **shared):
+    """A property in Blender units, for names that end so."""
+    return FloatProperty(
+        subtype="DISTANCE", precision=6, step=step * (1e-3 if end == FINE else 1.0), **shared
+    )
 
 
 def in_scene(unit, scales: bool) -> float:
@@ -115,8 +129,13 @@ def shown_value(group, d: Description, value: float) -> str:
     return scene_units.length(bpy.context.scene, value * scale, digits=6)
 
 
-TRUE = "_true"
-"""What the name of a parameter's field `true_length` ends with."""
+TRUE, FINE = "_true", "_true_fine"
+"""What the names of the two fields of `true_lengths` end with."""
+
+
+def true_end(scene) -> str:
+    """Which of the two is dragged by small steps in a scene: the fine one where a Blender unit is a metre."""
+    return FINE if scene_units.mm(scene) < 0.05 else TRUE
 
 
 def field(group, d: Description) -> str:
@@ -124,7 +143,8 @@ def field(group, d: Description) -> str:
     if d.unit != "mm":
         return d.name
     scaled = not d.fixed and group.id_data.mu_unit.scale != 1.0
-    return d.name + TRUE if scaled or not scene_units.in_millimetres(bpy.context.scene) else d.name
+    scene = bpy.context.scene
+    return d.name + true_end(scene) if scaled or not scene_units.in_millimetres(scene) else d.name
 
 
 def _tied_update(name: str, changed):
@@ -148,5 +168,5 @@ def generated_fields(section: type, changed) -> dict[str, Any]:
         update = _tied_update(d.name, changed) if len(tied({d.name: 0.0})) > 1 else changed
         annotations[d.name] = blender_property(d, update)
         if d.unit == "mm":
-            annotations[d.name + TRUE] = true_length(d.name, label(d), tooltip(d), not d.fixed)
+            annotations |= true_lengths(d.name, label(d), tooltip(d), not d.fixed, step_of(d.high))
     return annotations

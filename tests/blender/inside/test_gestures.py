@@ -323,6 +323,19 @@ def test_appended_it_is_a_unit_of_its_own(tmp_path):
     assert len({root.mu_unit.uuid for root in unit_object.roots()}) == 2
 
 
+def test_an_asset_that_is_dropped_again_has_a_mesh_of_its_own(tmp_path):
+    """Blender reuses what it brought in before; a mesh that ten units share is slower to bring in, too."""
+    file, tall, _ = library(tmp_path / "there")
+    for _ in range(3):
+        bpy.ops.wm.append(directory=f"{file}/Object/", filename="stored", do_reuse_local_id=True)
+    units = unit_object.roots()
+    assert len({root.mu_unit.uuid for root in units}) == len({root.data.name for root in units}) == 3
+    assert all(root.mu_unit.preview == root.data for root in units)
+    units[1].mu_unit.chambers.count = 4
+    heights = sorted(round(size(root)[2], 3) for root in units)
+    assert heights == [round(0.75 * 56.0, 3), round(tall, 3), round(tall, 3)]
+
+
 def test_linked_it_shows_and_says_why_it_does_not_change(tmp_path):
     file, tall, _ = library(tmp_path / "there")
     root = fetched(file, "stored", link=True)

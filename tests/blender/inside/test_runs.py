@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 
-from mu_addon.blender.results import legend, panel, places, probe, run_panel, runs
+from mu_addon.blender.results import field_operators, legend, panel, places, probe, run_panel, runs
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import object as unit_object
@@ -267,5 +267,12 @@ def test_the_probe_says_value_place_and_time(home):
 def test_a_field_that_the_run_has_not_is_refused_with_what_to_do(home):
     started(home)
     assert "without self-contact" in refused(bpy.ops.mu.field_show, field="contact_pressure_kPa")
+    # The button of a field that is not there is grey, and its tooltip says why.
+    root = unit_object.active_root(bpy.context)
+    assert field_operators.lacking(root, "von_mises_kPa") == ""
+    for field, words in (("contact_pressure_kPa", "without self-contact"), ("von_mises_kPa", "")):
+        kind = field_operators.MU_OT_field_show
+        text = kind.description(bpy.context, SimpleNamespace(field=field))
+        assert (f"Not here: this run was simulated {words}" in text) == bool(words)
     assert "no map of the sensitivity" in refused(bpy.ops.mu.field_show, field="dJ_by_modulus_mm_per_MPa")
     assert "no sensor path" in refused(bpy.ops.mu.field_show, field="deviation_mm")

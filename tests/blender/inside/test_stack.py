@@ -2,15 +2,19 @@
 
 import tempfile
 from collections import Counter
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
 from mu_addon.blender.preview import nodes
+from mu_addon.blender.shared import scene_units
+from mu_addon.blender.steps import operators as steps_operators
 from mu_addon.blender.steps import state as stack
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.drawing import DRAWN, PARTS
+from mu_addon.blender.unit.fields import field
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.steps import STEPS
 
@@ -53,9 +57,8 @@ def test_each_step_runs_alone_with_its_own_parameters():
             continue
         operator = getattr(bpy.ops.mu, step.name)
         own = {name for _, name in stack.own_parameters(step)}
-        shown = {p.identifier.removesuffix("_true") for p in operator.get_rna_type().properties} - {
-            "rna_type"
-        }
+        fields = {p.identifier for p in operator.get_rna_type().properties} - {"rna_type"}
+        shown = {name.removesuffix("_fine").removesuffix("_true") for name in fields}
         assert shown == own | ({"muted"} if step.muting else set()), (step.name, shown)
         assert made(operator) == {step.name}
         assert props.step == list(STEPS).index(step.name)
@@ -72,12 +75,42 @@ def test_each_step_runs_alone_with_its_own_parameters():
     assert round(props.waveguide.well_depth_mm, 4) == 0.3
 
 
+CHAMBERS = next(c for c in steps_operators.CLASSES if c.bl_idname == "mu.chambers")
+
+
+def redo_fields(operator):
+    """Names of the lengths in a step's redo panel."""
+    shown = []
+    layout = SimpleNamespace(prop=lambda data, name: shown.append(name))
+    members = dict.fromkeys(operator.__annotations__)
+    operator.draw(SimpleNamespace(layout=layout, step=operator.step, **members), bpy.context)
+    return [name for name in shown if "_mm" in name]
+
+
+def test_the_step_that_is_asked_for_is_of_hundredths_of_a_millimetre_in_any_scene():
+    """Blender rounds it to a unit of length: in a scene of metres a drag goes by 1 mm a pixel, not by 10."""
+    root = add(preset="mu-0.75x")
+    units = bpy.context.scene.unit_settings
+    for system, scale_length in (("METRIC", 1.0), ("METRIC", 0.001), ("IMPERIAL", 1.0), ("NONE", 1.0)):
+        units.system, units.scale_length = system, scale_length
+        mm = scene_units.mm(bpy.context.scene)
+        for section, name, step_mm in (("chambers", "wall_mm", 0.01), ("chambers", "cell_mm", 0.1)):
+            group = getattr(root.mu_unit, section)
+            shown = group.bl_rna.properties[field(group, stack.description(section, name))]
+            assert shown.step / 100.0 / mm == pytest.approx(step_mm, rel=1e-5), (system, scale_length, name)
+
+
 def test_a_steps_redo_panel_shows_true_lengths():
     props = add(preset="mu-0.75x").mu_unit
     bpy.context.scene.unit_settings.scale_length = 1.0
-    shown = {p.identifier for p in bpy.ops.mu.chambers.get_rna_type().properties if not p.is_hidden}
-    assert "wall_mm_true" in shown
-    assert not {p for p in shown if p.endswith("_mm")}
+    assert redo_fields(CHAMBERS) == [
+        "wall_mm_true_fine",
+        "base_cap_mm_true_fine",
+        "tip_cap_mm_true_fine",
+    ]
+    bpy.context.scene.unit_settings.scale_length = 0.001
+    assert redo_fields(CHAMBERS)[0] == "wall_mm_true"
+    bpy.context.scene.unit_settings.scale_length = 1.0
     assert bpy.ops.mu.chambers(wall_mm_true=0.00075) == {"FINISHED"}
     assert round(props.chambers.wall_mm, 4) == 1.0
     assert bpy.ops.mu.chambers(wall_mm=0.9) == {"FINISHED"}
@@ -85,7 +118,6 @@ def test_a_steps_redo_panel_shows_true_lengths():
 
 
 def test_a_length_dragged_beyond_its_bound_ends_there():
-    """In a scene of metres one step of a drag is 10 mm."""
     root = add()
     bpy.context.scene.unit_settings.scale_length = 1.0
     assert bpy.ops.mu.chambers(wall_mm_true=-0.0091) == {"FINISHED"}
