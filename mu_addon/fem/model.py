@@ -139,6 +139,7 @@ class Model:
         reference = reference_gradients(mesh.nodes, mesh.tets)
         weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
         self.volumes = weights.sum(axis=1)
+        self._point_volumes = reference.volumes
         put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
         k, kf = mesh.tets.shape[1], mesh.cavity.shape[1]

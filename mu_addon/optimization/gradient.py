@@ -88,17 +88,21 @@ def gradients(
             if hasattr(q, "change"):
                 found[number, f] += q.change(structure, states, plus, minus) / step
             elif q not in direct:
-                found[number, f] += (q.value(plus, states) - q.value(minus, states)) / step
+                ahead, behind = (
+                    q.value(side, {c: side.following(states[c]) for c in q.conditions})
+                    for side in (plus, minus)
+                )
+                found[number, f] += (ahead - behind) / step
         if direct:
             held.append((plus, minus, step))
     if direct and held:
         moving = _displacement_derivatives(structure, states, forces)
         for f, (plus, minus, step) in enumerate(held):
-            ahead = {c: states[c] + 0.5 * step * moving[c][f] for c in own}
-            behind = {c: states[c] - 0.5 * step * moving[c][f] for c in own}
+            forward = {c: states[c] + 0.5 * step * moving[c][f] for c in own}
+            backward = {c: states[c] - 0.5 * step * moving[c][f] for c in own}
             for number, q in enumerate(quantities):
                 if q in direct:
-                    found[number, f] = (q.value(plus, ahead) - q.value(minus, behind)) / step
+                    found[number, f] = (q.value(plus, forward) - q.value(minus, backward)) / step
     return found
 
 
@@ -136,7 +140,7 @@ def _residual_change(plus: Structure, minus: Structure, condition: Condition, st
     for s in (plus, minus):
         model = s.under(condition)
         data = model.parameters(s.materials[condition.materials])
-        sides.append(model.residual(u, pressure, data).ravel()[model.free])
+        sides.append(model.residual(s.following(u), pressure, data).ravel()[model.free])
     return np.asarray(sides[0] - sides[1])
 
 
