@@ -36,7 +36,7 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     found.self_contact = self_contact
     if mesh is model.mesh:
         return found
-    gradients, volumes = model._gradients.numpy(), model._point_volumes.copy()
+    gradients, volumes = model._gradients.numpy(), model.point_volumes.copy()
     moved = (mesh.nodes != model.mesh.nodes).any(axis=1)[mesh.tets].any(axis=1)
     if moved.any():
         gradients = gradients.copy()
@@ -44,7 +44,7 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
         gradients[moved], volumes[moved] = reference.gradients, reference.volumes
     weights = volumes * mesh.filled if mesh.resolved else volumes
     found.mesh = mesh
-    found._point_volumes = volumes
+    found.point_volumes = volumes
     found.volumes = weights.sum(axis=1)
     found._gradients = model._put(gradients, wp.vec3d)
     found._dV = model._put(weights, wp.float64)

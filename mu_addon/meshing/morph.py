@@ -100,6 +100,8 @@ class Morph:
         if a == b:
             return mesh
         factor = b.cell / a.cell
+        if factor == 1.0 and _alike(a, b):
+            return mesh
         after = self._grid.of(b if factor == 1.0 else shrunk(b, a.cell))
         count = len(self._before.nodes)
         moved = np.zeros_like(mesh.nodes)
@@ -123,6 +125,12 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
     if drawn.printed == other.printed:
         return mesh
     return Morph(mesh, drawn, settings).to(other)
+
+
+def _alike(a: Dimensions, b: Dimensions) -> bool:
+    """Whether a homogenised unit's mesh is the same for both: struts alone differ."""
+    struts = ("grading", "junction_diameter", "midspan_diameter")
+    return attrs.evolve(b, **{name: getattr(a, name) for name in struts}) == a
 
 
 def shrunk(d: Dimensions, cell: float) -> Dimensions:

@@ -234,6 +234,8 @@ class Stretch:
         The mean is t + the integral of (stretch - t) over the points above t, by 1 % of the volume; the
         points may be held, and t, for it is largest by t there.
         """
+        if plus.model.mesh is minus.model.mesh:
+            return 0.0
         mesh, u = structure.model.mesh, states[self.conditions[0]]
         kept_name, known = f"most {self.pressure_kPa} {self.region}", None
         if kept_name in structure.shared and structure.shared[kept_name][0] is u:
@@ -260,10 +262,9 @@ class Stretch:
 
     def _volume(self, structure: Structure) -> float:
         """Volume in mm3 of the region."""
-        mesh = structure.model.mesh
-        elements = np.flatnonzero(mesh.region == REGIONS[self.region])
-        volumes = reference_gradients(mesh.nodes, mesh.tets[elements]).volumes
-        return float(_solid(mesh, elements, volumes).sum())
+        model = structure.model
+        elements = np.flatnonzero(model.mesh.region == REGIONS[self.region])
+        return float(_solid(model.mesh, elements, model.point_volumes[elements]).sum())
 
     def _most(self, mesh: Any, u: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
         """The points stretched most: stretches (k,), shares (k,) that sum to 1, their elements and points,
