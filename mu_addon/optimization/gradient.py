@@ -120,9 +120,9 @@ def _weights_change(structure: Structure, plus: Structure, minus: Structure) -> 
     models = plus.model, minus.model
     if any(m.mesh is not model.mesh or m.self_contact is not None for m in models):
         return None
-    loads = [np.zeros(1) if m.load is None else m.load for m in models]
+    first, second = (np.zeros(1) if m.load is None else m.load for m in models)
     layers = [s.materials[WITHOUT].layers for s in (plus, minus)]
-    if len(structure.materials) > 1 or not np.array_equal(*loads) or len(layers[0]) != len(layers[1]):
+    if len(structure.materials) > 1 or not np.array_equal(first, second) or len(layers[0]) != len(layers[1]):
         return None
     change, covered = np.zeros(len(model.mesh.tets)), np.zeros(len(model.mesh.tets), int)
     for one, other in zip(*layers, strict=True):

@@ -66,7 +66,7 @@ class PrintedMorph:
             raise _failed("its lattice is of another kind")
         factor = b.cell / a.cell
         if factor != 1.0 and self._body is not None:
-            raise _failed("a body of one's own does not grow with the cell")
+            raise _failed("a user-defined body does not grow with the cell")
         near = b if factor == 1.0 else shrunk(b, a.cell)
         wall = wall_of(self._grid.of(near), a)
         wall = mirror(wall, "x") if self._full else wall
