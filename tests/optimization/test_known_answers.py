@@ -72,6 +72,7 @@ def test_the_slopes_of_stiffness_are_those_of_the_closed_form():
     np.testing.assert_allclose(found[2:], expected[2:], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_least_resin_of_a_graded_block_is_where_the_moment_is():
     """A block in bending: sum(J_i/f_i) is given and sum(f_i) least where f_i grows as the root of J_i."""
     layers = 4
@@ -100,6 +101,7 @@ def test_the_least_resin_of_a_graded_block_is_where_the_moment_is():
     np.testing.assert_allclose(found.observed[number].design, best, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_the_lightest_bellows_of_a_stiffness_has_the_thickness_of_plate_theory():
     folds, wanted = 6, 2e-3  # N/mm, of folds in series
     quantities = [AxialStiffness("k", "z"), Volume("v")]

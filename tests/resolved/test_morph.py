@@ -35,6 +35,7 @@ def volume(mesh, region):
     return solid_volumes(mesh)[mesh.region == region].sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("values", "of_struts"),
     [
