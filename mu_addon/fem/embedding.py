@@ -63,6 +63,38 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
     return Embedding(mesh.tets[element], weights, distance, mirrored)
 
 
+@attrs.frozen(eq=False)
+class Footholds:
+    """Where points (p, 3) hold onto a mesh, so that their weights follow as mesh and points move a little.
+
+    tets (p, n): nodes of each point's element; at (p, 4): the place in it, barycentric, about which the
+    displacement is continued linearly; held (p,): beyond the fixed base, where nothing is continued. weights
+    (p, n): as `embed` has them, of the places that the footholds were made at.
+    """
+
+    tets: Array
+    at: Array
+    held: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, mesh: Mesh, points: Array) -> Footholds:
+        """Footholds of points in a quadratic mesh or beside it, none of them across a mirror plane."""
+        element, local = _elements(mesh, points)
+        inside = element >= 0
+        at, held = _barycentric(local), np.zeros(len(points), bool)
+        weights = shape_functions(at, mesh.order)
+        out = np.flatnonzero(~inside)
+        if len(out):
+            element[out], at[out], held[out], _ = _nearest(mesh, points[out])
+            weights[out] = _weights(mesh.nodes[mesh.tets[element[out]]], at[out], held[out], points[out])
+        return cls(mesh.tets[element], at, held, weights)
+
+    def moved(self, nodes: Array, points: Array) -> Array:
+        """Weights (p, n) with the mesh's nodes (n, 3) and the points (p, 3) elsewhere, to first order."""
+        return _weights(nodes[self.tets], self.at, self.held, points)
+
+
 def _barycentric(local: Array) -> Array:
     return np.column_stack([1 - local.sum(axis=1), local])
 
@@ -138,6 +170,26 @@ def _counted(counts: Array) -> tuple[Array, Array]:
 
 def _continued(mesh: Mesh, points: Array) -> tuple[Array, Array, Array]:
     """Elements (p,), weights (p, n) and distances (p,) in mm of points outside a mesh."""
+    element, at, held, away = _nearest(mesh, points)
+    return element, _weights(mesh.nodes[mesh.tets[element]], at, held, points), away
+
+
+def _weights(nodes: Array, at: Array, held: Array, points: Array) -> Array:
+    """Weights (p, n) of points, continued linearly from places `at` (p, 4) of elements' nodes (p, n, 3)."""
+    order = 1 if nodes.shape[1] == 4 else 2
+    weights, slope = shape_functions(at, order), shape_gradients(at, order)
+    surface = np.einsum("en,eni->ei", weights, nodes)
+    jacobian = np.einsum("eni,enj->eij", nodes, slope)
+    further = np.linalg.solve(jacobian, (points - surface)[:, :, None])[:, :, 0]
+    further[held] = 0.0
+    return np.asarray(weights + np.einsum("enj,ej->en", slope, further))
+
+
+def _nearest(mesh: Mesh, points: Array) -> tuple[Array, Array, Array, Array]:
+    """Elements (p,) at the surface points nearest to points outside a mesh, and these, barycentric (p, 4).
+
+    Besides whether each lies on the fixed base (p,), and distances (p,) in mm.
+    """
     from scipy.spatial import cKDTree
     from trimesh.triangles import closest_point
 
@@ -161,11 +213,5 @@ def _continued(mesh: Mesh, points: Array) -> tuple[Array, Array, Array]:
     local = np.linalg.solve(edges, (surface - nodes[:, 0])[:, :, None])[:, :, 0]
     if mesh.order == 2:
         local = invert(nodes, surface, local)
-    barycentric = _barycentric(local)
-    weights = shape_functions(barycentric, mesh.order)
-    slope = shape_gradients(barycentric, mesh.order)
-    jacobian = np.einsum("eni,enj->eij", nodes, slope)
-    further = np.linalg.solve(jacobian, (points - surface)[:, :, None])[:, :, 0]
     held = np.isin(faces[face], mesh.base).all(axis=1)
-    further[held] = 0.0
-    return element, weights + np.einsum("enj,ej->en", slope, further), away[rows, best]
+    return element, _barycentric(local), held, away[rows, best]

@@ -113,6 +113,9 @@ class Model:
     above POINTWISE_BULK shear moduli acts on the mean J of an element. True asks it of every law, which must
     then split the volume off; None, of the laws that do so in a resolved mesh, and of none in another.
 
+    Attributes: volumes (m,) of the elements and point_volumes (m, q) of their quadrature points as if all of
+    them were filled, in mm3.
+
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
     may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
     where pairs meet that it has no entry for, and `factor` is another after that.
@@ -141,6 +144,7 @@ class Model:
         reference = reference_gradients(mesh.nodes, mesh.tets)
         weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
         self.volumes = weights.sum(axis=1)
+        self.point_volumes = reference.volumes
         put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
         k, kf = mesh.tets.shape[1], mesh.cavity.shape[1]

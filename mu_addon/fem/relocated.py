@@ -12,30 +12,48 @@ from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .elements import reference_gradients
 from .model import Model
+from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
 
 
-def relocated(model: Model, mesh: Mesh) -> Model:
+def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None) -> Model:
     """The model of a mesh of the same elements with other nodes, in milliseconds instead of a new pattern.
 
     The two share buffers and factor: use one after the other, and factorise again in between. `load` is the
-    first model's and must be set anew where it depends on the places. Raises InputError for a mesh of other
-    elements and for a model with obstacles or self-contact, and MeshingError for an inverted element.
+    first model's and must be set anew where it depends on the places. self_contact: of the other mesh, see
+    `SelfContact.relocated`; needed where the first model has one. Raises InputError for a mesh of other
+    elements, for a model with obstacles or self-contact alone, and where the tangent of one with other
+    weights of its ties is asked for: its pattern may be another. Raises MeshingError for an inverted element.
     """
-    if model.obstacles or model.self_contact is not None:
+    if model.obstacles or (model.self_contact is not None and self_contact is None):
         raise InputError(
             "a body in contact cannot be relocated", "model", "leave out obstacles and self-contact"
         )
     if mesh.nodes.shape != model.mesh.nodes.shape or not np.array_equal(mesh.tets, model.mesh.tets):
         raise InputError("the other mesh has other elements", "mesh", "give the same mesh with moved nodes")
     found = copy.copy(model)
+    found.self_contact = self_contact
     if mesh is model.mesh:
         return found
-    reference = reference_gradients(mesh.nodes, mesh.tets)
-    weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
+    gradients, volumes = model._gradients.numpy(), model.point_volumes.copy()
+    moved = (mesh.nodes != model.mesh.nodes).any(axis=1)[mesh.tets].any(axis=1)
+    if moved.any():
+        gradients = gradients.copy()
+        reference = reference_gradients(mesh.nodes, mesh.tets[moved])
+        gradients[moved], volumes[moved] = reference.gradients, reference.volumes
+    weights = volumes * mesh.filled if mesh.resolved else volumes
     found.mesh = mesh
+    found.point_volumes = volumes
     found.volumes = weights.sum(axis=1)
-    found._gradients = model._put(reference.gradients, wp.vec3d)
+    found._gradients = model._put(gradients, wp.vec3d)
     found._dV = model._put(weights, wp.float64)
+    if not np.array_equal(mesh.tied_weights, model.mesh.tied_weights):
+        found._folding = _refused
     return found
+
+
+def _refused(blocks: Array) -> Array:
+    raise InputError(
+        "a relocated body with other ties has no tangent", "mesh", "make a model of the mesh anew"
+    )

@@ -271,6 +271,25 @@ class SelfContact:
         other._planes, other._last = [], None
         return other
 
+    def relocated(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> SelfContact:
+        """The same facets and mirror planes on a mesh of the same elements with its nodes elsewhere.
+
+        gap_mm, stiffness_MPa: as the class has them, for the other body. Without friction.
+        """
+        other = copy.copy(self)
+        other.gap_mm, other.stiffness_MPa, other.friction, other._friction = gap_mm, stiffness_MPa, 0.0, None
+        other._rest, other._last = mesh.nodes, None
+        other._potential, other._wider = (
+            self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
+        )
+        other._surface, _ = other._collision_mesh(self.facets)
+        area = np.asarray(other._surface.vertex_areas)
+        other._planes = [
+            attrs.evolve(plane, area=area[np.searchsorted(self._nodes, plane.nodes)])
+            for plane in self._planes
+        ]
+        return other
+
     def energy_mJ(self, u: Array) -> float:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
         found = self._pairs(u)

@@ -136,5 +136,15 @@ def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContac
     """What keeps walls and struts of a resolved mesh apart, with friction between them. Raises InputError."""
     from .self_contact import SelfContact
 
+    return SelfContact(mesh, *_barrier_of(unit), friction)
+
+
+def relocated_contact(contact: SelfContact, unit: Unit, mesh: Mesh) -> SelfContact:
+    """The contact of a unit whose mesh is that of another with its nodes moved; see `self_contact_of`."""
+    return contact.relocated(mesh, *_barrier_of(unit))
+
+
+def _barrier_of(unit: Unit) -> tuple[float, float]:
+    """Gap in mm and stiffness in MPa of a unit's contact with itself."""
     resin_MPa = in_MPa(unit.material.membrane_modulus_kPa)
-    return SelfContact(mesh, _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa, friction)
+    return _GAP_SHARE * unit.printed.thinnest_wall, _BARRIER_SHARE * resin_MPa

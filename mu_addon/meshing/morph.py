@@ -17,6 +17,39 @@ from .quality import check_positive
 from .settings import CELL_MM, MeshSettings
 
 
+class WallGrid:
+    """The grid of a unit's membrane, made again of other units node by node."""
+
+    def __init__(
+        self, d: Dimensions, edge_mm: float, turn: float, sectors: int, layers: int, rings: int
+    ) -> None:
+        """d: as printed; edge_mm: along the meridian; the others as `membrane_mesh` has them."""
+        self.meridian = Meridian.of(d)
+        self._heights = stations(self.meridian, edge_mm)
+        self._grid = turn, sectors, layers, rings
+        self.membrane = self._made(self.meridian, self._heights)
+
+    def of(self, b: Dimensions) -> Membrane:
+        """The membrane of other dimensions of the same cell and envelope; raises MeshingError."""
+        a = self.meridian.d
+        if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
+            raise _failed("its envelope differs")
+        second = Meridian.of(b)
+        breaks = [_breaks(m) for m in (self.meridian, second)]
+        order = np.argsort(breaks[0])
+        from_, to = (x[order] for x in breaks)
+        if not (np.diff(to) > 0).all():
+            raise _failed("its profile differs")
+        made = self._made(second, np.interp(self._heights, from_, to))
+        if not np.array_equal(self.membrane.tets, made.tets):
+            raise _failed("its membrane folds")
+        return made
+
+    def _made(self, meridian: Meridian, heights: Array) -> Membrane:
+        turn, sectors, layers, rings = self._grid
+        return membrane_mesh(meridian, turn, heights, sectors, layers, rings)
+
+
 class Morph:
     """Moves the half or quarter mesh that gmsh made of a unit under some settings to other units.
 
@@ -29,15 +62,15 @@ class Morph:
         self.mesh, self.drawn, self._settings = mesh, drawn, settings
         size = a.cell / CELL_MM / settings.refine
         quarters = 1 if settings.fraction == "quarter" else 2
-        self._meridian = Meridian.of(a)
-        self._heights = stations(self._meridian, settings.meridian_mm * size)
-        self._grid = (
+        self._grid = WallGrid(
+            a,
+            settings.meridian_mm * size,
             quarters * math.pi / 2,
             quarters * division(a.R * math.pi / 2, settings.hoop_mm * size),
             max(1, int(settings.through_wall * settings.refine + 0.5)),
             division(a.r, settings.hoop_mm * size),
         )
-        self._before = self._membrane(self._meridian, self._heights)
+        self._before = self._grid.membrane
         count = len(self._before.nodes)
         close = 1e-6 * a.cell
         if len(mesh.nodes) < count or np.abs(mesh.nodes[:count] - self._before.nodes).max() > close:
@@ -67,7 +100,9 @@ class Morph:
         if a == b:
             return mesh
         factor = b.cell / a.cell
-        after = self._moved_membrane(b if factor == 1.0 else _shrunk(b, a.cell))
+        if factor == 1.0 and _alike(a, b):
+            return mesh
+        after = self._grid.of(b if factor == 1.0 else shrunk(b, a.cell))
         count = len(self._before.nodes)
         moved = np.zeros_like(mesh.nodes)
         moved[:count] = after.nodes - self._before.nodes
@@ -81,26 +116,6 @@ class Morph:
             check_positive(found)
         return found
 
-    def _membrane(self, meridian: Meridian, heights: Array) -> Membrane:
-        turn, sectors, layers, rings = self._grid
-        return membrane_mesh(meridian, turn, heights, sectors, layers, rings)
-
-    def _moved_membrane(self, b: Dimensions) -> Membrane:
-        """The grid of another membrane of the same cell, alike node by node."""
-        a = self._meridian.d
-        if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
-            raise _failed("its envelope differs")
-        second = Meridian.of(b)
-        breaks = [_breaks(m) for m in (self._meridian, second)]
-        order = np.argsort(breaks[0])
-        from_, to = (x[order] for x in breaks)
-        if not (np.diff(to) > 0).all():
-            raise _failed("its profile differs")
-        made = self._membrane(second, np.interp(self._heights, from_, to))
-        if not np.array_equal(self._before.tets, made.tets):
-            raise _failed("its membrane folds")
-        return made
-
 
 def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mesh:
     """The half or quarter mesh that gmsh made of `drawn` under `settings`, moved to the unit `other`.
@@ -112,11 +127,20 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
     return Morph(mesh, drawn, settings).to(other)
 
 
-def _shrunk(d: Dimensions, cell: float) -> Dimensions:
-    """Dimensions with every length of the membrane and its envelope scaled to another cell in mm."""
+def _alike(a: Dimensions, b: Dimensions) -> bool:
+    """Whether a homogenised unit's mesh is the same for both: struts alone differ."""
+    struts = ("grading", "junction_diameter", "midspan_diameter")
+    return attrs.evolve(b, **{name: getattr(a, name) for name in struts}) == a
+
+
+def shrunk(d: Dimensions, cell: float) -> Dimensions:
+    """Dimensions with every length of membrane, struts and envelope scaled to another cell in mm."""
     by = cell / d.cell
-    lengths = ("R", "r", "a", "b", "wall", "wall_growth", "base_cap", "tip_cap")
-    return attrs.evolve(d, cell=cell, **{name: by * getattr(d, name) for name in lengths})
+    wall = ("R", "r", "a", "b", "wall", "wall_growth", "base_cap", "tip_cap")
+    lengths = (*wall, "junction_diameter", "midspan_diameter", "strut_growth")
+    grading = None if d.grading is None else attrs.evolve(d.grading, cell=cell)
+    scaled = {name: by * getattr(d, name) for name in lengths}
+    return attrs.evolve(d, cell=cell, grading=grading, **scaled)
 
 
 def _breaks(meridian: Meridian) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 
 from ..design.anchors import windows
+from ..design.body import Body, envelope, read_body
 from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
 from ..design.toml_text import nearest
@@ -19,18 +20,21 @@ from ..materials.library import Material, load_material, material_text, read_mat
 from ..meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
-from .freedoms import UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import RESIN as RESIN_FREEDOM
+from .quantities import Stretch
 from .search import SearchSettings
 from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
+from .whole import Mass
 
 FORMAT = 1
-UNIT, RESIN = "unit.toml", "resin.toml"
+UNIT, RESIN, BODY = "unit.toml", "resin.toml", "body.obj"
 HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit that it starts from."
 _KEYS = (
     "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
-    "orientation_deg", "robust", "check_fidelity",
+    "orientation_deg", "robust", "check_fidelity", "self_contact", "body",
 )  # fmt: skip
 # A finer mesh for what is proposed, over the search's.
 FINER = 1.5
@@ -46,7 +50,9 @@ class Design:
     tables; material: the resin's, for density and elongation at break. orientation_deg: in which the unit
     bears its weight, 0 hanging, tip down, turned about x; None: without weight. robust:
     whether the search asks for what is met within the uncertainty. check_struts: whether what is proposed is
-    simulated strut by strut besides.
+    simulated strut by strut besides. materials: the resins that the freedom `resin` is among, by name; body:
+    a closed surface in place of the lattice's box, in the unit's frame; self_contact: whether walls and
+    struts of a resolved unit keep apart.
     """
 
     unit: Unit
@@ -64,6 +70,9 @@ class Design:
     orientation_deg: float | None = None
     robust: bool = False
     check_struts: bool = False
+    materials: Mapping[str, Material] = attrs.field(factory=dict)
+    body: Body | None = None
+    self_contact: bool = False
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -81,21 +90,104 @@ class Design:
         if self.resin.endswith(".toml"):
             tables["resin"] = RESIN
             beside[RESIN] = material_text(self.material)
+        files = [name for name in self.materials if name.endswith(".toml")]
+        renamed = {
+            name: RESIN if name == self.resin else f"resin-{n}.toml" for n, name in enumerate(files, 1)
+        }
+        beside |= {renamed[name]: material_text(self.materials[name]) for name in files}
+        if files:
+            tables["freedom"] = [
+                {**table, "values": [renamed.get(v, v) for v in table["values"]]}
+                if table["parameter"] == RESIN_FREEDOM
+                else table
+                for table in tables["freedom"]
+            ]
+        if self.body is not None:
+            tables["body"] = BODY
+            beside[BODY] = self.body.text()
         return {"design.toml": toml_text(tables, HEADER), **beside}
 
     @property
     def start(self) -> tuple[Any, ...]:
-        """The unit's own values of the freedoms."""
-        return tuple(f.value_of(self.unit) for f in self.freedoms)
+        """The unit's own values of the freedoms; of path and resin the file's, or the first."""
+        return tuple(
+            f.value_of(self.unit)
+            if f.is_of_unit
+            else self.resin
+            if f.name == RESIN_FREEDOM and self.resin in f.values
+            else f.values[0]
+            for f in self.freedoms
+        )
 
     def unit_of(self, design: tuple[Any, ...]) -> Unit:
-        """The unit with values of the freedoms; raises InputError where it breaks a rule."""
-        return changed_unit(self.unit, self.freedoms, design)
+        """The unit with values of the freedoms; raises InputError where it breaks a rule, or leaves its body.
+
+        Of another resin wall and lattice have its modulus, in proportion; a modulus that is free goes first.
+        """
+        own = [(f, v) for f, v in zip(self.freedoms, design, strict=True) if f.is_of_unit]
+        found = changed_unit(
+            _of_resin(self.unit, self.chosen(self.choice(design)).material, self.material),
+            [f for f, _ in own],
+            [v for _, v in own],
+        )
+        if self.body is not None:
+            envelope(self.body, found.dimensions)
+        return found
+
+    def choice(self, design: tuple[Any, ...]) -> dict[str, str]:
+        """Of a design's values the path and the resin, as far as they are free, by the freedom's name."""
+        return {f.name: v for f, v in zip(self.freedoms, design, strict=True) if not f.is_of_unit}
+
+    def chosen(self, choice: Mapping[str, str]) -> Design:
+        """The same design of a path and a resin of `choice`, in its targets and its weight."""
+        material = self.materials[choice[RESIN_FREEDOM]] if RESIN_FREEDOM in choice else self.material
+        targets = tuple(
+            t
+            if t.quantity is None
+            else attrs.evolve(t, quantity=_as_chosen(t.quantity, choice.get(PATH, ""), material))
+            for t in self.targets
+        )
+        return attrs.evolve(self, targets=targets, material=material)
 
 
-def read_design(path: Path, text: str, unit: Unit | None = None) -> Design:
+def _of_resin(unit: Unit, chosen: Material, first: Material) -> Unit:
+    """The unit of another resin than its first one; its lattice and its sensor change as the wall does."""
+    if chosen is first:
+        return unit
+    found = chosen.in_unit(unit)
+    m = found.material
+    share = m.membrane_modulus_kPa / unit.material.membrane_modulus_kPa
+    changed = attrs.evolve(
+        m,
+        lattice_modulus_kPa=share * m.lattice_modulus_kPa,
+        sensor_modulus_kPa=share * m.sensor_modulus_kPa,
+    )
+    return attrs.evolve(found, material=changed)
+
+
+def _as_chosen(quantity: Any, path: str, material: Material) -> Any:
+    """A quantity of a path that was left free, or of the resin's density or elongation, with these."""
+    if path and getattr(quantity, "path", None) == "":
+        quantity = attrs.evolve(quantity, path=path)
+    if isinstance(quantity, Mass):
+        return attrs.evolve(quantity, density_g_per_ml=material.density_g_per_ml)
+    if isinstance(quantity, Stretch) and quantity.elongation is not None:
+        return attrs.evolve(quantity, elongation=_elongation(material))
+    return quantity
+
+
+def _elongation(material: Material) -> float:
+    """Elongation at break as a ratio; raises InputError where a resin's file has none."""
+    if "elongation" not in material.values:
+        raise InputError(
+            f"{material.name} has no elongation at break", "resin", "add [elongation] to its file"
+        )
+    return material.values["elongation"].value / 100.0
+
+
+def read_design(path: Path, text: str, unit: Unit | None = None, body: Body | None = None) -> Design:
     """The design of a file's text, see `parse_design`; raises InputError with file, line and key."""
-    return parse_design(text, str(path), unit, path.parent)
+    return parse_design(text, str(path), unit, path.parent, body)
 
 
 def parse_design(
@@ -103,14 +195,14 @@ def parse_design(
     origin: str,
     unit: Unit | None = None,
     folder: Path | None = None,
-    material: Material | None = None,
+    body: Body | None = None,
 ) -> Design:
     """The design in TOML text; raises InputError with file, line and key.
 
-    unit, material: in place of those that the text names; folder: where its files lie.
+    unit, body: in place of those that the text names; folder: where its files lie.
     """
     with located_keys(text):
-        return _design(text, origin, unit, folder, material)
+        return _design(text, origin, unit, folder or Path(), body)
 
 
 @contextmanager
@@ -132,9 +224,7 @@ def located_keys(text: str) -> Iterator[None]:
         raise
 
 
-def _design(
-    text: str, origin: str, unit: Unit | None, folder: Path | None, material: Material | None
-) -> Design:
+def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body | None) -> Design:
     document = parse_toml(text, origin)
     for key in document:
         if key not in _KEYS:
@@ -150,7 +240,7 @@ def _design(
     tables = {key: _tables(document, key, origin) for key in ("target", "freedom")}
     where = {key: _places(text, key, origin, len(rows)) for key, rows in tables.items()}
     number = _Numbers(document, text, origin)
-    base = unit or _unit(document, origin, folder or Path())
+    base = unit or _unit(document, origin, folder)
     fixed = fixed_values(tables["freedom"], where["freedom"])
     base = changed_unit(base, [Freedom(name) for name in fixed], list(fixed.values()))
     freedoms = read_freedoms(tables["freedom"], where["freedom"], base)
@@ -162,26 +252,43 @@ def _design(
         _word(document, "resin", "elastic-50a-v1", origin),
         _word(document, "printer", DEFAULT, origin),
     )
-    if material is None:
-        own = resin.endswith(".toml")
-        material = read_material((folder or Path()) / resin) if own else load_material(resin)
-    if "elongation" not in material.values:
+    material = _material(resin, folder, f"{origin}, resin")
+    materials = {
+        name: material if name == resin else _material(name, folder, where["freedom"][0])
+        for f in freedoms
+        if f.name == RESIN_FREEDOM
+        for name in f.values
+    }
+    if body is None and "body" in document:
+        body = read_body(folder / _word(document, "body", "", origin))
+    self_contact = _flag(document, "self_contact", text, origin)
+    if self_contact and not settings.resolved:
         raise InputError(
-            f"{resin} has no elongation at break", f"{origin}, resin", "add [elongation] to its file"
-        )
+            "a homogenised lattice has no struts that could touch",
+            f"{origin}, {_line(text, 'self_contact')}, self_contact", 'write fidelity = "resolved" too',
+        )  # fmt: skip
     counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
+    paths = [w.name for w in windows(min(counts))]
     turned = number("orientation_deg", 0.0, -360.0, 360.0) if "orientation_deg" in document else None
     targets = read_targets(
         tables["target"],
         where["target"],
         Supplies(
-            material.values["elongation"].value / 100.0,
+            _elongation(material),
             material.density_g_per_ml,
             load_printer(printer),
-            [w.name for w in windows(min(counts))],
+            paths,
             turned is not None,
+            any(f.name == PATH for f in freedoms),
+            body,
         ),
     )
+    for freedom, place in zip(freedoms, _places_of(freedoms, tables, where), strict=True):
+        for path in freedom.values if freedom.name == PATH else ():
+            if path not in paths:
+                raise InputError(
+                    f"{path!r} is not a path of the unit", f"{place}, values", f"of: {', '.join(paths)}"
+                )
     if not settings.resolved:
         _require_homogenised(freedoms, targets, tables["freedom"], where["freedom"])
     search = SearchSettings(
@@ -196,7 +303,30 @@ def _design(
         material, turned, _flag(document, "robust", text, origin),
         not settings.resolved
         and _word(document, "check_fidelity", HOMOGENISED, origin, FIDELITIES) != HOMOGENISED,
+        materials, body, self_contact,
     )  # fmt: skip
+
+
+def _material(name: str, folder: Path, where: str) -> Material:
+    """The resin of the library, or in a file; raises InputError."""
+    found = read_material(folder / name) if name.endswith(".toml") else load_material(name)
+    try:
+        _elongation(found)
+    except InputError as error:
+        raise InputError(error.what, where, error.remedy) from error
+    return found
+
+
+def _places_of(
+    freedoms: list[Freedom], tables: Mapping[str, list[dict[str, Any]]], where: Mapping[str, list[str]]
+) -> list[str]:
+    """File and line of the table of each freedom."""
+    rows = [
+        place
+        for table, place in zip(tables["freedom"], where["freedom"], strict=True)
+        if "fixed" not in table
+    ]
+    return rows[: len(freedoms)]
 
 
 def _require_homogenised(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -87,10 +87,9 @@ def evaluate(
 ) -> Evaluated:
     """All targets' quantities of a unit, and their gradients by its continuous freedoms.
 
-    A unit that cannot be meshed or does not bear a pressure is an answer (`why`), not an error. A resolved
-    unit's gradients are those that need no morph of its mesh; the others are nan. uncertainty: what of a
-    print the values' standard errors are found by. Raises InputError for targets that the mechanics cannot
-    answer.
+    A unit that cannot be meshed or does not bear a pressure is an answer (`why`), not an error. uncertainty:
+    what of a print the values' standard errors are found by. Raises InputError for targets that the mechanics
+    cannot answer.
     """
     asked = [t for t in targets if t.quantity is not None]
     quantities = [t.quantity for t in asked if t.quantity is not None]
@@ -111,10 +110,7 @@ def evaluate(
         return Evaluated(unit, values, gradient[:, :count], error.what, simulated)
     if with_gradient and continuous:
         try:
-            usable = [f for f in continuous if not mechanics.settings.resolved or _material_only(f)]
-            places = [continuous.index(f) for f in usable]
-            found = gradients(body.structure, states, quantities, body.pairs(usable))
-            gradient[np.ix_(rows, places)] = found
+            gradient[rows] = gradients(body.structure, states, quantities, body.pairs(continuous))
         except (MeshingError, InputError, IndefiniteError):
             # Beside a rule's limit or a folded mesh: the values stand, and the search goes on without slopes.
             gradient[:] = np.nan
@@ -122,18 +118,25 @@ def evaluate(
     return Evaluated(unit, values, gradient[:, :count], "", simulated, *errors)
 
 
-def _material_only(freedom: Freedom) -> bool:
-    return freedom.name.startswith(("material.", "wall."))
+@attrs.frozen
+class Candidate:
+    """A unit to be evaluated, and what is chosen besides its parameters: path and resin by name."""
+
+    unit: Unit
+    choice: tuple[tuple[str, str], ...] = ()
+
+
+Asked = tuple[Sequence[Target], Mechanics]
 
 
 @attrs.define(eq=False)
 class Evaluator:
     """Evaluates units, each once: from its cache where it was found before, by this run or a killed one.
 
-    origin: text of all that decides a value besides the unit (targets, mesh, extended model); workers:
-    several units at a time by `many`, a function of units that yields their number and what was found;
-    None: one after the other, here. uncertainty: as `evaluate` has it. computed: how many units were
-    simulated by this run, and model_a the
+    origin: text of all that decides a value besides the unit (targets, mesh, extended model); many: evaluates
+    several candidates at a time, a function of them that yields their number and what was found; None: one
+    after the other, here. uncertainty: as `evaluate` has it. of_choice: targets and mechanics of a chosen
+    path and resin; None: those given. computed: how many units were simulated by this run, and model_a the
     solutions they took.
     """
 
@@ -142,41 +145,47 @@ class Evaluator:
     mechanics: Mechanics
     cache: Cache | None = None
     origin: str = ""
-    many: Callable[[Sequence[Unit]], Any] | None = None
+    many: Callable[[Sequence[Candidate]], Any] | None = None
     on_each: Callable[[Evaluated], None] = lambda found: None
     uncertainty: Uncertainty | None = None
+    of_choice: Callable[[Mapping[str, str]], Asked] | None = None
     computed: int = 0
     model_a: int = 0
 
-    def of(self, units: Sequence[Unit]) -> list[Evaluated]:
+    def of(self, units: Sequence[Unit | Candidate]) -> list[Evaluated]:
         """What is found of some units, in their order."""
-        found: list[Evaluated | None] = [self._kept(unit) for unit in units]
+        candidates = [u if isinstance(u, Candidate) else Candidate(u) for u in units]
+        found: list[Evaluated | None] = [self._kept(c) for c in candidates]
         todo = [i for i, known in enumerate(found) if known is None]
-        for number, result in self._each([units[i] for i in todo]):
+        for number, result in self._each([candidates[i] for i in todo]):
             self.computed += 1
             self.model_a += result.model_a
             found[todo[number]] = result
             if self.cache is not None:
                 text = json.dumps(result.plain())
-                self.cache.put("unit", self._key(result.unit), {"found": np.array(text)})
+                self.cache.put("unit", self._key(candidates[todo[number]]), {"found": np.array(text)})
             self.on_each(result)
         return [result for result in found if result is not None]
 
-    def _each(self, units: Sequence[Unit]) -> Any:
-        if self.many is not None and len(units) > 1:
-            return self.many(units)
-        return (
-            (i, evaluate(unit, self.targets, self.freedoms, self.mechanics, uncertainty=self.uncertainty))
-            for i, unit in enumerate(units)
-        )
+    def _each(self, candidates: Sequence[Candidate]) -> Any:
+        if self.many is not None and len(candidates) > 1:
+            return self.many(candidates)
+        return ((i, self._one(c)) for i, c in enumerate(candidates))
 
-    def _key(self, unit: Unit) -> str:
-        return key("optimise 2", attrs.evolve(unit, name="unit").hash(), self.origin)
+    def _one(self, c: Candidate) -> Evaluated:
+        targets, mechanics = self.targets, self.mechanics
+        if c.choice and self.of_choice is not None:
+            targets, mechanics = self.of_choice(dict(c.choice))
+        return evaluate(c.unit, targets, self.freedoms, mechanics, uncertainty=self.uncertainty)
 
-    def _kept(self, unit: Unit) -> Evaluated | None:
-        stored = None if self.cache is None else self.cache.get("unit", self._key(unit))
+    def _key(self, c: Candidate) -> str:
+        own = c.choice or ""
+        return key("optimise 3", attrs.evolve(c.unit, name="unit").hash(), self.origin, own)
+
+    def _kept(self, c: Candidate) -> Evaluated | None:
+        stored = None if self.cache is None else self.cache.get("unit", self._key(c))
         if stored is None:
             return None
-        result = restored(unit, json.loads(str(stored["found"])))
+        result = restored(c.unit, json.loads(str(stored["found"])))
         self.model_a += result.model_a
         return result

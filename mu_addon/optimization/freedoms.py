@@ -17,6 +17,8 @@ from ..design.toml_text import nearest
 from ..errors import InputError
 
 SCALE = "scale"
+PATH, RESIN = "path", "resin"
+"""Freedoms besides a unit's parameters: which path the sensor takes, and which resin the unit is of."""
 # Struts of a homogenised lattice have no stiffness of their own: its modulus is a parameter.
 UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
 
@@ -95,7 +97,8 @@ class Freedom:
     """One parameter of the unit, by its dotted name, that may change.
 
     "grading.cells[0 2 *]" is the factor on the struts of these cells: column, row and chamber as
-    `design.grading` has them; "chambers.wall_factors[2]" that on a chamber's wall.
+    `design.grading` has them; "chambers.wall_factors[2]" that on a chamber's wall. `PATH` and `RESIN` are no
+    parameters of the unit: `is_of_unit` is then False.
 
     low, high: bounds of a continuous one, or of whole numbers; values: those of a discrete one; also: factors
     by the names of parameters that follow it, as the bladder's diameter follows the cell.
@@ -112,6 +115,11 @@ class Freedom:
     def discrete(self) -> bool:
         """Whether it has values in place of a range."""
         return bool(self.values)
+
+    @property
+    def is_of_unit(self) -> bool:
+        """Whether it is a parameter of the unit."""
+        return self.name not in (PATH, RESIN)
 
     def value_of(self, unit: Unit) -> Any:
         """Its value in a unit."""
@@ -214,7 +222,7 @@ def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
         raise InputError(
             f"parameter = {name!r} is not a parameter of a unit{hint}",
             f"{where}, parameter",
-            "name it as in a unit's file: chambers.wall_mm, material.lattice_modulus_kPa, scale",
+            "name it as in a unit's file: chambers.wall_mm, lattice.kind, scale; or path, resin",
         )
     return name, known[name]
 
@@ -228,6 +236,8 @@ def _require_keys(table: Mapping[str, Any], known: Sequence[str], where: str) ->
 
 
 def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
+    if table.get("parameter") in (PATH, RESIN):
+        return _choice(table, where)
     name, d = _parameter(table, where)
     if "fixed" in table:
         return None
@@ -267,6 +277,17 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
             raise InputError(f"{name} is a whole number", f"{where}, low", "give whole numbers")
         return Freedom(name, values=tuple(range(int(low), int(high) + 1)), also=also, unit=d.unit)
     return Freedom(name, float(low), float(high), also=also, unit=d.unit)
+
+
+def _choice(table: Mapping[str, Any], where: str) -> Freedom:
+    """The freedom of a path or a resin; raises InputError where its values are no names."""
+    name = str(table["parameter"])
+    _require_keys(table, ("parameter", "values"), where)
+    values = table.get("values")
+    if not isinstance(values, list) or not values or not all(isinstance(v, str) for v in values):
+        example = '["alpha4", "alpha7"]' if name == PATH else '["elastic-50a-v1", "my-resin.toml"]'
+        raise InputError(f"{name} has no list of names", f"{where}, values", f"write values = {example}")
+    return Freedom(name, values=tuple(dict.fromkeys(values)))
 
 
 def _of_factor(listed: FactorList, table: Mapping[str, Any], where: str) -> Freedom:
@@ -309,6 +330,8 @@ def _also(given: Any, where: str) -> dict[str, float]:
 
 def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
     """Raise InputError where a value is none that the parameter may have."""
+    if not freedom.is_of_unit:
+        return
     if entry := _entry(freedom.name):
         try:
             changed_unit(unit, [freedom], [freedom.low])

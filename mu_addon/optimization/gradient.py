@@ -23,7 +23,7 @@ import numpy as np
 from ..design.quantity import in_MPa
 from ..fem.elementwise import element_forces
 from ..fem.model import Model
-from .structure import Condition, Quantity, States, Structure
+from .structure import WITHOUT, Condition, Quantity, States, Structure
 
 Array = np.ndarray[Any, Any]
 
@@ -65,7 +65,8 @@ def gradients(
 ) -> Array:
     """Derivatives (q, f) of q quantities by f freedoms at a body's states.
 
-    pairs: for each freedom a function that makes the two bodies; called in order, one held at a time. solved:
+    pairs: for each freedom a function that makes the two bodies; called in order, one held at a time. A
+    freedom that makes elements stiffer or softer and does no more takes no assembly (`by_element`). solved:
     `adjoint` of the same quantities, found here where it is not given. Raises IndefiniteError at an unstable
     state, and what making a body raises.
     """
@@ -75,9 +76,15 @@ def gradients(
     found = np.zeros((len(quantities), len(pairs)))
     forces: dict[Condition, list[Array]] = {c: [] for c in own}
     held: list[Pair] = []
+    by_stiffness: Array | None = None
     for f, make in enumerate(pairs):
         plus, minus, step = make()
-        for condition in {*solved.of, *own}:
+        weights = None if direct else _weights_change(structure, plus, minus)
+        if weights is not None:
+            if by_stiffness is None:
+                by_stiffness = by_element(structure, states, quantities, solved)
+            found[:, f] = by_stiffness @ weights / step
+        for condition in {*solved.of, *own} if weights is None else ():
             change = _residual_change(plus, minus, condition, states) / step
             if condition in own:
                 forces[condition].append(change)
@@ -88,18 +95,43 @@ def gradients(
             if hasattr(q, "change"):
                 found[number, f] += q.change(structure, states, plus, minus) / step
             elif q not in direct:
-                found[number, f] += (q.value(plus, states) - q.value(minus, states)) / step
+                ahead, behind = (
+                    q.value(side, {c: side.following(states[c]) for c in q.conditions})
+                    for side in (plus, minus)
+                )
+                found[number, f] += (ahead - behind) / step
         if direct:
             held.append((plus, minus, step))
     if direct and held:
         moving = _displacement_derivatives(structure, states, forces)
         for f, (plus, minus, step) in enumerate(held):
-            ahead = {c: states[c] + 0.5 * step * moving[c][f] for c in own}
-            behind = {c: states[c] - 0.5 * step * moving[c][f] for c in own}
+            forward = {c: states[c] + 0.5 * step * moving[c][f] for c in own}
+            backward = {c: states[c] - 0.5 * step * moving[c][f] for c in own}
             for number, q in enumerate(quantities):
                 if q in direct:
-                    found[number, f] = (q.value(plus, ahead) - q.value(minus, behind)) / step
+                    found[number, f] = (q.value(plus, forward) - q.value(minus, backward)) / step
     return found
+
+
+def _weights_change(structure: Structure, plus: Structure, minus: Structure) -> Array | None:
+    """Difference (m,) of the logarithm of each element's stiffness between two bodies, None where that is
+    not all that differs: of one mesh and load, each element of one law with the same parameters."""
+    model = structure.model
+    models = plus.model, minus.model
+    if any(m.mesh is not model.mesh or m.self_contact is not None for m in models):
+        return None
+    first, second = (np.zeros(1) if m.load is None else m.load for m in models)
+    layers = [s.materials[WITHOUT].layers for s in (plus, minus)]
+    if len(structure.materials) > 1 or not np.array_equal(first, second) or len(layers[0]) != len(layers[1]):
+        return None
+    change, covered = np.zeros(len(model.mesh.tets)), np.zeros(len(model.mesh.tets), int)
+    for one, other in zip(*layers, strict=True):
+        alike = one.law is other.law and np.array_equal(one.elements, other.elements)
+        if not alike or not np.array_equal(one.parameters, other.parameters):
+            return None
+        change[one.elements] = 2.0 * (one.weight - other.weight) / (one.weight + other.weight)
+        covered[one.elements] += 1
+    return change if (covered == 1).all() else None
 
 
 def by_element(
@@ -136,7 +168,7 @@ def _residual_change(plus: Structure, minus: Structure, condition: Condition, st
     for s in (plus, minus):
         model = s.under(condition)
         data = model.parameters(s.materials[condition.materials])
-        sides.append(model.residual(u, pressure, data).ravel()[model.free])
+        sides.append(model.residual(s.following(u), pressure, data).ravel()[model.free])
     return np.asarray(sides[0] - sides[1])
 
 

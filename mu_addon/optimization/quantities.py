@@ -15,7 +15,7 @@ from ..fem.lattice_law import deformation_gradients
 from ..fem.model import Model
 from ..fem.relocated import relocated
 from ..fem.self_intersection import crossings
-from ..meshing.mesh import AXES, LATTICE, MEMBRANE
+from ..meshing.mesh import AXES, LATTICE, MEMBRANE, Mesh
 from .structure import WITHOUT, Condition, States, Structure
 
 Array = np.ndarray[Any, Any]
@@ -234,6 +234,8 @@ class Stretch:
         The mean is t + the integral of (stretch - t) over the points above t, by 1 % of the volume; the
         points may be held, and t, for it is largest by t there.
         """
+        if plus.model.mesh is minus.model.mesh:
+            return 0.0
         mesh, u = structure.model.mesh, states[self.conditions[0]]
         kept_name, known = f"most {self.pressure_kPa} {self.region}", None
         if kept_name in structure.shared and structure.shared[kept_name][0] is u:
@@ -245,17 +247,24 @@ class Stretch:
         mean, least = float((stretch * share).sum()), float(stretch[-1])
         chosen, place = np.unique(element, return_inverse=True)
         _, volumes = deformation_gradients(mesh, u, chosen)
-        kept = share / volumes[place, point]
-        inside = mesh.region == REGIONS[self.region]
-        total = float(structure.model.volumes[inside].sum())
+        solid = _solid(mesh, chosen, volumes)[place, point]
+        kept = np.divide(share, solid, out=np.zeros_like(share), where=solid > 0.0)
+        total = self._volume(structure)
         sides = []
         for s in (plus, minus):
-            F, dV = deformation_gradients(s.model.mesh, u, chosen)
+            F, dV = deformation_gradients(s.model.mesh, s.following(u), chosen)
+            dV = _solid(s.model.mesh, chosen, dV)
             largest = np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)[..., 2])[place, point]
             above = ((largest - least) * dV[place, point] * kept).sum()
-            sides.append(above - (mean - least) * s.model.volumes[inside].sum() / total)
+            sides.append(above - (mean - least) * self._volume(s) / total)
         found = float(sides[0] - sides[1])
         return found if self.elongation is None else -self.elongation * found / max(mean - 1.0, 1e-9) ** 2
+
+    def _volume(self, structure: Structure) -> float:
+        """Volume in mm3 of the region."""
+        model = structure.model
+        elements = np.flatnonzero(model.mesh.region == REGIONS[self.region])
+        return float(_solid(model.mesh, elements, model.point_volumes[elements]).sum())
 
     def _most(self, mesh: Any, u: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
         """The points stretched most: stretches (k,), shares (k,) that sum to 1, their elements and points,
@@ -264,9 +273,7 @@ class Stretch:
         F, volumes = deformation_gradients(mesh, u, elements)
         squares, directions = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
         largest = np.sqrt(squares[..., 2])
-        if mesh.resolved:
-            filled = mesh.filled[elements]
-            volumes = np.where(filled < 0.5, 0.0, volumes * filled)
+        volumes = _solid(mesh, elements, volumes)
         order = np.argsort(-largest, axis=None, kind="stable")
         volume = volumes.ravel()[order]
         wanted = MOST_STRETCHED * volume.sum()
@@ -279,6 +286,19 @@ class Stretch:
         now = np.einsum("kij,kj->ki", F[e, q], then)
         stretch = np.linalg.norm(now, axis=1)
         return stretch, volume / wanted, (elements[e], q), (now / stretch[:, None], then)
+
+
+def _solid(mesh: Mesh, elements: Array, volumes: Array) -> Array:
+    """Volumes (e, q) in mm3 of some elements' quadrature points, as far as they are filled.
+
+    What is filled by less than half counts less and less, and by less than a quarter not at all: next to
+    nothing holds it.
+    """
+    if not mesh.resolved:
+        return volumes
+    filled = mesh.filled[elements]
+    share = np.clip(2.0 * filled - 0.5, 0.0, 1.0)
+    return volumes * filled * share**2 * (3.0 - 2.0 * share)
 
 
 @attrs.frozen
@@ -314,7 +334,10 @@ class RestStiffness:
         for s in (plus, minus):
             other, w = self._side(s)
             data = other.parameters(s.materials[WITHOUT])
-            ahead, behind = (other.residual(sign * u, 0.0, data).ravel()[other.free] for sign in (1, -1))
+            moved_by = s.following(u)
+            ahead, behind = (
+                other.residual(sign * moved_by, 0.0, data).ravel()[other.free] for sign in (1, -1)
+            )
             forces = (ahead - behind) / (2 * small)
             sides.append(2 * w.ravel()[other.free] @ moved - moved @ forces)
         return -_whole(model) * float(sides[0] - sides[1]) / flexibility**2

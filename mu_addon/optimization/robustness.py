@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.body import Body, envelope
 from ..design.parameters import Unit
 from ..design.printing.check import check
 from ..design.printing.printer import Printer
@@ -76,7 +77,7 @@ def verified(
     found = evaluate(unit, targets, (), finer, uncertainty=uncertainty)
     zero = np.zeros(len(targets))
     struts = {} if as_printed is None else _with_struts(unit, targets, as_printed)
-    worst, words = ("", ()) if printer is None else _print_check(unit, printer)
+    worst, words = ("", ()) if printer is None else _print_check(unit, printer, finer.body)
     if not found.sound:
         none = np.zeros(len(targets), bool)
         return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words, **struts)
@@ -102,10 +103,10 @@ def _with_struts(unit: Unit, targets: Sequence[Target], as_printed: Mechanics) -
     return {"with_struts": values, "struts_why": found.why}
 
 
-def _print_check(unit: Unit, printer: Printer) -> tuple[str, tuple[str, ...]]:
+def _print_check(unit: Unit, printer: Printer, body: Body | None) -> tuple[str, tuple[str, ...]]:
     """The worst severity of the printability check, and its findings that are not a pass, in words."""
     try:
-        solid = build_solid(unit)
+        solid = build_solid(unit, body=None if body is None else envelope(body, unit.dimensions))
     except MuError as error:
         return "error", (f"no solid: {error.what}",)
     found = check(solid.vertices, solid.triangles, printer, unit, stages=("thickness", "chambers"))

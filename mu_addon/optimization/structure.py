@@ -62,6 +62,14 @@ class Structure:
             self.shared[name] = make()
         return self.shared[name]
 
+    def following(self, u: Array) -> Array:
+        """Displacements u (n, 3) in mm of its untied nodes as this body has them, its tied nodes following.
+
+        A body near to another holds struts onto its wall by weights of its own.
+        """
+        mesh = self.model.mesh
+        return np.asarray(mesh.following(u.copy())) if len(mesh.tied) else u
+
     def under(self, condition: Condition) -> Model:
         """The model of a condition: the body's own, or one with the wall that holds its tip beside it."""
         if condition.wall_mm is None:

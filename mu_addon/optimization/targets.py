@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import attrs
 
+from ..design.body import Body
 from ..design.toml_text import nearest
 from ..errors import InputError
 from .quantities import (
@@ -122,7 +123,8 @@ class Target:
 class Supplies:
     """What targets need besides: elongation at break as a ratio, density in g/ml and a printer, and paths.
 
-    has_gravity: whether the unit bears its weight, so that it is bent at 0 kPa.
+    has_gravity: whether the unit bears its weight, so that it is bent at 0 kPa. path_is_free: whether a
+    target may leave its path out, which is the free one then; body: in place of the lattice's box, or None.
     """
 
     elongation: float
@@ -130,6 +132,8 @@ class Supplies:
     printer: Any
     paths: Sequence[str]
     has_gravity: bool = False
+    path_is_free: bool = False
+    body: Body | None = None
 
 
 def read_targets(
@@ -265,7 +269,7 @@ def _quantity(
     if kind == "printable":
         return None
     if kind == "mass":
-        return Mass(name, supplies.density_g_per_ml, supplies.printer)
+        return Mass(name, supplies.density_g_per_ml, supplies.printer, body=supplies.body)
     if kind == "print_time":
         return PrintTime(name, supplies.printer)
     if kind == "wall_thickness":
@@ -281,10 +285,12 @@ def _quantity(
         return Workspace(name, _pressures(table, where))
     if kind in OF_SENSOR:
         pressures, path = _pressures(table, where), table.get("path")
-        if path not in supplies.paths:
+        if path is None and supplies.path_is_free:
+            path = ""
+        elif path not in supplies.paths:
             raise InputError(
                 f"path = {path!r} is not a path of the unit", f"{where}, path",
-                f"one of: {', '.join(supplies.paths)}",
+                f"one of: {', '.join(supplies.paths)}; left out where the path is a freedom",
             )  # fmt: skip
         made = Disturbance if kind == "deviation" else SensorSlope
         return made(name, str(path), pressures)

@@ -11,18 +11,20 @@ import attrs
 import numpy as np
 
 from ..design.anchors import Window, anchor_points
+from ..design.body import Body, envelope
 from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.materials import Materials
 from ..fem.model import Model
-from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
 from ..fem.relocated import relocated
-from ..fem.unit import materials_of
+from ..fem.unit import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
 from ..meshing.morph import Morph
 from ..meshing.settings import MeshSettings
 from ..placement.candidates import Candidate, roi, with_sensor
 from ..placement.inclusion import sensor_share
+from ..resolved.morph import PrintedMorph
 from ..resolved.unit import mesh_of
 from .freedoms import Freedom, changed_unit
 from .gradient import Pair
@@ -55,7 +57,8 @@ class Mechanics:
 
     as_printed: a drawn unit with the parts of the model that a unit has parameters for; materials, model: of
     such a unit and its mesh; load: dead forces (n, 3) in N, or None; newton: settings, None for the
-    fidelity's usual ones.
+    fidelity's usual ones. body: a closed surface in place of the lattice's box; self_contact: whether walls
+    and struts of a resolved unit keep apart.
     """
 
     settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
@@ -66,6 +69,8 @@ class Mechanics:
     newton: NewtonSettings | None = None
     mesher: str = "auto"
     cache: Path | None = None
+    body: Body | None = None
+    self_contact: bool = False
 
 
 @attrs.frozen
@@ -89,19 +94,30 @@ class UnitBody:
     def mesh(self) -> Mesh:
         """Its own mesh. Raises InputError and MeshingError."""
         m = self.mechanics
-        return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache)
+        return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
+
+    @property
+    def envelope(self) -> Body | None:
+        """The body in place of the lattice's box, cut to the unit's length, or None. Raises InputError."""
+        own = self.mechanics.body
+        return None if own is None else envelope(own, self.printed.dimensions)
 
     @cached_property
     def structure(self) -> Structure:
         """The body; see `mesh` for the errors."""
         model = self.mechanics.model(self.printed, self.mesh)
         model.load = self.mechanics.load(self.printed, self.mesh)
+        if self.mechanics.self_contact:
+            model.self_contact = self_contact_of(self.printed, self.mesh)
         return self._structure(self.unit, self.printed, model)
 
     @cached_property
-    def morph(self) -> Morph:
-        """What moves its mesh to units near to it. Raises MeshingError, for a resolved mesh in any case."""
-        return Morph(self.mesh, self.printed, self.mechanics.settings)
+    def morph(self) -> Morph | PrintedMorph:
+        """What moves its mesh to units near to it. Raises MeshingError."""
+        m = self.mechanics
+        if self.mesh.resolved:
+            return PrintedMorph(self.mesh, self.printed, m.settings, self.envelope)
+        return Morph(self.mesh, self.printed, m.settings)
 
     def moved(self, unit: Unit) -> Structure:
         """Another unit on this one's mesh, morphed; it shares this one's buffers (`relocated`).
@@ -110,7 +126,9 @@ class UnitBody:
         """
         printed = self.mechanics.as_printed(unit)
         mesh = self.mesh if printed.printed == self.printed.printed else self.morph.to(printed, checked=False)
-        model = relocated(self.structure.model, mesh)
+        own = self.structure.model.self_contact
+        contact = None if own is None else relocated_contact(own, printed, mesh)
+        model = relocated(self.structure.model, mesh, contact)
         model.load = self.mechanics.load(printed, mesh)
         return self._structure(unit, printed, model)
 
@@ -154,5 +172,6 @@ class UnitBody:
             found = roi(mesh, Candidate(name, window.start, points), printed.waveguide.inclusion_radius_mm)
             share = sensor_share(RULE, found)
             materials[name] = with_sensor(own, share, printed.material.sensor_modulus_MPa)
-        newton = self.mechanics.newton or (RESOLVED_NEWTON if mesh.resolved else NewtonSettings())
+        usual = RESOLVED_CONTACT_NEWTON if self.mechanics.self_contact else RESOLVED_NEWTON
+        newton = self.mechanics.newton or (usual if mesh.resolved else NewtonSettings())
         return Structure(model, materials, printed, newton, self._shared)

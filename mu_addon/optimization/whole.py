@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import attrs
 
+from ..design.body import Body, envelope
 from ..design.figures import estimated_volume, print_time
 from ..design.parameters import Unit
 from ..design.printing.printer import Printer
@@ -15,19 +16,21 @@ from .structure import Condition, States, Structure
 class Mass:
     """Mass in g, by `estimated_volume` (2 % above the solid's for the shipped units), without a waveguide.
 
-    density_g_per_ml: of the resin. It jumps a little where a strut enters the actuator, so that its
-    derivative is that between units a little apart.
+    density_g_per_ml: of the resin; body: in place of the lattice's box, or None. The mass jumps a little
+    where a strut enters the actuator, so that its derivative is that between units a little apart.
     """
 
     name: str
     density_g_per_ml: float
     printer: Printer
     conditions: tuple[Condition, ...] = ()
+    body: Body | None = None
 
     def value(self, structure: Structure, states: States) -> float:
         """In g."""
         unit: Unit = structure.about
-        struts = Stack().value("struts", StepInputs(unit))
+        body = None if self.body is None else envelope(self.body, unit.dimensions)
+        struts = Stack().value("struts", StepInputs(unit, body=body))
         return estimated_volume(unit, struts) / 1000.0 * self.density_g_per_ml
 
 

@@ -12,7 +12,7 @@ from ..design.lattice import Lattice, lattice_of
 from ..design.waveguide import Bar, strut_radii
 from ..errors import InputError
 from ..meshing.mesh import Array
-from .strut import Radius, radius_of, thickened
+from .strut import Radius, is_half_diagonal, radius_of, thickened
 
 _STATIONS = np.linspace(0.0, 1.0, 33)
 
@@ -61,6 +61,44 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
         return plain, _radius(_from_corner(lattice, strut))
 
     return _swept_again(lattice, range(len(lattice.struts)), laws, nodes)
+
+
+def resized_nodes(d: Dimensions, other: Dimensions, nodes: Array) -> Array:
+    """Nodes (n, 3) in mm of a lattice's struts where those of other diameters or grading have them.
+
+    As `thickened_nodes`; both of one cell and envelope. Raises InputError for struts that are no half
+    diagonals.
+    """
+    first, second = lattice_of(d), lattice_of(other)
+    apart = np.abs(first.radii(_STATIONS) - second.radii(_STATIONS)).max(axis=1)
+    changed = np.flatnonzero(apart > 0.0).tolist()
+    if not changed:
+        return nodes
+    if not is_half_diagonal(d):
+        raise InputError(
+            f"the mesh of struts of lattice {d.kind.name!r} cannot be moved to other diameters",
+            "[lattice] kind",
+            "choose body-centred or body-centred-straight",
+        )
+
+    if first.factors is None and second.factors is None:
+        return _all_alike(d, radius_of(other), nodes)
+
+    def laws(strut: int) -> tuple[Radius, Radius]:
+        return _radius(_from_corner(first, strut)), _radius(_from_corner(second, strut))
+
+    return _swept_again(first, changed, laws, nodes)
+
+
+def _all_alike(d: Dimensions, other: Radius, nodes: Array) -> Array:
+    """Nodes (n, 3) in mm of struts that are alike everywhere, all octants at once; as `_swept_again`."""
+    half = d.cell / 2.0
+    shift = np.array([half, half, 0.0])
+    corner = d.cell * np.round((nodes - shift) / d.cell) + shift
+    sign = np.where(nodes < corner, -1.0, 1.0)
+    local = np.minimum((nodes - corner) * sign, half)
+    found = corner + sign * thickened(half, local, radius_of(d), other)
+    return np.where(np.abs(found - nodes) < 1e-9 * d.cell, nodes, found)
 
 
 def _swept_again(

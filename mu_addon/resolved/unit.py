@@ -14,8 +14,9 @@ from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.embedding import embed
-from ..meshing.membrane import Meridian, division, membrane_mesh, stations
+from ..meshing.membrane import Membrane, division
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
+from ..meshing.morph import WallGrid
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.unit import mesh_unit
@@ -114,17 +115,26 @@ def mesh_printed(
     return mesh
 
 
+def wall_grid(d: Dimensions, sizes: Sizes) -> WallGrid:
+    """The grid of a unit's wall and caps at x >= 0."""
+    scale = d.cell / CELL_MM
+    return WallGrid(
+        d,
+        sizes.meridian_mm * scale,
+        math.pi,
+        2 * division(d.R * math.pi / 2, sizes.hoop_mm * scale),
+        sizes.through_wall,
+        division(d.r, sizes.hoop_mm * scale),
+    )
+
+
 def wall_mesh(d: Dimensions, sizes: Sizes) -> Mesh:
     """Quadratic tetrahedra of a unit's wall and caps at x >= 0, base and tip those of its own end planes."""
-    meridian, scale = Meridian.of(d), d.cell / CELL_MM
-    found = membrane_mesh(
-        meridian,
-        turn=math.pi,
-        p=stations(meridian, sizes.meridian_mm * scale),
-        sectors=2 * division(d.R * math.pi / 2, sizes.hoop_mm * scale),
-        layers=sizes.through_wall,
-        rings=division(d.r, sizes.hoop_mm * scale),
-    )
+    return wall_of(wall_grid(d, sizes).membrane, d)
+
+
+def wall_of(found: Membrane, d: Dimensions) -> Mesh:
+    """Quadratic tetrahedra of a membrane at x >= 0 of these dimensions; see `wall_mesh`."""
     nodes, tets, cavity = second_order(found.nodes, found.tets, found.cavity, found.middles)
     nodes[np.abs(nodes[:, 0]) < 1e-9 * d.cell, 0] = 0.0
     base, tip = (np.flatnonzero(nodes[:, 2] == z) for z in (0.0, d.height))

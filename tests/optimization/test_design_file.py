@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.materials.library import load_material, material_text, parse_material
+from mu_addon.materials.library import load_material, material_text
 from mu_addon.optimization.design_file import parse_design, read_design
 from mu_addon.optimization.freedoms import changed_unit, parameter_of
 
@@ -55,8 +55,8 @@ def test_a_resin_of_ones_own_lies_beside_what_is_written(tmp_path):
     text = HEAD.replace("format = 1", 'format = 1\nresin = "mine.toml"') + ANGLE + WALL
     found = parse_design(text, "design.toml", folder=tmp_path)
     texts = found.texts()
-    material = parse_material(texts["resin.toml"])
-    again = parse_design(texts["design.toml"], "again", found.unit, material=material)
+    (tmp_path / "resin.toml").write_text(texts["resin.toml"])
+    again = parse_design(texts["design.toml"], "again", found.unit, tmp_path)
     assert again.texts() == texts
     for name, content in texts.items():
         (tmp_path / name).write_text(content)
@@ -64,7 +64,91 @@ def test_a_resin_of_ones_own_lies_beside_what_is_written(tmp_path):
     assert read_design(tmp_path / "design.toml", texts["design.toml"]).texts() == texts
 
 
-@pytest.mark.parametrize("folder", ["stronger-finger", "graded-finger", "robust-finger", "straight-finger"])
+def test_the_path_of_a_target_may_be_a_freedom():
+    slope = '[[target]]\nkind = "sensor_slope"\npressures_kPa = [10]\nobjective = "maximise"\n'
+    path = '[[freedom]]\nparameter = "path"\nvalues = ["alpha2", "alpha4"]\n'
+    row = '[[freedom]]\nparameter = "waveguide.row"\nlow = 1\nhigh = 2\n'
+    found = design(HEAD + ANGLE + slope + SENSOR.replace('"x"', '"alpha1"') + WALL + path + row)
+    assert found.start == (0.9, "alpha2", 2)
+    values = (0.8, "alpha4", 1)
+    chosen = found.chosen(found.choice(values))
+    assert [t.quantity.path for t in chosen.targets[1:]] == ["alpha4", "alpha1"]
+    assert found.unit_of(values).waveguide.row == 1
+    assert read(found).start == found.start
+    for wrong, words in (('"alpha99"', "is not a path"), ("3", "no list of names")):
+        with pytest.raises(InputError, match=words) as error:
+            design(HEAD + ANGLE + WALL + path.replace('"alpha4"', wrong))
+        assert "line 13, values" in error.value.where
+    with pytest.raises(InputError, match="is not a path of the unit"):
+        design(HEAD + ANGLE + slope + WALL)
+
+
+def test_another_resin_brings_its_moduli_its_density_and_its_elongation(tmp_path):
+    own = material_text(load_material("elastic-50a-v1")).replace("value = 2.70", "value = 1.35")
+    (tmp_path / "mine.toml").write_text(own)
+    text = HEAD + ANGLE + '[[target]]\nkind = "mass"\nobjective = "minimise"\n'
+    text += ANGLE.replace("angle", "safety").replace("low = 20", "low = 4") + WALL
+    text += '[[freedom]]\nparameter = "resin"\nvalues = ["elastic-50a-v1", "flexible-80a", "mine.toml"]\n'
+    found = parse_design(text, "design.toml", folder=tmp_path)
+    assert found.start == (0.9, "elastic-50a-v1")
+    assert found.unit_of(found.start) == found.unit, "the first resin's unit is as it is drawn"
+    stiff = load_material("flexible-80a")
+    unit, chosen = found.unit_of((0.9, "flexible-80a")), found.chosen({"resin": "flexible-80a"})
+    share = unit.material.membrane_modulus_kPa / found.unit.material.membrane_modulus_kPa
+    assert unit.material.membrane_modulus_kPa == pytest.approx(1000 * stiff.modulus_MPa)
+    assert unit.material.lattice_modulus_kPa == pytest.approx(share * found.unit.material.lattice_modulus_kPa)
+    assert (chosen.targets[1].quantity.density_g_per_ml, chosen.targets[2].quantity.elongation) == (1.05, 1.2)
+    # A modulus that is free goes before the resin's.
+    soft = '[[freedom]]\nparameter = "material.lattice_modulus_kPa"\nlow = 5\nhigh = 60\n'
+    free = parse_design(text + soft, "design.toml", folder=tmp_path)
+    assert free.unit_of((0.9, "flexible-80a", 12.0)).material.lattice_modulus_kPa == 12.0
+    # A resin of one's own lies beside.
+    for name, content in found.texts().items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "mine.toml").unlink()
+    again = read_design(tmp_path / "design.toml", found.texts()["design.toml"])
+    assert again.texts() == found.texts()
+    assert again.unit_of((0.9, "resin-1.toml")) == found.unit_of((0.9, "mine.toml"))
+
+
+def test_a_body_of_ones_own_bounds_the_lattice_and_what_leaves_it_breaks_a_rule(tmp_path):
+    half_x, y0, y1, top = 17.0, -17.0, 28.0, 75.0
+    corners = [(x, y, z) for z in (0.0, top) for y in (y0, y1) for x in (-half_x, half_x)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    lines += ["f " + " ".join(str(n + 1) for n in quad) for quad in quads]
+    (tmp_path / "box.obj").write_text("\n".join(lines) + "\n")
+    text = HEAD.replace("format = 1", 'format = 1\nbody = "box.obj"') + ANGLE + WALL
+    text += '[[target]]\nkind = "mass"\nobjective = "minimise"\n'
+    text += '[[freedom]]\nparameter = "chambers.count"\nlow = 6\nhigh = 7\n'
+    found = parse_design(text, "design.toml", folder=tmp_path)
+    assert found.targets[1].quantity.body is found.body
+    assert found.unit_of((0.9, 6)).chambers.count == 6
+    with pytest.raises(InputError, match="cannot be an envelope"):
+        found.unit_of((0.9, 7))
+    for name, content in found.texts().items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "box.obj").unlink()
+    assert read_design(tmp_path / "design.toml", found.texts()["design.toml"]).texts() == found.texts()
+
+
+def read(found):
+    return parse_design(found.texts()["design.toml"], "again", found.unit)
+
+
+def test_self_contact_is_of_struts_as_printed():
+    both = HEAD + 'fidelity = "resolved"\nself_contact = true\n' + ANGLE + WALL
+    assert design(both).self_contact
+    assert read(design(both)).self_contact
+    assert not design(HEAD + 'fidelity = "resolved"\n' + ANGLE + WALL).self_contact
+    with pytest.raises(InputError, match="no struts that could touch") as error:
+        design(HEAD + "self_contact = true\n" + ANGLE + WALL)
+    assert error.value.where.endswith("line 3, self_contact")
+
+
+@pytest.mark.parametrize(
+    "folder", ["stronger-finger", "graded-finger", "robust-finger", "straight-finger", "printed-finger"]
+)
 def test_the_examples_are_read(folder):
     path = Path(__file__).parents[2] / "assets/examples" / folder / "design.toml"
     found = design(path.read_text())

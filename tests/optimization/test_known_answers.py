@@ -10,7 +10,17 @@ from mu_addon.optimization.search import SearchSettings, search_units
 from mu_addon.optimization.structure import solve
 from mu_addon.optimization.targets import Target
 
-from .bodies import LENGTH, MODULUS, Cantilever, Volume
+from .bodies import (
+    LENGTH,
+    MODULUS,
+    AxialStiffness,
+    Cantilever,
+    Fold,
+    GradedBlock,
+    Resin,
+    Volume,
+    fold_stiffness,
+)
 
 FREE = [Freedom("a", 1.0, 4.0), Freedom("b", 1.0, 4.0)]
 WANTED = 4e-4  # N/mm
@@ -60,3 +70,50 @@ def test_the_slopes_of_stiffness_are_those_of_the_closed_form():
     # Slender beams leave out shear, of the order of (b/L)^2.
     np.testing.assert_allclose(found, expected, rtol=0.01)
     np.testing.assert_allclose(found[2:], expected[2:], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_least_resin_of_a_graded_block_is_where_the_moment_is():
+    """A block in bending: sum(J_i/f_i) is given and sum(f_i) least where f_i grows as the root of J_i."""
+    layers = 4
+    ends = LENGTH - np.linspace(0, LENGTH, layers + 1)
+    moment = (ends[:-1] ** 3 - ends[1:] ** 3) / 3  # the integral of the squared moment in each layer
+    section = MODULUS * 2.0**4 / 12
+    wanted = 1.5 * section / moment.sum()
+    roots = np.sqrt(moment)
+    best = roots * roots.sum() * wanted / section
+    quantities = [RestStiffness("k", "y"), Resin("resin")]
+    asked = [
+        Target("k", "stiffness", "N/mm", quantities[0], low=wanted, tolerance=wanted * 0.01),
+        Target("resin", "mass", "", quantities[1], goal="minimise"),
+    ]
+    calls = []
+    observe = GradedBlock(layers).observe(quantities, calls)
+    free = [Freedom(f"layer {n}", 0.1, 4.0) for n in range(layers)]
+    found = search_units(free, asked, observe, (1.5,) * layers, SearchSettings(30))
+    [number] = found.proposed
+    resin = found.observed[number].values[1]
+    assert found.feasible
+    # An even block of that stiffness has 1.5.
+    assert best.mean() < 1.3
+    assert resin == pytest.approx(best.mean(), rel=0.01)
+    # Near the least, where resin hardly depends on them, the factors themselves are less sharp.
+    np.testing.assert_allclose(found.observed[number].design, best, rtol=0.1)
+
+
+@pytest.mark.slow
+def test_the_lightest_bellows_of_a_stiffness_has_the_thickness_of_plate_theory():
+    folds, wanted = 6, 2e-3  # N/mm, of folds in series
+    quantities = [AxialStiffness("k", "z"), Volume("v")]
+    each = folds * wanted
+    asked = [
+        Target("k", "stiffness", "N/mm", quantities[0], low=each, tolerance=each * 0.01),
+        Target("v", "mass", "mm3", quantities[1], goal="minimise"),
+    ]
+    free = [Freedom("t", 0.2, 1.5)]
+    found = search_units(free, asked, Fold().observe(quantities, []), (0.8,), SearchSettings(10))
+    [number] = found.proposed
+    thickness = (each / fold_stiffness(1.0)) ** (1 / 3)
+    assert found.feasible
+    assert 0.25 < thickness < 0.6, "thin enough for plate theory"
+    assert found.observed[number].design[0] == pytest.approx(thickness, rel=0.01)

@@ -13,7 +13,7 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_curve, present
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present
 
 JOB = "optimize_"
 _KNOWN = parameters()
@@ -62,6 +62,9 @@ def _more(layout, props) -> None:
     if not body:
         return
     body.prop(props, "robust")
+    body.prop(props, "printed_struts")
+    if props.printed_struts:
+        body.prop(props, "self_contact")
     row = body.row()
     row.prop(props, "has_gravity")
     if props.has_gravity:
@@ -121,6 +124,9 @@ def _freedoms(layout, root, props) -> None:
         row.prop(freedom, "parameter", text="")
         _remove(row, "freedoms", index)
         column = box.column(align=True)
+        if freedom.parameter in NAMED:
+            column.prop(freedom, "values", text="Names")
+            continue
         column.prop(freedom, "how", text="")
         d = FREE[freedom.parameter]
         for name in {"range": ("low", "high"), "values": ("values",), "fixed": ("value",)}[freedom.how]:

@@ -13,21 +13,31 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...design import lattices
+from ...design.anchors import windows
+from ...design.assets import asset_names
 from ...design.quantity import Description
-from ...optimization.freedoms import UNSEEN, parameters
+from ...errors import InputError
+from ...optimization.freedoms import PATH, RESIN, parameters
 from ..shared.registration import property_group_factory
 from ..shared.texts import sentence
 from ..unit.fields import exact, label
-from ..unit.properties import BESIDE_BLEND_FILE, section_of
+from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
 """Sections whose numbers may be free; those of sensor, printer and laws with memory are not offered."""
 FREE = {
     name: d
     for name, d in parameters().items()
-    if d.type in (int, float) and name not in UNSEEN and (name == "scale" or name.split(".")[0] in SECTIONS)
+    if d.type in (int, float) and (name in ("scale", "waveguide.row") or name.split(".")[0] in SECTIONS)
 }
 """Parameters that the panel offers to be free, by dotted name."""
+NAMED = {
+    "lattice.kind": ("Lattice: Kind", "Kind of lattice cell; for struts as printed"),
+    PATH: ("Sensor: Path", "Path of the sensor; a target whose path is left empty is of it"),
+    RESIN: ("Resin", "Resin of the library: its moduli, density and elongation at break"),
+}
+"""What has names in place of numbers: how each is listed, and what it is."""
 AROUND = 0.25
 """A parameter that is made free may first change by this share of its value to either side."""
 
@@ -102,7 +112,9 @@ class MU_PG_target(bpy.types.PropertyGroup):
         description="Pressure in kPa and value of each point, as -15: -10, 30: 16",
         default="-15: -10, 30: 16",
     )
-    path: StringProperty(name="Path", description="Sensor path, alpha1 and on", default="alpha4")
+    path: StringProperty(
+        name="Path", description="Sensor path, alpha1 and on; empty: the free one", default="alpha4"
+    )
     ask: EnumProperty(
         name="Shall Be",
         description="What is asked of the quantity",
@@ -139,6 +151,9 @@ def asks_curve(target) -> bool:
 
 def _first_range(freedom, context) -> None:
     """Let a parameter's first range lie around the unit's present value, within the parameter's bounds."""
+    if freedom.parameter in NAMED:
+        freedom.values = ", ".join(names_of(freedom.id_data, freedom.parameter))
+        return
     d = FREE[freedom.parameter]
     now = present(freedom.id_data, freedom.parameter)
     step = max(abs(now) * AROUND, 1.0 if d.type is int else 0.0)
@@ -159,6 +174,16 @@ def present(root, name: str) -> float:
     return section_of(root.mu_unit, section)[key]
 
 
+def names_of(root, name: str) -> list[str]:
+    """All names that a freedom of `NAMED` may have; of a unit that breaks a rule no path."""
+    if name == PATH:
+        try:
+            return [w.name for w in windows(to_unit(root.mu_unit).chambers.count)]
+        except InputError:
+            return []
+    return asset_names("materials") if name == RESIN else lattices.names()
+
+
 def title(name: str, d: Description) -> str:
     """How a parameter is listed: its section and its label, as "Chambers: Wall"."""
     section = name.rpartition(".")[0]
@@ -171,7 +196,8 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
     parameter: EnumProperty(
         name="Parameter",
         description="What may change",
-        items=[(name, title(name, d), sentence(d.text)) for name, d in FREE.items()],
+        items=[(name, title(name, d), sentence(d.text)) for name, d in FREE.items()]
+        + [(name, *words) for name, words in NAMED.items()],
         default="chambers.wall_mm",
         update=_first_range,
     )
@@ -186,7 +212,7 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
     )
     values: StringProperty(
         name="Values",
-        description="The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1",
+        description="The values, in the parameter's unit at scale 1, as 0.7, 0.9, 1.1; or the names",
         default="",
     )
     value: FloatProperty(
@@ -227,6 +253,17 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     robust: BoolProperty(
         name="Robust",
         description="Ask for units that meet the targets within the uncertainty of mesh, print and resin",
+        default=False,
+    )
+    printed_struts: BoolProperty(
+        name="Struts as Printed",
+        description="Simulate every strut in place of a homogenised lattice: slower by far, and the search "
+        "sees the struts' diameters and kind",
+        default=False,
+    )
+    self_contact: BoolProperty(
+        name="Self-Contact",
+        description="Keep walls and struts from passing through each other: slower again",
         default=False,
     )
     has_gravity: BoolProperty(

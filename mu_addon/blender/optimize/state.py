@@ -21,7 +21,7 @@ from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit.fields import exact
 from ..unit.properties import shape_hash, to_unit
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, OF_PATH, YES, asks_curve
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve
 
 if TYPE_CHECKING:
     from ...usecases.optimize.job import Job
@@ -105,7 +105,7 @@ OPTIMIZATION = JobKind(
 def target_table(target: Any) -> dict[str, Any]:
     """A target of the panel as its [[target]] table."""
     table: dict[str, Any] = {"kind": target.kind}
-    if target.kind in OF_PATH:
+    if target.kind in OF_PATH and target.path:
         table["path"] = target.path
     if target.kind in AT_TWO:
         table["pressures_kPa"] = [exact(p) for p in target.pressures_kPa]
@@ -141,6 +141,9 @@ def _numbers(text: str, between: str) -> list[Any]:
 
 def freedom_table(freedom: Any) -> dict[str, Any]:
     """A freedom of the panel as its [[freedom]] table; what a rule ties to it follows."""
+    if freedom.parameter in NAMED:
+        names = [name.strip() for name in freedom.values.split(",")]
+        return {"parameter": freedom.parameter, "values": [name for name in names if name]}
     section, _, name = freedom.parameter.rpartition(".")
     whole = FREE[freedom.parameter].type is int
 
@@ -161,8 +164,10 @@ def freedom_table(freedom: Any) -> dict[str, Any]:
 def document(root: Any) -> dict[str, Any]:
     """What design.toml says of the panel's targets and freedoms."""
     s = root.mu_optimize
-    weight = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
-    return weight | {
+    more: dict[str, Any] = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
+    if s.printed_struts:
+        more |= {"fidelity": "resolved", "self_contact": s.self_contact}
+    return more | {
         "format": 1,
         "unit": UNIT,
         "evaluations": s.evaluations,
@@ -182,15 +187,12 @@ def job_of(root: Any) -> Job:
     from ...usecases.optimize.job import Job, job_from
 
     unit, s = to_unit(root.mu_unit), root.mu_optimize
-    if bodies.envelope_in(root, unit) is not None:
-        raise InputError(
-            "the unit has a body of your own", "", "the search knows the lattice's box alone: remove the body"
-        )
+    body = bodies.envelope_in(root, unit)
     if s.source == "file":
         if not s.file:
             raise InputError("no file is chosen", "Optimize, File", "choose a design.toml")
-        return job_from(Path(bpy.path.abspath(s.file)), unit=unit if s.own_unit else None)
-    return Job(parse_design(toml_text(document(root)), DESIGN, unit))
+        return job_from(Path(bpy.path.abspath(s.file)), unit=unit if s.own_unit else None, body=body)
+    return Job(parse_design(toml_text(document(root)), DESIGN, unit, body=body))
 
 
 def write_inputs(root: Any, folder: Path) -> None:

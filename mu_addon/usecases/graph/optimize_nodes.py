@@ -32,7 +32,10 @@ def optimize_nodes() -> tuple[Definition, ...]:
             (Output("unit", "unit", "the proposed unit"),),
             (
                 setting(
-                    "file", "", "design.toml of targets and freedoms; its own unit is not read", path=FILE
+                    "file",
+                    "",
+                    "design.toml of targets and freedoms; the linked unit and its body stand for its own",
+                    path=FILE,
                 ),
                 setting("proposed", 1, "which of the proposed units", low=1, high=6),
                 setting("workers", 1, "units at a time; decides how the search goes", low=1, high=256),

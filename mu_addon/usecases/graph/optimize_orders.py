@@ -12,16 +12,14 @@ from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ..optimize.job import job_from
 from ..optimize.run import USE_CASE
-from .parts import refuse_body
 
 
 def optimize_order(call: Call) -> Order:
     """The optimisation of a unit by a file's targets and freedoms; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
-    refuse_body(design, "an optimisation")
     if not s["file"]:
         raise InputError("no targets are named", "file", "give a design.toml")
-    job = job_from(Path(s["file"]), call.inputs["model"], s["workers"], unit=design.unit)
+    job = job_from(Path(s["file"]), call.inputs["model"], s["workers"], unit=design.unit, body=design.body)
     return Order(USE_CASE, job)
 
 
@@ -37,4 +35,4 @@ def proposed_of(call: Call, done: Finished) -> Outputs:
     row = rows[number - 1]
     design = call.inputs["unit"]
     unit = attrs.evolve(read_unit(done.folder / row["file"]), name=design.unit.name)
-    return {"unit": attrs.evolve(design, unit=unit), "proposed": row}
+    return {"unit": attrs.evolve(design, unit=unit, path=row.get("path", design.path)), "proposed": row}

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import attrs
 
-from ...design.parameters import Unit, from_toml
+from ...design.body import Body
+from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit import materials_of
-from ...materials.library import parse_material
-from ...meshing.settings import RESOLVED
-from ...optimization.design_file import HEADER, RESIN, UNIT, Design, parse_design, read_design
+from ...meshing.settings import RESOLVED, MeshSettings
+from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
 from ...run.folder import FolderLayout
@@ -26,7 +26,7 @@ LAYOUT = FolderLayout(
     DESIGN,
     HEADER,
     results=(TABLE, REPORT, FRONT, "proposed-*.toml", "proposed-*.png"),
-    optional=(UNIT, RESIN, MODEL),
+    optional=(UNIT, RESIN, "resin-*.toml", BODY, MODEL),
 )
 # No file of inputs is longer, in bytes.
 _LONGEST = 1_000_000
@@ -57,8 +57,9 @@ def job_from(
     workers: int = 1,
     scheduler: str | None = None,
     unit: Unit | None = None,
+    body: Body | None = None,
 ) -> Job:
-    """The job of a design file and a model's; unit: in place of the file's own. Raises InputError."""
+    """The job of a design file and a model's; unit, body: in place of the file's own. Raises InputError."""
     try:
         text = file_text(file, _LONGEST)
     except OSError as error:
@@ -68,7 +69,7 @@ def job_from(
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(file), "save it as UTF-8") from error
     return Job(
-        read_design(file, text, unit), None if model is None else load_model(model), workers, scheduler
+        read_design(file, text, unit, body), None if model is None else load_model(model), workers, scheduler
     )
 
 
@@ -76,12 +77,6 @@ def read_job(folder: Path) -> Job:
     """The optimisation that a folder describes; raises InputError."""
     model = folder / MODEL
     return job_from(folder / DESIGN, model if model.is_file() else None)
-
-
-def design_of(texts: Mapping[str, str]) -> Design:
-    """The design of a run's own texts, which hold its unit and resin; raises InputError."""
-    material = parse_material(texts[RESIN], RESIN) if RESIN in texts else None
-    return parse_design(texts[DESIGN], DESIGN, from_toml(texts[UNIT], UNIT), material=material)
 
 
 def mechanics_of(
@@ -98,7 +93,7 @@ def mechanics_of(
     if model is None:
         effects, left_out = _with_weight(NamedEffects(), design), []
         if not effects:
-            return Mechanics(settings), []
+            return Mechanics(settings, **_kept_apart(design, settings)), []
     else:
         first = extend(design.unit, model)
         effects, left_out = _with_weight(first.effects, design), list(first.left_out)
@@ -118,7 +113,13 @@ def mechanics_of(
         model=lambda unit, mesh: effects.model(unit, mesh, threads=1),
         load=effects.load,
         newton=None if settings.resolved else effects.newton,
+        **_kept_apart(design, settings),
     ), left_out
+
+
+def _kept_apart(design: Design, settings: MeshSettings) -> dict[str, Any]:
+    """Of `Mechanics` the design's body, and whether a resolved unit's walls and struts keep apart."""
+    return {"body": design.body, "self_contact": design.self_contact and settings.resolved}
 
 
 def _with_weight(effects: NamedEffects, design: Design) -> NamedEffects:

@@ -80,12 +80,12 @@ def _units(found: Optimised) -> str:
         (
             [
                 f.name,
-                _shown(f.value_of(found.design.unit)),
-                *(_shown(f.value_of(p.unit)) for p in found.proposals),
+                _shown(found.design.start[n]),
+                *(_shown(p.observed.design[n]) for p in found.proposals),
             ],
             False,
         )
-        for f in found.design.freedoms
+        for n, f in enumerate(found.design.freedoms)
     ]
     head = [("freedom", ""), ("start", "n"), *((str(p.place), "n") for p in found.proposals)]
     return f'<div class="triple">{html}</div>' + table("Each lies beside as proposed-N.toml.", head, rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
@@ -19,7 +20,8 @@ Array = np.ndarray[Any, Any]
 class Proposal:
     """A proposed unit: its place among them from 1, its design's number, and what was found of it.
 
-    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words.
+    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words. choice: path and
+    resin, as far as they were free, by the freedom's name.
     """
 
     place: int
@@ -30,6 +32,7 @@ class Proposal:
     checked: Verified
     changes: tuple[str, ...]
     reasons: tuple[str, ...]
+    choice: Mapping[str, str] = attrs.field(factory=dict)
 
 
 @attrs.frozen(eq=False)

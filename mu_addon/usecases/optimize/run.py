@@ -14,7 +14,8 @@ from ...design.parameters import Unit, write_unit
 from ...design.printing.printer import load_printer
 from ...errors import InputError, OutputError
 from ...files import write_csv
-from ...optimization.evaluation import Evaluated, Evaluator, evaluate
+from ...materials.library import material_text
+from ...optimization.evaluation import Candidate, Evaluated, Evaluator, evaluate
 from ...optimization.robustness import Verified, verified
 from ...optimization.search import Found, Observed, Values, search_units
 from ...optimization.uncertainty import SURE
@@ -26,7 +27,7 @@ from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_jo
 from .report import write_report
 from .results import Optimised, Proposal
 from .words import changes, outcome, reasons, verdict
-from .worker import several
+from .worker import asked_of, several
 
 Array = np.ndarray[Any, Any]
 
@@ -60,6 +61,7 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
         origin,
         several(job, progress.warning),
         uncertainty=design.uncertainty if design.robust else None,
+        of_choice=lambda choice: asked_of(job, choice),
     )
     run.evaluator = evaluator
     start = Observed(design.start, np.empty(0), np.empty((0, 0)), False)
@@ -120,6 +122,8 @@ class _Run:
                 [(f.name, f.low, f.high, tuple(f.also.items())) for f in design.freedoms if not f.discrete],
                 design.settings,
                 (design.orientation_deg, design.material.density_g_per_ml),
+                {name: material_text(m) for name, m in design.materials.items()},
+                (design.body.hash if design.body else "", design.self_contact),
                 design.uncertainty if design.robust else None,
             )
         )
@@ -135,31 +139,38 @@ class _Run:
     def robust_search(self) -> Found:
         """A search that judges by the finer mesh: by what the start changes there, then by its best unit."""
         design = self.job.design
-        self.mesh_change = self.change_by_mesh(design.unit)
+        self.mesh_change = self.change_by_mesh(self.candidate(design.start, design.unit))
         found = self.search(FIRST_PART)
         best = found.observed[found.proposed[len(found.proposed) // 2]]
         if not best.sound:
             return self.search(1.0, self._known())
-        self.mesh_change = self.change_by_mesh(design.unit_of(best.design))
+        self.mesh_change = self.change_by_mesh(self.candidate(best.design))
         return self.search(1.0, self._known())
 
     def _known(self) -> list[Observed]:
         return [self._observed(values, found) for values, found in self.rows]
 
-    def change_by_mesh(self, unit: Unit) -> Array:
+    def candidate(self, values: Values, unit: Unit | None = None) -> Candidate:
+        """A design's unit, by default of its values, with the path and the resin that it chose."""
+        design = self.job.design
+        choice = tuple(design.choice(values).items())
+        return Candidate(design.unit_of(values) if unit is None else unit, choice)
+
+    def change_by_mesh(self, candidate: Candidate) -> Array:
         """Share (q,) by which each value of a unit changes from the search's mesh to the finer one.
 
         0 where it fails on either.
         """
         design = self.job.design
-        name = key("change by mesh 1", unit.hash(), self.asked, design.check_refine, self._model_text)
+        unit, own = candidate.unit, candidate.choice or ""
+        name = key("change by mesh 1", unit.hash(), self.asked, design.check_refine, self._model_text, own)
         cache = self.evaluator.cache
         kept = None if cache is None else cache.get("mesh", name)
         if kept is not None:
             return np.asarray(kept["change"])
-        finer, _ = mechanics_of(design, self.job.model, design.check_refine)
-        [coarse] = self.evaluator.of([unit])
-        fine = evaluate(unit, design.targets, (), finer).values - coarse.values
+        targets, finer = asked_of(self.job, dict(candidate.choice), design.check_refine)
+        [coarse] = self.evaluator.of([candidate])
+        fine = evaluate(unit, targets, (), finer).values - coarse.values
         share = np.divide(fine, coarse.values, out=np.zeros_like(fine), where=coarse.values != 0)
         change = np.clip(np.nan_to_num(share), -LARGEST_CHANGE, LARGEST_CHANGE)
         if cache is not None:
@@ -188,11 +199,10 @@ class _Run:
 
     def observe(self, designs: Sequence[Values]) -> list[Observed]:
         """Designs as the search takes them; one that breaks a rule of units is not computed."""
-        design = self.job.design
-        units: list[Unit | None] = []
+        units: list[Candidate | None] = []
         for values in designs:
             try:
-                units.append(design.unit_of(values))
+                units.append(self.candidate(values))
             except InputError:
                 units.append(None)
         found = iter(self.evaluator.of([u for u in units if u is not None]))
@@ -214,36 +224,31 @@ class _Run:
         design, progress = self.job.design, self.context.progress
         chosen = _spread(found.proposed, MOST_CHECKED)
         sound = [n for n in chosen if found.observed[n].sound]
-        finer, _ = mechanics_of(design, self.job.model, design.check_refine)
-        struts = (
-            mechanics_of(design, self.job.model, design.check_refine, True)[0]
-            if design.check_struts
-            else None
-        )
         printer = load_printer(design.printer) if any(t.kind == "printable" for t in design.targets) else None
         proposals = []
         with progress.stage("check of what is proposed"):
             for place, number in enumerate(sound, 1):
                 observed = found.observed[number]
                 unit = attrs.evolve(design.unit_of(observed.design), name=f"proposed-{place}")
+                choice = design.choice(observed.design)
+                targets, finer = asked_of(self.job, choice, design.check_refine)
                 result = self.rows[number][1]
                 assert result is not None
                 name = key(
                     "verified 2", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
                     design.print_tolerance_mm, design.modulus_tolerance, design.printer if printer else "",
                     self._model_text, design.check_struts,
-                    [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets],
+                    [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets], choice,
                 )  # fmt: skip
                 checked = self._kept(name)
                 if checked is None:
+                    struts = (
+                        asked_of(self.job, choice, design.check_refine, True)[1]
+                        if design.check_struts
+                        else None
+                    )
                     checked = verified(
-                        unit,
-                        result.values,
-                        design.targets,
-                        finer,
-                        design.uncertainty,
-                        printer,
-                        struts,
+                        unit, result.values, targets, finer, design.uncertainty, printer, struts
                     )
                     self._keep(name, checked)
                 write_unit(unit, self.folder / f"proposed-{place}.toml")
@@ -258,6 +263,7 @@ class _Run:
                         checked,
                         tuple(changes(design.freedoms, design.start, observed.design)),
                         tuple(reasons(design.freedoms, design.targets, observed, design.start)),
+                        choice,
                     )
                 )
                 progress.update(place / len(sound))
@@ -316,6 +322,7 @@ def summary(found: Optimised) -> dict[str, Any]:
         "proposed": [
             {
                 "file": f"proposed-{p.place}.toml",
+                **p.choice,
                 "robust": p.checked.is_robust,
                 "printable": p.checked.print_worst or "not asked",
                 "values": dict(zip(found.names, map(float, p.checked.values), strict=True)),

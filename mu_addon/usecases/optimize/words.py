@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ...design.parameters import Unit
 from ...optimization.freedoms import Freedom
 from ...optimization.robustness import Verified
 from ...optimization.search import Found, Observed
@@ -93,11 +92,6 @@ def sensitivities(freedoms: Sequence[Freedom], observed: Observed) -> Array:
     """Slopes (q, c) times a tenth of each continuous freedom's range: what a tenth of it moves."""
     widths = np.array([f.high - f.low for f in freedoms if not f.discrete])
     return np.asarray(0.1 * widths * observed.slopes)
-
-
-def differences(unit: Unit, freedoms: Sequence[Freedom]) -> dict[str, Any]:
-    """The unit's values of the freedoms by name."""
-    return {f.name: f.value_of(unit) for f in freedoms}
 
 
 def _at_bound(freedom: Freedom, value: Any) -> str:

@@ -4,6 +4,7 @@ import json
 
 import attrs
 import bpy
+import numpy as np
 import pytest
 
 from mu_addon.blender.optimize import panel as panels
@@ -138,6 +139,50 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert (design.search.evaluations, design.settings.refine, design.check_refine) == (7, 0.5, 0.75)
     # What the core reads is what it writes again.
     assert read_job(tmp_path / "run").texts() == design.texts()
+
+
+def test_path_resin_kind_and_struts_as_printed_are_asked_for_by_name(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "deviation", path="", pressures_kPa=(-10.0, 20.0), ask="minimise")
+    path = free(root, "path")
+    assert path.values.startswith("alpha1, alpha2, ")
+    path.values = "alpha2, alpha4"
+    resin = free(root, "resin")
+    assert set(resin.values.split(", ")) == {"elastic-50a-v1", "flexible-80a"}
+    free(root, "waveguide.row", low=1.0, high=2.0)
+    kind = free(root, "lattice.kind", values="body-centred, body-centred-straight")
+    assert drawn(), "the panel shows names"
+    assert "does not see lattice.kind" in refused(bpy.ops.mu.optimize)
+    root.mu_optimize.targets.remove(0)
+    target(root, "angle", ask="low", low=5.0)
+    root.mu_optimize.printed_struts = root.mu_optimize.self_contact = True
+    optimization.write_inputs(root, tmp_path / "run")
+    design = read_job(tmp_path / "run").design
+    assert (design.settings.fidelity, design.self_contact) == ("resolved", True)
+    assert [f.values for f in design.freedoms] == [
+        ("alpha2", "alpha4"), ("elastic-50a-v1", "flexible-80a"), (1, 2),
+        ("body-centred", "body-centred-straight"),
+    ]  # fmt: skip
+    kind.values = ""
+    assert "empty list" in refused(bpy.ops.mu.optimize)
+
+
+def test_the_users_own_body_goes_along(tmp_path):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle")
+    free(root, "chambers.wall_mm")
+    half = np.array([17.0, 22.5, 37.5])
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    cube = bpy.context.object
+    for vertex in cube.data.vertices:
+        vertex.co = np.array(vertex.co) * half + [0.0, 5.5, 37.5]
+    root.mu_unit.envelope = cube.data
+    optimization.write_inputs(root, tmp_path / "run")
+    job = read_job(tmp_path / "run")
+    np.testing.assert_allclose(np.ptp(job.design.body.bounds, axis=0), 2 * half, atol=1e-4)
+    assert mechanics_of(job.design, None)[0].body is job.design.body
 
 
 def test_what_the_core_refuses_is_said_and_nothing_is_written(tmp_path):
