@@ -118,7 +118,7 @@ def test_a_robust_search_judges_by_the_finer_mesh_and_within_its_uncertainty(tmp
     mechanics, _ = mechanics_of(job.design, None)
     uncertainty = job.design.uncertainty
     run.evaluator = Evaluator(job.design.targets, job.design.freedoms, mechanics, uncertainty=uncertainty)
-    run.mesh_change = run.change_by_mesh(job.design.unit)
+    run.mesh_change = run.change_by_mesh(run.candidate(job.design.start, job.design.unit))
     [observed] = run.observe([job.design.start])
     raw = run.rows[0][1]
     finer, _ = mechanics_of(job.design, None, job.design.check_refine)

@@ -23,7 +23,7 @@ FULL_S = {
     "motion of the best path": 60.0, "report": 30.0,
 }  # fmt: skip
 """Seconds that the stages of a study take about, on two cores; a run of the same folder tells better."""
-PACE = {"full": 1.0, "resolved": 4.0, "quick": 0.1}
+PACE = {"full": 1.0, "resolved": 6.0, "quick": 0.1}
 """How a study's equilibria take longer or shorter by its detail."""
 _SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 
