@@ -51,7 +51,7 @@ class Flaw:
     places: NDArray[np.float64] = attrs.field(eq=False, factory=lambda: np.empty((0, 3)))
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Body:
     """A surface of triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame.
 
@@ -82,6 +82,10 @@ class Body:
                 self.name,
                 f"simplify it to {MOST_TRIANGLES} at most; the analysis mesh is coarser still",
             )
+
+    def __repr__(self) -> str:
+        # Caches go by it: the same surface under any name, and each of its numbers counts.
+        return f"Body({self.hash})"
 
     @property
     def bounds(self) -> NDArray[np.float64]:

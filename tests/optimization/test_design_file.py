@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import attrs
 import pytest
 
 from mu_addon.errors import InputError
@@ -123,6 +124,9 @@ def test_a_body_of_ones_own_bounds_the_lattice_and_what_leaves_it_breaks_a_rule(
     text += '[[freedom]]\nparameter = "chambers.count"\nlow = 6\nhigh = 7\n'
     found = parse_design(text, "design.toml", folder=tmp_path)
     assert found.targets[1].quantity.body is found.body
+    # A run keeps the body under a name of its own, and goes by this text to find what it computed.
+    renamed = attrs.evolve(found.body, name="body.stl")
+    assert repr(attrs.evolve(found.targets[1].quantity, body=renamed)) == repr(found.targets[1].quantity)
     assert found.unit_of((0.9, 6)).chambers.count == 6
     with pytest.raises(InputError, match="cannot be an envelope"):
         found.unit_of((0.9, 7))
