@@ -35,29 +35,19 @@ sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 from circumstances import circumstances  # noqa: E402
 
-from mu_addon.design.parameters import load_preset  # noqa: E402
 from mu_addon.errors import MuError, OutputError  # noqa: E402
-from mu_addon.meshing.settings import MeshSettings  # noqa: E402
 from mu_addon.run.context import run_to_end  # noqa: E402
 from mu_addon.run.folder import keep_inputs  # noqa: E402
 from mu_addon.run.progress import Progress  # noqa: E402
-from mu_addon.usecases.simulate_and_place.job import Job, grasp  # noqa: E402
 from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
 from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
+from tests.headless.test_resume import JOB as COARSE  # noqa: E402
 from tests.run.failing_files import failing  # noqa: E402
 from tests.run.failing_memory import short_of_memory  # noqa: E402
 from tests.usecases.fault_injection import PARTIAL, PLACEMENT, inject_each, placement  # noqa: E402
 
 JOBS = {
-    False: Job(
-        load_preset("mu-1.0x"),
-        grasp(),
-        mesh=MeshSettings(refine=0.4, order=1),
-        times=7,
-        stations=11,
-        rules=("volume_fraction",),
-        mesh_check=False,
-    ),
+    False: COARSE,
     # Two states of three chambers, for a busy machine.
     True: PLACEMENT,
 }
