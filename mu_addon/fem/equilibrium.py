@@ -68,21 +68,24 @@ class Equilibrium:
             self._stiffening = self.model.pattern, values
         return self._stiffening[1]
 
-    def _factorise(self, u: Array, pressure: float, convex: bool = False) -> bool:
+    def _factorise(self, u: Array, pressure: float, convex: bool = False, first: int = 0) -> tuple[bool, int]:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
 
         Away from equilibrium a thin wall easily carries more compression than it can, without any
         instability at the equilibrium itself. convex: as `Model.tangent` takes it; where that of self-contact
-        is needed and not asked for, it comes first. Returns whether the tangent asked for was definite.
+        is needed and not asked for, it comes first. first: number of the share to begin with, 0 for none.
+        Returns whether the tangent asked for was definite, and the number of the share that was added.
         """
         touches = self.model.self_contact is not None
+        shares = 0.0, *self.settings.regularisation
         for with_convex in dict.fromkeys((convex, convex or touches)):
             values = self.model.tangent(u, pressure, self.parameters, with_convex)
             last = with_convex == (convex or touches)
-            for share in (0.0, *self.settings.regularisation) if last else (0.0,):
+            for number in range(first, len(shares)) if last else (0,):
+                share = shares[number]
                 try:
                     self.factor.factor(values + share * self.rest_tangent if share else values)
-                    return with_convex == convex and share == 0.0
+                    return with_convex == convex and number == 0, number
                 except IndefiniteError:
                     continue
         raise ConvergenceError("the tangent is far from definite")
@@ -159,11 +162,11 @@ class Equilibrium:
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
         touches = self.model.self_contact is not None
-        factorisations, stale, definite, convex = 0, not factored, True, False
+        factorisations, stale, definite, convex, added = 0, not factored, True, False, 0
         for iteration in range(s.max_iterations + 1):
             if search.converged:
                 exact = definite and not convex
-                if not exact and not self._factorise(search.u, pressure):
+                if not exact and not self._factorise(search.u, pressure)[0]:
                     raise ConvergenceError("the equilibrium is unstable (limit point or buckling)")
                 return State(
                     pressure,
@@ -176,7 +179,8 @@ class Equilibrium:
                 if factorisations == s.max_factorisations:
                     break
                 convex = touches and search.residual > EXACT_BELOW
-                definite = self._factorise(search.u, pressure, convex)
+                # A little less than the last time may do now; from nothing on each try costs a factorisation.
+                definite, added = self._factorise(search.u, pressure, convex, max(added - 1, 0))
                 factorisations += 1
                 search.forget()
             try:
@@ -268,7 +272,7 @@ class Equilibrium:
         last = history[-1]
         if len(history) > 1:
             return extrapolate(history, pressure)
-        if not self._factorise(last.u, last.pressure_MPa):
+        if not self._factorise(last.u, last.pressure_MPa)[0]:
             raise ConvergenceError("the state to start from is unstable")
         with_, without = (
             self.model.residual(last.u, p, self.parameters).ravel()[self.model.free]

@@ -1,5 +1,7 @@
 """A study's sweep: what it solves, what it keeps, and what it does where a path leads elsewhere."""
 
+import time
+
 import attrs
 import numpy as np
 import pytest
@@ -68,3 +70,24 @@ def test_what_was_solved_is_read_back_to_the_same_digits(model_a, tmp_path):
     _, again = swept(model_a, tmp_path)
     assert np.array_equal(first, again)
     assert {p: p.stat().st_mtime_ns for p in tmp_path.iterdir()} == before
+
+
+def test_what_is_solved_beside_model_a_is_kept_at_once(model_a, tmp_path):
+    mesh, trajectory = model_a
+    job, cache = attrs.evolve(JOB, workers=2), Cache(tmp_path)
+    sweep = CandidateSolver(job, cache, mesh, JOBS, PRESSURES)
+    loaded = [state for state in trajectory.states if state.pressure_MPa]
+    for state in loaded:
+        sweep.reached(state)
+    for _ in range(600):
+        kept = list(tmp_path.glob("sweep-*.npz"))
+        if len(kept) >= 2:
+            break
+        time.sleep(0.1)
+    sweep.close()
+    assert len(kept) >= 2, "nothing kept after a minute"
+    before = {p: p.stat().st_mtime_ns for p in kept}
+    _, found = swept(model_a, tmp_path)
+    assert {p: p.stat().st_mtime_ns for p in kept} == before
+    _, alone = swept(model_a, tmp_path / "alone")
+    assert np.array_equal(found, alone)

@@ -173,11 +173,12 @@ class CandidatePool:
         self._pool = Pool(workers, "candidates", _start, (setting,))
         self._submitted: dict[tuple[float, int], Future[list[Moved]]] = {}
 
-    def submit(self, way: Sequence[State], part: int) -> None:
-        """Have a process solve a task of `solve`; needs two workers or more."""
+    def submit(self, way: Sequence[State], part: int) -> Future[list[Moved]]:
+        """Have a process solve a task of `solve`, unless one does; needs two workers or more."""
         name = way[-1].pressure_MPa, part
         if name not in self._submitted:
             self._submitted[name] = self._pool.submit(_work, way, part)
+        return self._submitted[name]
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -10,6 +13,7 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...design.quantity import in_kPa, in_MPa
+from ...errors import MuError
 from ...fem.kinematics import probe
 from ...fem.state import State
 from ...fem.trajectory import Trajectory
@@ -17,7 +21,7 @@ from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...placement.sampling import between, relative_error, solution_order
 from ...run.cache import Cache, key
-from .candidate_pool import CandidatePool, CandidateProblem
+from .candidate_pool import CandidatePool, CandidateProblem, Moved
 from .job import Job
 
 Array = np.ndarray[Any, Any]
@@ -74,6 +78,8 @@ class CandidateSolver:
         # What is solved whatever comes of it; the rest only where these do not tell enough.
         self._certain = {float(distinct[i]) for pair in self._rounds(distinct)[:2] for i in pair}
         self._passed: list[State] = []
+        # A file is written by one thread at a time.
+        self._keeping = threading.Lock()
         self.solved_kPa: list[float] = []
         self.error = 0.0
         self.path_difference_mm = 0.0
@@ -97,7 +103,27 @@ class CandidateSolver:
             way = _way(self._passed, state)
             for part in self._parts:
                 if not self._is_kept(state, part):
-                    self._sweeper.submit(way, part)
+                    done = self._sweeper.submit(way, part)
+                    # Model A's next state may take minutes, and the run may be stopped before.
+                    done.add_done_callback(partial(self._keep_done, way, part))
+
+    def _keep_done(self, way: Sequence[State], part: int, done: Future[list[Moved]]) -> None:
+        """Keep what a process found, if it did; what is wrong with it is told where it is asked for."""
+        if not done.cancelled() and done.exception() is None:
+            with contextlib.suppress(MuError):
+                self._keep(way, part, done.result())
+
+    def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
+        """Keep what a part's jobs do at the last of some states of Model A, and at those on the way there."""
+        whole = self._sweeper.setting.whole_of(part)
+        with self._keeping:
+            for state, moved in zip(way[-len(found) :], found, strict=True):
+                if self._is_kept(state, part):
+                    continue
+                name = self._name(state, part)
+                if whole:
+                    self._cache.put("whole", name, {"difference_mm": moved.whole})
+                self._cache.put("sweep", name, {"moved_mm": moved.anchors})
 
     @property
     def _parts(self) -> range:
@@ -221,12 +247,7 @@ class CandidateSolver:
         on_progress(done / total)
         for task, found in self._sweeper.solve(tasks):
             row, part = missing[task]
-            # The state that was asked for is kept last: with it are all on the way there.
-            for state, moved in zip(ways[row][-len(found) :], found, strict=True):
-                name = self._name(state, part)
-                if setting.whole_of(part):
-                    self._cache.put("whole", name, {"difference_mm": moved.whole})
-                self._cache.put("sweep", name, {"moved_mm": moved.anchors})
+            self._keep(ways[row], part, found)
             points[row, list(setting.parts[part])] = found[-1].anchors
             done += 1
             on_progress(done / total)
