@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError, MuError
 from ..measured import Experiment
-from .resolution import quantum, stretch
+from .resolution import display_steps, quantum, stretch
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -177,6 +177,7 @@ def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int 
     """
     kept = tuple(e for e in experiments if simulator.knows(e))
     parts: list[tuple[str, Any]] = []
+    steps = display_steps(kept, simulator)
     for i, e in enumerate(kept):
         seen_before: list[Array] = []
         for row, channel in enumerate(simulator.channels(e)):
@@ -184,7 +185,7 @@ def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int 
             if any(np.array_equal(values, other, equal_nan=True) for other in seen_before):
                 continue
             seen_before.append(values)
-            parts.append(_series(i, e, row, channel, blocks))
+            parts.append(_series(i, e, row, channel, blocks, steps[e.kind, channel]))
     # Stable: experiments keep their order within a group.
     parts.sort(key=lambda part: part[0])
     if not parts:
@@ -199,7 +200,7 @@ def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int 
     return Record(kept, tuple(series), np.concatenate(values_))
 
 
-def _series(i: int, e: Experiment, row: int, channel: str, blocks: int) -> tuple[str, Any]:
+def _series(i: int, e: Experiment, row: int, channel: str, blocks: int, step: float) -> tuple[str, Any]:
     values = e[channel]
     n = len(values)
     seen = np.isfinite(values)
@@ -226,7 +227,7 @@ def _series(i: int, e: Experiment, row: int, channel: str, blocks: int) -> tuple
         "time_s": centre,
         "count": count[kept],
         "sample_s": sample,
-        "step": quantum(values),
+        "step": max(quantum(values), step),
         "stays": stretch(values),
         "seen": seen,
         "first": first,

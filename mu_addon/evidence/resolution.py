@@ -84,6 +84,19 @@ def _any_step(seen: Array, values: Array) -> float:
     return 0.0
 
 
+def display_steps(experiments: Sequence[Experiment], simulator: Composite) -> dict[tuple[str, str], float]:
+    """The step of each predicted channel, by kind and channel, of the readings of all experiments together.
+
+    One record that is mostly held has few levels, from which no step is sure; the same instrument reads all.
+    Of instruments or zeros that differ there is none in common: 0.
+    """
+    every: dict[tuple[str, str], list[Array]] = {}
+    for e in experiments:
+        for channel in simulator.channels(e) if simulator.knows(e) else ():
+            every.setdefault((e.kind, channel), []).append(e[channel])
+    return {key: quantum(np.concatenate(read)) for key, read in every.items()}
+
+
 def dwell(values: Array) -> float:
     """How many readings (n,) follow one another without a change, in the median of all such runs.
 
@@ -141,8 +154,10 @@ def divided(time_s: Array, values: Array, order: int) -> Array:
     return np.asarray(found[np.isfinite(found)])
 
 
-def wrong_readings(time_s: Array, values: Array) -> Array:
+def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
     """Which readings (n,) at times (n,) in s stand alone, away from all around them: (n,) bool.
+
+    step: of the display, where it is known from other records, in the readings' unit.
 
     Each is compared with the lines through its neighbours on both sides, through the next but one on both
     sides, and through two before and two after it. A corner or a step agrees with one of the latter two; what
@@ -160,7 +175,7 @@ def wrong_readings(time_s: Array, values: Array) -> Array:
         t1, t2, y1, y2 = t[at + first], t[at + second], y[at + first], y[at + second]
         away[row, at] = y[at] - y1 - (t[at] - t1) / np.where(t2 > t1, t2 - t1, 1.0) * (y2 - y1)
     size = float(np.nanmedian(np.abs(away[0]))) / 0.6745
-    size = max(size, quantum(y) / math.sqrt(12.0), 1e-9 * float(np.ptp(y)))
+    size = max(size, max(quantum(y), step) / math.sqrt(12.0), 1e-9 * float(np.ptp(y)))
     low, high = np.nanmin(away, axis=0), np.nanmax(away, axis=0)
     alone = (low > WRONG * size) | (high < -WRONG * size)
     # Beyond the ends nothing says how it goes on.
@@ -204,6 +219,7 @@ def without_wrong_readings(
     See `wrong_readings` and `clipped_readings`.
     """
     found, words = [], []
+    steps = display_steps(experiments, simulator)
     for e in experiments:
         columns = dict(e.columns)
         for channel in _timed_channels(e, simulator):
@@ -215,18 +231,19 @@ def without_wrong_readings(
                     f"{e.name}, {channel}: {np.count_nonzero(clipped)} of {len(e)} readings are at the "
                     f"end of the channel's range or beside it, first at {first:.4g} s, and do not count"
                 )
-            _set_aside(e, channel, columns, wrong_readings(e["time_s"], columns[channel]), words)
+            wrong = wrong_readings(e["time_s"], columns[channel], steps[e.kind, channel])
+            _set_aside(e, channel, columns, wrong, words)
         changed = any(columns[c] is not e.columns[c] for c in columns)
         found.append(attrs.evolve(e, columns=columns) if changed else e)
     return found, words
 
 
-def unpredicted_readings(values: Array, predicted: Array) -> Array:
+def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> Array:
     """Which readings (n,) lie away from their prediction (n,) as those around them do not: (n,) bool.
 
     By `WRONG` deviations from the median of what `AROUND_ONE` readings are off, one or two together. A clock
     or a lag that the prediction lacks does that wherever the prediction changes fast: what it could do counts
-    only where ten times as many readings, of changes as fast, are not off.
+    only where ten times as many readings, of changes as fast, are not off. step: as in `wrong_readings`.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(predicted))
@@ -236,7 +253,7 @@ def unpredicted_readings(values: Array, predicted: Array) -> Array:
     beside = np.lib.stride_tricks.sliding_window_view
     away = np.abs(off - np.median(beside(np.pad(off, AROUND_ONE // 2, "reflect"), AROUND_ONE), axis=1))
     size = float(np.median(away)) / 0.6745
-    size = max(size, quantum(values) / math.sqrt(12.0), 1e-9 * float(np.ptp(values[known])))
+    size = max(size, max(quantum(values), step) / math.sqrt(12.0), 1e-9 * float(np.ptp(values[known])))
     alone = away > WRONG * size
     alone[:2] = alone[-2:] = False
     fast = np.ptp(beside(np.pad(plain, 1, "edge"), 3), axis=1)
@@ -258,6 +275,7 @@ def without_unpredicted_readings(
     """
     found: list[Experiment] = []
     words: list[str] = []
+    steps = display_steps(experiments, simulator)
     for e in experiments:
         columns = dict(e.columns)
         channels = _timed_channels(e, simulator)
@@ -277,7 +295,7 @@ def without_unpredicted_readings(
                 # It counts no second time, and stays the same so that the record sees it.
                 columns[channel] = columns[copied]
                 continue
-            wrong = unpredicted_readings(e[channel], predicted[row])
+            wrong = unpredicted_readings(e[channel], predicted[row], steps[e.kind, channel])
             _set_aside(e, channel, columns, wrong, words)
         changed = any(columns[c] is not e.columns[c] for c in columns)
         found.append(attrs.evolve(e, columns=columns) if changed else e)

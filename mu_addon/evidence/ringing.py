@@ -59,6 +59,8 @@ def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array
     their samples, from rest. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical
     one, below 1.
     """
+    from scipy.linalg.lapack import ztbtrs
+
     w = 2.0 * math.pi * hertz
     rate = w * (-damping + 1j * math.sqrt(1.0 - damping**2))
     h = np.diff(time_s)
@@ -70,12 +72,9 @@ def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array
     stays = np.where(small, h * (1.0 + x / 2.0 + x**2 / 6.0), (keeps - 1.0) / rate)
     grows = np.where(small, h * (0.5 + x / 6.0 + x**2 / 24.0), h * (keeps - 1.0 - x) / safe**2)
     driven = still[:, :-1] * stays + np.diff(still, axis=1) * grows
-    steps, found = keeps.tolist(), np.empty_like(still)
-    for row, source in enumerate(driven.tolist()):
-        z = complex(-still[row, 0] / rate)
-        places = [z]
-        for keep, drive in zip(steps, source, strict=True):
-            z = keep * z + drive
-            places.append(z)
-        found[row] = w / math.sqrt(1.0 - damping**2) * np.array(places).imag
-    return found
+    # z_k - keeps z_(k-1) = what drives it: a band with ones on its diagonal.
+    band = np.ones((2, len(time_s)), complex)
+    band[1, :-1] = -keeps
+    driven = np.concatenate([-still[:, :1] / rate, driven], axis=1)
+    z, _ = ztbtrs(band, driven.T, uplo="L", diag="U")
+    return np.asarray(w / math.sqrt(1.0 - damping**2) * z.T.imag)

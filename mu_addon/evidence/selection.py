@@ -139,7 +139,8 @@ def select(
         if loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
-        pool[0] = chosen = refined(fitter, pool[0], progress)
+        pool = by_all_laws(fitter, pool, progress)
+        chosen = pool[0]
         singles = singles if level else tuple(pool)
         taken = base.chi2 - chosen.chi2
         ps.append(p)
@@ -242,6 +243,28 @@ def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _
     return fit
 
 
+def by_all_laws(
+    fitter: Fitter, pool: Sequence[Fit], progress: Callable[[str], None] = lambda _: None
+) -> list[Fit]:
+    """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked anew.
+
+    The first one's, and where structure is left with it, those of the `SEEDS` next mechanisms that have any:
+    what does little by its first law may be what is right by another.
+    """
+    found = [refined(fitter, pool[0], progress), *pool[1:]]
+    if not structure(strict_table(fitter, found[0])):
+        return found
+    lawful = {law.name for law in fitter.simulator.refinements}
+    tried = {pool[0].names}
+    for i, f in enumerate(pool):
+        if len(tried) > SEEDS:
+            break
+        if f.names not in tried and lawful.intersection(f.names):
+            tried.add(f.names)
+            found[i] = refined(fitter, f, progress)
+    return ranked(found)
+
+
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
     """A selection repeated under the noise of another fitter: no effect is added.
 
@@ -317,12 +340,15 @@ def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
 
 
 def mainly(fitter: Fitter, found: Selection) -> Selection | None:
-    """A selection of the one effect that takes nearly all of a misfit, though structure is left; None else.
+    """A selection of the effects that take nearly all of a misfit, though structure is left; None without.
 
-    Its law may be another than the library's. It must take `MAINLY` of the misfit, leave a tenth of what any
-    other effect leaves in its place, predict left-out experiments better, rest on no single experiment, have
-    no value at a bound but its null, and do better than a step change.
+    Their law may be another than the library's. Several: see `_mainly_several`. A single one must take
+    `MAINLY` of the misfit, leave a tenth of what any other effect leaves in its place, predict left-out
+    experiments better, rest on no single experiment, have no value at a bound but its null, and do better
+    than a step change.
     """
+    if len(found.causes) > 1 and _mainly_several(fitter, found):
+        return found
     if not found.singles:
         return None
     best, base = found.singles[0], found.base
@@ -341,6 +367,29 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
 
 
+def _mainly_several(fitter: Fitter, found: Selection) -> bool:
+    """Whether several causes take nearly all of a misfit, each of them plainly, though structure is left.
+
+    What is left is less than 1 - `MAINLY` of what any of them takes, and no other effect in the place of one
+    comes within `APART` times that. None has a value at a bound or rests on a single experiment.
+    """
+    base, chosen = found.base, found.chosen
+    if found.doubted or at_a_bound(chosen) or any(c.rivals for c in found.causes):
+        return False
+    left, taken = max(chosen.chi2 - len(fitter.record), 0.0), base.chi2 - chosen.chi2
+    for c in found.causes:
+        # So near a rival would have been told (`causes_of`).
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
+        if left > (1.0 - MAINLY) * c.loss or APART * left > near:
+            return False
+        others = [e for e in chosen.effects if e is not c.effect]
+        last = fitter.fit([*others, c.effect], chosen.values)
+        shares = _share_by_experiment(fitter, last)
+        if len(shares) > 1 and max(shares.values()) > ALONE:
+            return False
+    return True
+
+
 def at_a_bound(fit: Fit) -> bool:
     """Whether a fitted value of an effect lies at a bound that is not its null."""
     return any(
@@ -355,8 +404,12 @@ def size_at_bound(fit: Fit) -> bool:
 
 
 def _bounded(p: Parameter, value: float) -> bool:
-    near = 1e-3 * (p.high - p.low)
-    return any(abs(value - b) < near and b != p.null for b in (p.low, p.high))
+    ends = [b for b in (p.low, p.high) if b != p.null]
+    if logarithmic(p):
+        # Over decades the range's own size is near the low end's neighbours, too.
+        near = 1e-3 * math.log(p.high / p.low)
+        return any(abs(math.log(value / b)) < near for b in ends)
+    return any(abs(value - b) < 1e-3 * (p.high - p.low) for b in ends)
 
 
 def _too_large(chosen: Fit) -> str:

@@ -44,6 +44,8 @@ UNLIKELY = 3.0
 STRAINED = 5.0
 # Noise around the causes this many times larger or smaller than around the base model is believed instead.
 RENEWED = 1.5
+# Times that causes are selected anew under noise that is quieter around those found before.
+QUIETER = 2
 
 
 @attrs.frozen(eq=False)
@@ -202,6 +204,19 @@ def diagnose(
     progress("sensitivities")
     seen = _seen(fitter, base)
     chosen = select(fitter, seen, progress)
+    for _ in range(QUIETER):
+        if not chosen.causes:
+            break
+        renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
+        if not any(_total(sources[g]) > RENEWED * _total(renewed[g]) for g in sources):
+            break
+        # Around the base model a large cause is not what its slope says: it had counted as noise, behind
+        # which a second cause, or another first one, is not seen.
+        progress("selection under quieter noise")
+        sources, fitter = renewed, Fitter(measured, simulator, renewed)
+        base = fitter.fit()
+        seen = _seen(fitter, base)
+        chosen = select(fitter, seen, progress)
     if chosen.causes and _kind(fitter, chosen) == "unexplained":
         # Beside a large misfit readings that stand alone are not seen.
         experiments, more = without_unpredicted_readings(experiments, simulator, chosen.chosen.values)
@@ -220,8 +235,7 @@ def diagnose(
         progress("noise around the causes")
         # What is left of a large cause once its linear part is set aside had counted as noise.
         owned = [e for e in chosen.chosen.effects if e.whose]
-        named = [e for e in chosen.chosen.effects if e.whose or e.name in WANDERING]
-        renewed = noise_of(measured, simulator, chosen.chosen.values, named)
+        renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
         if any(_apart(sources[g], renewed[g]) for g in sources):
             sources, fitter = renewed, Fitter(measured, simulator, renewed)
             chosen = reselected(fitter, seen, chosen)
@@ -281,9 +295,18 @@ def _among(effect: Effect) -> dict[str, Any] | None:
     return {"what": effect.among, "spread": {"value": value, "low95": low, "high95": high, "unit": unit}}
 
 
+def _wandering(found: Selection) -> list[Effect]:
+    """Chosen effects that the estimate of noise does not set aside by itself."""
+    return [e for e in found.chosen.effects if e.whose or e.name in WANDERING]
+
+
+def _total(source: Source) -> float:
+    return math.hypot(source.white, source.slow)
+
+
 def _apart(one: Source, other: Source) -> bool:
     """Whether two estimates of one noise differ more than such estimates do."""
-    total = [math.hypot(s.white, s.slow) for s in (one, other)]
+    total = [_total(s) for s in (one, other)]
     return max(total) > RENEWED * min(total)
 
 

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from mu_addon.errors import InputError
 from mu_addon.evidence.drive import reading_noise
 from mu_addon.evidence.prediction.bench import bench_simulators
+from mu_addon.evidence.record import record
 from mu_addon.evidence.resolution import (
     between_steps,
     clipped_readings,
+    display_steps,
     divided,
     dwell,
     quantum,
@@ -51,6 +53,32 @@ def test_a_converter_s_step_need_not_be_decimal(step, seed):
     written = np.array([float(f"{v:.8g}") for v in step * levels])
     assert quantum(written) == pytest.approx(step, rel=1e-4)
     assert quantum(written / 37.13) == pytest.approx(step / 37.13, rel=1e-4)
+
+
+def test_a_display_s_step_is_seen_in_all_of_its_records_together():
+    """Held, moved and held: seven levels or eight each, of which no record alone shows the step."""
+    step = 0.0524 * 4.0003
+    records = [
+        (0, 5, 10, 25, 46, 62, 84),
+        (0, 1, 11, 12, 45, 106, 137),
+        (0, 9, 10, 35, 76, 100, 140),
+    ]
+    t = np.arange(280.0)
+    made = []
+    for k, levels in enumerate(records):
+        angle = np.repeat(np.array(levels), 40) * step
+        columns = {"time_s": t, "angle_deg": t, "voltage_V": np.array([float(f"{v:.8g}") for v in angle])}
+        made.append(bench.experiment("waveguide_bending", columns, f"record {k}"))
+    assert max(quantum(e["voltage_V"]) for e in made) < 1e-3 * step
+    simulator = Composite(bench_simulators(made))
+    found = display_steps(made, simulator)["waveguide_bending", "voltage_V"]
+    assert found == pytest.approx(step, rel=1e-5)
+    assert {s.step for s in record(made, simulator).series} == {found}
+    # A reading that goes over by one step stands alone by its digits alone.
+    over = made[1]["voltage_V"].copy()
+    over[100] += step
+    assert wrong_readings(t, over).any()
+    assert not wrong_readings(t, over, found).any()
 
 
 def test_a_part_that_is_held_shows_in_the_run_of_a_reading():

@@ -15,7 +15,16 @@ from ...measured.pose import down
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
-from .unit import GAUGE_SHARE, REFERENCE_C, RELAXING, TIMED, UnitPressure, UnitResponse, believed
+from .unit import (
+    GAUGE_SHARE,
+    REFERENCE_C,
+    RELAXING,
+    TIMED,
+    TWO_VOLUMES,
+    UnitPressure,
+    UnitResponse,
+    believed,
+)
 
 Array = np.ndarray[Any, Any]
 
@@ -63,8 +72,8 @@ class BlockedForce:
         gauge = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, here)
         self.effects = (
             *(
-                Effect(e.name, e.parameters, (KIND,), e.mechanism)
-                for e in (*TIMED, RELAXING)
+                Effect(e.name, e.parameters, (KIND,), e.mechanism, refines=e.refines)
+                for e in (*TIMED, RELAXING, TWO_VOLUMES)
                 if e.name in ACTING
             ),
             *(Effect(e.name, e.parameters, (KIND,)) for e in static),

@@ -24,12 +24,17 @@ REFERENCE = "mullins_softening.reference_kPa"
 def in_the_chambers(t: Array, p: Array, values: Mapping[str, float]) -> Array:
     """Pressure (n,) in kPa in the chambers behind an air line and a leak, of p (n,) in kPa before them.
 
-    t (n,): times in s. values: by "effect.parameter", of line_lag and leak.
+    t (n,): times in s. values: by "effect.parameter", of line_lag (either law) and leak.
     """
     leak, lag = values.get("leak.conductance_ratio", 0.0), values.get("line_lag.time_s", 0.0)
+    slower = values.get("line_lag.slower_s", 0.0)
     if leak:
         # The line feeds the leak: tau dp_c/dt = p - p_c - leak p_c.
-        p, lag = p / (1.0 + leak), lag / (1.0 + leak)
+        p, lag, slower = p / (1.0 + leak), lag / (1.0 + leak), slower / (1.0 + leak)
+    if slower:
+        # One lag after the other, in partial fractions: exact for p linear between its samples.
+        share = values.get("line_lag.faster_share", 0.3)
+        p = (first_order_lag(t, p, slower) - share * first_order_lag(t, p, share * slower)) / (1.0 - share)
     return first_order_lag(t, p, lag)
 
 

@@ -319,6 +319,20 @@ SPREADING = Effect(
 )
 
 
+# A second law of the line: what lies before the chambers (tube, filter, manifold) fills first. Two volumes,
+# each behind a resistance, have two real time constants, whatever their sizes.
+TWO_VOLUMES = Effect(
+    "line_lag",
+    (
+        Parameter("slower_s", "s", 0.0, 5.0, 0.0, (0.05, 0.5), "slower time of two volumes in a row"),
+        Parameter("faster_share", "", 0.0, 0.99, 0.3, (0.3,), "the other time, of the slower one"),
+    ),
+    (KIND,),
+    "two volumes of the air line fill in a row, so that the chamber pressure lags behind the gauge",
+    refines=True,
+)
+
+
 class UnitPressure:
     """Predicts unit_pressure experiments from responses of the unit, one for each scale and orientation.
 
@@ -359,7 +373,7 @@ class UnitPressure:
         most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
         gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
         camera = camera_effects(self.channels_known, self.kind, experiments)
-        self.effects = (*TIMED, RELAXING, SPREADING, *static.values(), *gauge, *camera)
+        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 

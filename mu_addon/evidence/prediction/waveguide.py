@@ -60,6 +60,28 @@ EFFECTS = (
         ),
         (KIND,),
     ),
+    # Modes that are guided less leave first, others begin to leak: calibrations go by a power of the bend or
+    # by a polynomial in it, which has any smooth curve to third order.
+    Effect(
+        "optical_nonlinearity",
+        (
+            Parameter("at_90_deg", "", -0.9, 10.0, 0.0, (0.3,), "loss at 90 deg over proportional, less 1"),
+            Parameter("power", "", 1.1, 4.0, 2.0, (1.5, 2.5), "of the bend by which the excess goes"),
+        ),
+        (KIND,),
+        "the light loss is not proportional to curvature, by a power of it",
+        refines=True,
+    ),
+    Effect(
+        "optical_nonlinearity",
+        (
+            Parameter("square", "", -10.0, 10.0, 0.0, (0.3,), "loss at 90 deg over proportional"),
+            Parameter("cube", "", -10.0, 10.0, 0.0, (0.0,), "loss at 90 deg over proportional"),
+        ),
+        (KIND,),
+        "the light loss is not proportional to curvature, by its square and cube",
+        refines=True,
+    ),
     *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("angle_offset", "clock_offset")),
 )
 
@@ -88,6 +110,13 @@ class WaveguideVoltage:
         if excess := get("optical_nonlinearity.excess", 0.0):
             beyond = np.maximum(np.abs(angle) - get("optical_nonlinearity.onset_deg", 0.0), 0.0)
             angle = angle + np.sign(angle) * excess * beyond**2 / 90.0
+        if excess := get("optical_nonlinearity.at_90_deg", 0.0):
+            beyond = np.abs(angle / 90.0) ** get("optical_nonlinearity.power", 2.0)
+            angle = angle + 90.0 * excess * np.sign(angle) * beyond
+        square, cube = (get(f"optical_nonlinearity.{k}", 0.0) for k in ("square", "cube"))
+        if square or cube:
+            x = angle / 90.0
+            angle = angle + 90.0 * (square * np.abs(x) * x + cube * x**3)
         exponent = -get(LOSS.name, LOSS.null) * angle
         exponent = exponent + get("led_drift.per_hour", 0.0) * (time - time[0]) / 3600.0
         if settled := get("led_drift.settled", 0.0):

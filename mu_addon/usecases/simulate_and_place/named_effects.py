@@ -14,7 +14,7 @@ from ...design.toml_text import nearest
 from ...errors import InputError
 from ...evidence.effect import LIBRARY, Parameter
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
-from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED
+from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED, TWO_VOLUMES
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
 
@@ -210,6 +210,8 @@ def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
     own = IN_TIME[name].parameters
     if name == "viscoelasticity":
         return own, RELAXING.parameters, SPREADING.parameters
+    if name == "line_lag":
+        return own, TWO_VOLUMES.parameters
     # With the pressure that the energy of softening was relative to, which a diagnosis of units states.
     return ((*own, REFERENCE),) if name == "mullins_softening" else (own,)
 
@@ -245,6 +247,9 @@ def _in_words(name: str, given: Mapping[str, float]) -> str:
     if name == "viscoelasticity":
         share, onset = given["per_decade"], given["onset_s"]
         return f"all moduli relax by {share:.1%} in each decade of time after {onset:.3g} s"
+    if name == "line_lag" and "slower_s" in given:
+        slower, faster = given["slower_s"], given["faster_share"] * given["slower_s"]
+        return f"the chambers follow the pressure with time constants of {slower:.3g} and {faster:.3g} s"
     return _DESCRIPTIONS[name].format(next(iter(given.values())))
 
 

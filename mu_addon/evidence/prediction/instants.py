@@ -1,0 +1,56 @@
+"""Instants between samples: where a drive turned from one straight line to another, and steps of a fast way.
+
+A regulator goes straight to where it turns, seldom at a sample. Whatever integrates over what it did (a mass,
+a line, a resin that relaxes) is driven by where it went, not by the chord from sample to sample.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+# Slopes on one side of a corner are alike to this share of what the slope changes by there.
+STRAIGHT = 0.05
+# A way of more than this share of the record's range between two instants is divided, into so many at most.
+SHARE, MOST = 0.05, 8
+
+
+def finer(t: Array, drive: Array) -> tuple[Array, Array, Array]:
+    """Times (m,) in s, the drive (m,) there in its unit, and which of them (n,) the samples are.
+
+    t (n,), drive (n,): samples, times ascending. Between two samples whose neighbours lie on straight lines
+    that meet there, on one side for two steps or more, a corner is inserted; then every fast way is divided
+    evenly. Linear between the samples elsewhere.
+    """
+    if len(t) < 6 or not np.ptp(drive):
+        return t, drive, np.arange(len(t))
+    at, value = _corners(t, drive)
+    times = np.concatenate([t, at])
+    order = np.argsort(times, kind="stable")
+    times, values = times[order], np.concatenate([drive, value])[order]
+    pieces = np.abs(np.diff(values)) / (SHARE * float(np.ptp(drive)))
+    parts = np.clip(np.ceil(pieces), 1, MOST).astype(int)
+    whole = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(whole)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[whole]
+    dense = np.append(times[whole] + share * np.diff(times)[whole], times[-1])
+    found = np.append(values[whole] + share * np.diff(values)[whole], values[-1])
+    places = np.append(np.cumsum(parts) - parts, len(whole))
+    return dense, found, places[np.flatnonzero(order < len(t))]
+
+
+def _corners(t: Array, drive: Array) -> tuple[Array, Array]:
+    """Times (c,) and values (c,) of corners strictly between samples."""
+    h = np.diff(t)
+    slope = np.diff(drive) / h
+    # Steps around each that may hold a corner: two before it and two after it.
+    before, up, down, after = slope[:-4], slope[1:-3], slope[3:-1], slope[4:]
+    first, last, step = drive[2:-3], drive[3:-2], h[2:-2]
+    bend = down - up
+    alike = np.minimum(np.abs(before - up), np.abs(after - down)) < STRAIGHT * np.abs(bend)
+    at = np.divide(first + down * step - last, bend, out=np.zeros_like(step), where=alike)
+    # To rounding a corner at a sample is that sample.
+    inside = alike & (at > 1e-6 * step) & (at < (1.0 - 1e-6) * step)
+    return (t[2:-3] + at)[inside], (first + up * at)[inside]
