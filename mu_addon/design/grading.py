@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import attrs
@@ -45,6 +45,7 @@ class CellFactor(NamedTuple):
     factor: float
 
 
+@lru_cache(maxsize=64)
 def parsed(text: str) -> tuple[CellFactor, ...]:
     """The entries of a text such as "0 2 3: 0.8; * * 5: 1.2", in one order. Raises InputError.
 

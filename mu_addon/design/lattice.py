@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import attrs
@@ -127,14 +128,18 @@ def with_struts(graph: Graph, d: Dimensions, is_graded: bool = True) -> Lattice:
 
 def graph_of(d: Dimensions) -> Graph:
     """Nodes and struts of all cells of the unit's envelope, without thickness; cells as in `lattice_of`."""
-    half_x = d.cells_x // 2
-    i, j, k = (
-        np.arange(-half_x, half_x + 1),
-        np.arange(-d.cells_y_minus, d.cells_y_plus + 1),
-        np.arange(d.count),
-    )
-    whole, half = d.kind.divisions, d.kind.divisions // 2
-    return joined(d.kind, grid_points(whole * i - half, whole * j - half, whole * k), d.cell)
+    return _graph(d.kind, d.cells_x // 2, d.cells_y_minus, d.cells_y_plus, d.count, d.cell)
+
+
+@lru_cache(maxsize=8)
+def _graph(kind: LatticeKind, half_x: int, y_minus: int, y_plus: int, count: int, cell: float) -> Graph:
+    """The rules of each unit near to another ask for the same graph."""
+    i, j, k = np.arange(-half_x, half_x + 1), np.arange(-y_minus, y_plus + 1), np.arange(count)
+    whole, half = kind.divisions, kind.divisions // 2
+    found = joined(kind, grid_points(whole * i - half, whole * j - half, whole * k), cell)
+    for array in (found.cells, found.grid, found.struts):
+        array.flags.writeable = False
+    return found
 
 
 def filled(

@@ -90,9 +90,10 @@ class Footholds:
             weights[out] = _weights(mesh.nodes[mesh.tets[element[out]]], at[out], held[out], points[out])
         return cls(mesh.tets[element], at, held, weights)
 
-    def moved(self, nodes: Array, points: Array) -> Array:
-        """Weights (p, n) with the mesh's nodes (n, 3) and the points (p, 3) elsewhere, to first order."""
-        return _weights(nodes[self.tets], self.at, self.held, points)
+    def moved(self, nodes: Array, points: Array, rows: Array) -> Array:
+        """Weights (k, n) of some points (k,) with the mesh's nodes (n, 3) and all points (p, 3) elsewhere, to
+        first order."""
+        return _weights(nodes[self.tets[rows]], self.at[rows], self.held[rows], points[rows])
 
 
 def _barycentric(local: Array) -> Array:

@@ -12,7 +12,7 @@ import attrs
 import warp as wp
 
 from .kernel_cache import own_cache, usable_cache
-from .laws.tensors import add_dyad, add_swapped, mat33
+from .laws.tensors import add_dyad, add_swapped, contract, mat33
 
 vec3 = wp.vec3d
 f64 = wp.float64
@@ -106,12 +106,14 @@ def mean_dilatation(
 class LawKernels:
     """The element kernels of one material law: energy, force, stiffness, and advance of its history.
 
-    `advance` is None where the law keeps none.
+    along: the stress at each point, and how it changes along other displacements. `advance` is None where the
+    law keeps none.
     """
 
     energy: Any
     force: Any
     stiffness: Any
+    along: Any
     advance: Any
 
 
@@ -284,8 +286,37 @@ def law_kernels(law: Any, mean: bool = False) -> LawKernels:
                     at = start + a * n - (a * (a - 1)) // 2 + (b - a)
                     out[at] = out[at] + block
 
+    @wp.kernel(module="unique")
+    def along(
+        first: int,
+        elements: wp.array(dtype=int),
+        rows: wp.array2d(dtype=f64),
+        mean_kappa: wp.array(dtype=f64),
+        history: wp.array3d(dtype=f64),
+        dt: f64,
+        u: wp.array(dtype=vec3),
+        tets: wp.array2d(dtype=int),
+        G: wp.array3d(dtype=vec3),
+        other: wp.array2d(dtype=vec3),
+        stress: wp.array2d(dtype=mat33),
+        change: wp.array3d(dtype=mat33),
+    ):
+        # Of the part of the law that acts point by point.
+        r = first + wp.tid()
+        e = elements[r]
+        for q in range(G.shape[1]):
+            m = parameters_at(rows, mean_kappa, history, dt, r, q)
+            F = deformation_gradient(u, tets, G, e, q)
+            stress[r, q] = stress_of(F, m)
+            A = tangent_of(F, m)
+            for k in range(other.shape[0]):
+                H = mat33()
+                for a in range(tets.shape[1]):
+                    H += wp.outer(other[k, tets[e, a]], G[e, q, a])
+                change[k, r, q] = contract(A, H)
+
     if not history_count:
-        return LawKernels(energy, force, stiffness, None)
+        return LawKernels(energy, force, stiffness, along, None)
 
     @wp.kernel(module="unique")
     def advance(
@@ -306,7 +337,7 @@ def law_kernels(law: Any, mean: bool = False) -> LawKernels:
             for i in range(wp.static(history_count)):
                 history[r, q, i] = found[i]
 
-    return LawKernels(energy, force, stiffness, advance)
+    return LawKernels(energy, force, stiffness, along, advance)
 
 
 @wp.kernel

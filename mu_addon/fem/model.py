@@ -17,12 +17,13 @@ from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import kernels
 from .conjugate_gradients import ConjugateGradients
-from .elements import reference_gradients, triangle_shapes
+from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
+from .reference import Reference
 from .ties import folded_blocks
 
 if TYPE_CHECKING:
@@ -113,8 +114,8 @@ class Model:
     above POINTWISE_BULK shear moduli acts on the mean J of an element. True asks it of every law, which must
     then split the volume off; None, of the laws that do so in a resolved mesh, and of none in another.
 
-    Attributes: volumes (m,) of the elements and point_volumes (m, q) of their quadrature points as if all of
-    them were filled, in mm3.
+    Attributes: volumes (m,) of the elements, as far as they are filled, in mm3; reference, what elements are
+    as drawn.
 
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
     may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
@@ -141,16 +142,13 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
         self._least_force = 0.0
-        reference = reference_gradients(mesh.nodes, mesh.tets)
-        weights = reference.volumes * mesh.filled if mesh.resolved else reference.volumes
-        self.volumes = weights.sum(axis=1)
-        self.point_volumes = reference.volumes
+        self.reference = Reference(mesh, device)
+        # Now, since it raises MeshingError.
+        _ = self.reference.at
         put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
         k, kf = mesh.tets.shape[1], mesh.cavity.shape[1]
         self._tets = put(mesh.tets.astype(np.int32), int)
-        self._gradients = put(reference.gradients, wp.vec3d)
-        self._dV = put(weights, wp.float64)
         shape, derivative, weight = triangle_shapes(mesh.order)
         self._faces = put(mesh.cavity.astype(np.int32).reshape(f, kf), int)
         self._face_rule = (
@@ -181,6 +179,19 @@ class Model:
         fixed[mesh.tied] = True
         self.free = np.nonzero(~fixed.ravel())[0]
         self._build_pattern(fixed)
+
+    @property
+    def volumes(self) -> Array:
+        """Volumes (m,) in mm3 of the elements, as far as they are filled."""
+        return np.asarray(self.reference.filled_volumes.sum(axis=1))
+
+    @property
+    def _gradients(self) -> wp.array:
+        return self.reference.on_device[0]
+
+    @property
+    def _dV(self) -> wp.array:
+        return self.reference.on_device[1]
 
     def _put(self, a: Array, dtype: Any) -> wp.array:
         return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)

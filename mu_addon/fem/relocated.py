@@ -6,12 +6,11 @@ import copy
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from ..errors import InputError
 from ..meshing.mesh import Mesh
-from .elements import reference_gradients
 from .model import Model
+from .reference import Reference
 from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
@@ -24,7 +23,8 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     first model's and must be set anew where it depends on the places. self_contact: of the other mesh, see
     `SelfContact.relocated`; needed where the first model has one. Raises InputError for a mesh of other
     elements, for a model with obstacles or self-contact alone, and where the tangent of one with other
-    weights of its ties is asked for: its pattern may be another. Raises MeshingError for an inverted element.
+    weights of its ties is asked for: its pattern may be another. An inverted element raises MeshingError when
+    it is first used.
     """
     if model.obstacles or (model.self_contact is not None and self_contact is None):
         raise InputError(
@@ -36,18 +36,8 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     found.self_contact = self_contact
     if mesh is model.mesh:
         return found
-    gradients, volumes = model._gradients.numpy(), model.point_volumes.copy()
-    moved = (mesh.nodes != model.mesh.nodes).any(axis=1)[mesh.tets].any(axis=1)
-    if moved.any():
-        gradients = gradients.copy()
-        reference = reference_gradients(mesh.nodes, mesh.tets[moved])
-        gradients[moved], volumes[moved] = reference.gradients, reference.volumes
-    weights = volumes * mesh.filled if mesh.resolved else volumes
     found.mesh = mesh
-    found.point_volumes = volumes
-    found.volumes = weights.sum(axis=1)
-    found._gradients = model._put(gradients, wp.vec3d)
-    found._dV = model._put(weights, wp.float64)
+    found.reference = Reference(mesh, model.device, model.reference)
     if not np.array_equal(mesh.tied_weights, model.mesh.tied_weights):
         found._folding = _refused
     return found

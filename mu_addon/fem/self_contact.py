@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -27,6 +29,8 @@ _ROOM = 2.0
 _ROUND = 2.5
 # Pairs of such neighbours, over the number of facets, up to which their facets may go.
 _SLIVERS = 0.05
+# Relative step in which two edges' smoothing is differentiated.
+_SMALL = 1e-4
 # Slip in gaps at which friction is full.
 _SLIP = 0.1
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
@@ -134,6 +138,7 @@ class SelfContact:
             facets = self._without_feet(mesh, facets)
         self.facets = self._without_slivers(facets)
         self._surface, self._nodes = self._collision_mesh(self.facets)
+        self._planes_near: list[_Plane] = []
         # Which of the surface's nodes share a facet.
         three = np.searchsorted(self._nodes, self.facets)
         ends = np.repeat(three, 3, axis=1).ravel(), np.tile(three, 3).ravel()
@@ -282,13 +287,23 @@ class SelfContact:
         other._potential, other._wider = (
             self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
         )
-        other._surface, _ = other._collision_mesh(self.facets)
-        area = np.asarray(other._surface.vertex_areas)
-        other._planes = [
-            attrs.evolve(plane, area=area[np.searchsorted(self._nodes, plane.nodes)])
-            for plane in self._planes
-        ]
+        # Made when they are asked for.
+        for name in ("_surface", "_planes"):
+            other.__dict__.pop(name, None)
+        other._planes_near = self._planes
         return other
+
+    @cached_property
+    def _surface(self) -> Any:
+        return self._collision_mesh(self.facets)[0]
+
+    @cached_property
+    def _planes(self) -> list[_Plane]:
+        area = np.asarray(self._surface.vertex_areas)
+        return [
+            attrs.evolve(plane, area=area[np.searchsorted(self._nodes, plane.nodes)])
+            for plane in self._planes_near
+        ]
 
     def energy_mJ(self, u: Array) -> float:
         """Energy in mJ at u (n, 3) in mm; infinite where a mirror plane is crossed."""
@@ -322,6 +337,68 @@ class SelfContact:
             slope = self._barrier(plane.distance(self._rest + u))[1]
             total[plane.nodes, plane.column] += plane.area * plane.side * slope
         return np.asarray(total[self._nodes])
+
+    def by_places(self, u: Array, along: Sequence[Array]) -> list[Array]:
+        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the places of the nodes as drawn.
+
+        u and v: displacements (n, 3) in mm, which stay; gap and stiffness stay, too. Without friction.
+        """
+        stiffness = self.stiffness(u).tocsr()
+        found = [np.asarray(stiffness @ v.ravel()).reshape(-1, 3) for v in along]
+        own = np.stack([v[self._nodes] for v in along])
+        for total, of_surface in zip(found, self._by_rest(u, own), strict=True):
+            total[self._nodes] += of_surface
+        for plane in self._planes:
+            slope = self._barrier(plane.distance(self._rest + u))[1]
+            for total, v in zip(found, along, strict=True):
+                of_node = np.zeros(len(self._rest))
+                of_node[plane.nodes] = slope * plane.side * v[plane.nodes, plane.column]
+                self._add_by_area(total, of_node)
+        return found
+
+    def _by_rest(self, u: Array, along: Array) -> Array:
+        """Derivatives (v, j, 3) of v . forces (v, j, 3) by the surface as drawn, what is moved staying there.
+
+        By the pairs' weights, which are areas, and where edges are nearly parallel by the smoothing there,
+        which is over a share of the squares of their lengths.
+        """
+        surface, places = self._surface, self._places(u)
+        near = self._near(places, self.gap_mm, by_places=True)
+        rest = np.asarray(surface.rest_positions)
+        found = np.zeros((len(along), rest.size))
+        for number in range(len(near)):
+            pair = near[number]
+            nodes = np.array(pair.vertex_ids(surface.edges, surface.faces))
+            nodes = nodes[nodes >= 0]
+            at, v = places[nodes].ravel(), along[:, nodes].reshape(len(along), -1)
+            work = v @ self._potential.gradient(pair, at)
+            by_weight = pair.weight_gradient
+            found[:, by_weight.indices] += np.outer(work / pair.weight, by_weight.data)
+            if len(nodes) < 4 or not hasattr(pair, "eps_x"):
+                continue
+            threshold = pair.eps_x
+            sides = []
+            for factor in (1.0 + _SMALL, 1.0 - _SMALL):
+                pair.eps_x = factor * threshold
+                sides.append(v @ self._potential.gradient(pair, at))
+            pair.eps_x = threshold
+            change = (sides[0] - sides[1]) / _SMALL
+            if change.any():
+                edges = rest[nodes[[1, 3]]] - rest[nodes[[0, 2]]]
+                slope = edges / (edges**2).sum(axis=1)[:, None]
+                by_node = np.stack([-slope[0], slope[0], -slope[1], slope[1]]).ravel()
+                unknowns = (3 * nodes[:, None] + np.arange(3)).ravel()
+                found[:, unknowns] += np.outer(change, by_node)
+        return found.reshape(len(along), -1, 3)
+
+    def _add_by_area(self, total: Array, weight: Array) -> None:
+        """Add derivatives (n, 3) of the nodes' areas, a third of their facets', each times a weight (n,)."""
+        a, b, c = (self._rest[corner] for corner in self.facets.T)
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        share = weight[self.facets].sum(axis=1)[:, None] / 6.0
+        for corner, opposite in zip(self.facets.T, (c - b, a - c, b - a), strict=True):
+            np.add.at(total, corner, share * np.cross(normal, opposite))
 
     def stiffness(self, u: Array, convex: bool = False) -> sparse.coo_matrix:
         """Second derivative (3 n, 3 n) in N/mm of the energy at u (n, 3) in mm, symmetric if not definite.
@@ -412,9 +489,17 @@ class SelfContact:
         self._last = _Pairs(places, self._near(places, self.gap_mm))
         return self._last
 
-    def _near(self, places: Array, reach_mm: float) -> Any:
-        """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm."""
+    def _near(self, places: Array, reach_mm: float, by_places: bool = False) -> Any:
+        """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm.
+
+        by_places: with what derivatives by the places as drawn need.
+        """
         near = self._ipctk.NormalCollisions()
+        if by_places:
+            # Called again it would double them.
+            if not self._surface.are_area_jacobians_initialized():
+                self._surface.init_area_jacobians()
+            near.enable_shape_derivatives = True
         near.use_area_weighting = True
         near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
         near.build(self._surface, places, reach_mm)

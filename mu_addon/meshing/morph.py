@@ -100,7 +100,7 @@ class Morph:
         if a == b:
             return mesh
         factor = b.cell / a.cell
-        if factor == 1.0 and _alike(a, b):
+        if factor == 1.0 and struts_alone_differ(a, b):
             return mesh
         after = self._grid.of(b if factor == 1.0 else shrunk(b, a.cell))
         count = len(self._before.nodes)
@@ -127,8 +127,8 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
     return Morph(mesh, drawn, settings).to(other)
 
 
-def _alike(a: Dimensions, b: Dimensions) -> bool:
-    """Whether a homogenised unit's mesh is the same for both: struts alone differ."""
+def struts_alone_differ(a: Dimensions, b: Dimensions) -> bool:
+    """Whether all but the struts is the same, wall and homogenised mesh among it."""
     struts = ("grading", "junction_diameter", "midspan_diameter")
     return attrs.evolve(b, **{name: getattr(a, name) for name in struts}) == a
 

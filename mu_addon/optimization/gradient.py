@@ -1,15 +1,16 @@
-"""Derivatives of quantities by freedoms, semi-analytic: one adjoint solution a quantity and condition.
+"""Derivatives of quantities by freedoms: one adjoint solution a quantity and condition.
 
 With r(u, p) = 0 the equilibrium at freedoms p, a quantity q(u, p) changes by
 
     dq/dp = dq/dp |u - lambda . dr/dp |u,    K lambda = dq/du,
 
-K the tangent at the state, whose factor serves every quantity. The derivatives at fixed displacements are
-central differences between two bodies with the freedom moved a little either way and the same elements (a
-mesh morphed, not made anew), so that no mesher's noise is in them: two assemblies a freedom and condition.
-Source: the discrete semi-analytic adjoint, e.g. Haftka and Guerdal, Elements of Structural Optimization,
-ch. 7; its known trouble, the error of forward differences under large rotations, is one of first order in
-the step that central differences do not have.
+K the tangent at the state, whose factor serves every quantity. lambda . dr at fixed u is linear in what the
+body is made of, so that one pass over the elements (`fem.sensitivity`) gives it for all freedoms: each takes
+the difference of the nodes' places, shares and ties between two bodies with the freedom moved a little either
+way and the same elements (a mesh morphed, not made anew, so that no mesher's noise is in it), and no assembly
+of its own. Source: the discrete semi-analytic adjoint, e.g. Haftka and Guerdal, Elements of Structural
+Optimization, ch. 7; its known trouble, the error of forward differences under large rotations, is one of
+first order in the step that central differences do not have.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ import attrs
 import numpy as np
 
 from ..design.quantity import in_MPa
-from ..fem.elementwise import element_forces
 from ..fem.model import Model
-from .structure import WITHOUT, Condition, Quantity, States, Structure
+from .residual_change import ResidualChange
+from .structure import Condition, Quantity, States, Structure
 
 Array = np.ndarray[Any, Any]
 
@@ -65,32 +66,23 @@ def gradients(
 ) -> Array:
     """Derivatives (q, f) of q quantities by f freedoms at a body's states.
 
-    pairs: for each freedom a function that makes the two bodies; called in order, one held at a time. A
-    freedom that makes elements stiffer or softer and does no more takes no assembly (`by_element`). solved:
-    `adjoint` of the same quantities, found here where it is not given. Raises IndefiniteError at an unstable
-    state, and what making a body raises.
+    pairs: for each freedom a function that makes the two bodies; called in order, one held at a time but for
+    quantities without a slope. solved: `adjoint` of the same quantities, found here where it is not given.
+    Raises IndefiniteError at an unstable state, and what making a body raises.
     """
     solved = solved or adjoint(structure, states, quantities)
+    changes = _changes(structure, states, solved)
     direct = [q for q in quantities if q.conditions and not hasattr(q, "slope") and not hasattr(q, "change")]
     own = {condition for q in direct for condition in q.conditions}
     found = np.zeros((len(quantities), len(pairs)))
     forces: dict[Condition, list[Array]] = {c: [] for c in own}
     held: list[Pair] = []
-    by_stiffness: Array | None = None
     for f, make in enumerate(pairs):
         plus, minus, step = make()
-        weights = None if direct else _weights_change(structure, plus, minus)
-        if weights is not None:
-            if by_stiffness is None:
-                by_stiffness = by_element(structure, states, quantities, solved)
-            found[:, f] = by_stiffness @ weights / step
-        for condition in {*solved.of, *own} if weights is None else ():
-            change = _residual_change(plus, minus, condition, states) / step
-            if condition in own:
-                forces[condition].append(change)
-            if condition in solved.of:
-                numbers, lam = solved.of[condition]
-                found[list(numbers), f] -= lam.T @ change
+        for numbers, change in changes.values():
+            found[numbers, f] -= change.between(plus, minus) / step
+        for condition in own:
+            forces[condition].append(_residual_change(plus, minus, condition, states) / step)
         for number, q in enumerate(quantities):
             if hasattr(q, "change"):
                 found[number, f] += q.change(structure, states, plus, minus) / step
@@ -113,25 +105,15 @@ def gradients(
     return found
 
 
-def _weights_change(structure: Structure, plus: Structure, minus: Structure) -> Array | None:
-    """Difference (m,) of the logarithm of each element's stiffness between two bodies, None where that is
-    not all that differs: of one mesh and load, each element of one law with the same parameters."""
-    model = structure.model
-    models = plus.model, minus.model
-    if any(m.mesh is not model.mesh or m.self_contact is not None for m in models):
-        return None
-    first, second = (np.zeros(1) if m.load is None else m.load for m in models)
-    layers = [s.materials[WITHOUT].layers for s in (plus, minus)]
-    if len(structure.materials) > 1 or not np.array_equal(first, second) or len(layers[0]) != len(layers[1]):
-        return None
-    change, covered = np.zeros(len(model.mesh.tets)), np.zeros(len(model.mesh.tets), int)
-    for one, other in zip(*layers, strict=True):
-        alike = one.law is other.law and np.array_equal(one.elements, other.elements)
-        if not alike or not np.array_equal(one.parameters, other.parameters):
-            return None
-        change[one.elements] = 2.0 * (one.weight - other.weight) / (one.weight + other.weight)
-        covered[one.elements] += 1
-    return change if (covered == 1).all() else None
+def _changes(
+    structure: Structure, states: States, solved: Adjoint
+) -> dict[Condition, tuple[list[int], ResidualChange]]:
+    """For each condition of an adjoint the quantities it serves, and the change of lambda . r."""
+    found = {}
+    for condition, (numbers, lam) in solved.of.items():
+        along = [_everywhere(structure, column) for column in lam.T]
+        found[condition] = list(numbers), ResidualChange(structure, condition, states[condition], along)
+    return found
 
 
 def by_element(
@@ -139,17 +121,13 @@ def by_element(
 ) -> Array:
     """Derivatives (q, m) of quantities with a `slope` by the logarithm of each element's stiffness.
 
-    As many freedoms as elements for one assembly a condition: -lambda . f_e, f_e the element's own forces.
+    As many freedoms as elements for one pass a condition.
     """
     solved = solved or adjoint(structure, states, quantities)
-    model = structure.model
-    found = np.zeros((len(quantities), len(model.mesh.tets)))
-    for condition, (numbers, lam) in solved.of.items():
-        data = model.parameters(structure.materials[condition.materials])
-        forces = element_forces(model, states[condition], data)
-        for number, column in zip(numbers, lam.T, strict=True):
-            whole = _everywhere(structure, column)
-            found[number] -= np.einsum("eai,eai->e", forces, whole[model.mesh.tets])
+    found = np.zeros((len(quantities), len(structure.model.mesh.tets)))
+    for numbers, change in _changes(structure, states, solved).values():
+        for number, one in zip(numbers, change.sensitivities, strict=True):
+            found[number] -= one.stiffness
     return found
 
 

@@ -8,14 +8,15 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..fem.elements import reference_gradients
 from ..fem.held_tip import HeldTip
 from ..fem.kinematics import TipSection, tip_faces
 from ..fem.lattice_law import deformation_gradients
 from ..fem.model import Model
 from ..fem.relocated import relocated
 from ..fem.self_intersection import crossings
+from ..fem.sensitivity import Sensitivity
 from ..meshing.mesh import AXES, LATTICE, MEMBRANE, Mesh
+from .residual_change import ResidualChange
 from .structure import WITHOUT, Condition, States, Structure
 
 Array = np.ndarray[Any, Any]
@@ -178,10 +179,20 @@ class AirVolume:
         """By the displacements (n, 3), in ml/mm: minus the nodal forces of unit pressure."""
         if not self.conditions:
             return {}
-        model, u = structure.model, states[self.conditions[0]]
+        return {self.conditions[0]: self._by_places(structure, states)}
+
+    def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
+        """Difference in ml between two bodies near to `structure` at its displacements, to first order."""
+        kept = structure.kept(f"air {self.pressure_kPa}", lambda: self._by_places(structure, states))
+        return float(np.vdot(kept, plus.model.mesh.nodes - minus.model.mesh.nodes))
+
+    def _by_places(self, structure: Structure, states: States) -> Array:
+        """Derivative (n, 3) in ml/mm by the nodes' places: minus the nodal forces of unit pressure."""
+        model = structure.model
+        u = states[self.conditions[0]] if self.conditions else np.zeros_like(model.mesh.nodes)
         data = model.parameters(structure.materials[WITHOUT])
         forces = model.residual(u, 0.0, data) - model.residual(u, 1.0, data)
-        return {self.conditions[0]: _whole(model) * forces / 1000.0}
+        return np.asarray(_whole(model) * forces / 1000.0)
 
 
 @attrs.frozen
@@ -216,10 +227,9 @@ class Stretch:
         The set of points changes with the displacements, but not to first order in their mean.
         """
         mesh, u = structure.model.mesh, states[self.conditions[0]]
-        stretch, share, (element, point), (now, then) = self._most(mesh, u)
+        stretch, share, (element, point), (now, then) = self._known(structure, states)
         tets = mesh.tets[element]
-        chosen, place = np.unique(element, return_inverse=True)
-        gradients = reference_gradients(mesh.nodes, mesh.tets[chosen]).gradients[place, point]
+        gradients = structure.model.reference.at.gradients[element, point]
         parts = share[:, None, None] * np.einsum("ki,knj,kj->kni", now, gradients, then)
         found = np.zeros_like(u)
         np.add.at(found, tets, parts)
@@ -229,42 +239,53 @@ class Stretch:
         return {self.conditions[0]: found}
 
     def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
-        """Difference between two bodies near to `structure` at its displacements, to first order.
+        """Difference between two bodies near to `structure` at its displacements, to first order."""
+        first, second = plus.model.mesh, minus.model.mesh
+        if first is second:
+            return 0.0
+        name = f"by mesh {self.pressure_kPa} {self.region} {self.elongation}"
+        return structure.kept(name, lambda: self._sensitivity(structure, states)).between(first, second)
+
+    def _sensitivity(self, structure: Structure, states: States) -> Sensitivity:
+        """By the mesh, at the displacements.
 
         The mean is t + the integral of (stretch - t) over the points above t, by 1 % of the volume; the
         points may be held, and t, for it is largest by t there.
         """
-        if plus.model.mesh is minus.model.mesh:
-            return 0.0
         mesh, u = structure.model.mesh, states[self.conditions[0]]
-        kept_name, known = f"most {self.pressure_kPa} {self.region}", None
-        if kept_name in structure.shared and structure.shared[kept_name][0] is u:
-            known = structure.shared[kept_name][1]
-        else:
-            known = self._most(mesh, u)
-            structure.shared[kept_name] = u, known
-        stretch, share, (element, point), _ = known
+        reference = structure.model.reference.at
+        stretch, share, (element, point), (now, then) = self._known(structure, states)
         mean, least = float((stretch * share).sum()), float(stretch[-1])
-        chosen, place = np.unique(element, return_inverse=True)
-        _, volumes = deformation_gradients(mesh, u, chosen)
-        solid = _solid(mesh, chosen, volumes)[place, point]
-        kept = np.divide(share, solid, out=np.zeros_like(share), where=solid > 0.0)
-        total = self._volume(structure)
-        sides = []
-        for s in (plus, minus):
-            F, dV = deformation_gradients(s.model.mesh, s.following(u), chosen)
-            dV = _solid(s.model.mesh, chosen, dV)
-            largest = np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)[..., 2])[place, point]
-            above = ((largest - least) * dV[place, point] * kept).sum()
-            sides.append(above - (mean - least) * self._volume(s) / total)
-        found = float(sides[0] - sides[1])
-        return found if self.elongation is None else -self.elongation * found / max(mean - 1.0, 1e-9) ** 2
+        G = reference.gradients[element, point]
+        excess = (stretch - least) * share
+        slope_u = np.einsum("kni,knj->kij", u[mesh.tets[element]], G)
+        # F = 1 + grad u changes by -grad u grad d as nodes go by d, a volume by div d of itself.
+        by_place = excess[:, None, None] * G
+        by_place -= np.einsum("k,kji,kj,kn->kni", share, slope_u, now, np.einsum("knj,kj->kn", G, then))
+        nodes, filled = np.zeros_like(u), np.zeros_like(mesh.filled)
+        np.add.at(nodes, mesh.tets[element], by_place)
+        own = np.flatnonzero(mesh.region == REGIONS[self.region])
+        volumes = reference.volumes[own]
+        solid = _solid(mesh, own, volumes)
+        less = (mean - least) / solid.sum()
+        np.add.at(nodes, mesh.tets[own], -less * np.einsum("eq,eqni->eni", solid, reference.gradients[own]))
+        if mesh.resolved:
+            slope = _solid_slope(mesh, own, volumes)
+            filled[own] = -less * slope
+            relative = np.zeros_like(filled)
+            relative[own] = np.divide(slope, solid, out=np.zeros_like(slope), where=solid > 0.0)
+            np.add.at(filled, (element, point), excess * relative[element, point])
+        factor = 1.0 if self.elongation is None else -self.elongation / max(mean - 1.0, 1e-9) ** 2
+        by_u = self.slope(structure, states)[self.conditions[0]]
+        ties = np.einsum("ti,tki->tk", by_u[mesh.tied], u[mesh.tied_to])
+        return Sensitivity(factor * nodes, factor * filled, ties, np.zeros(len(mesh.tets)))
 
-    def _volume(self, structure: Structure) -> float:
-        """Volume in mm3 of the region."""
-        model = structure.model
-        elements = np.flatnonzero(model.mesh.region == REGIONS[self.region])
-        return float(_solid(model.mesh, elements, model.point_volumes[elements]).sum())
+    def _known(self, structure: Structure, states: States) -> Any:
+        """What `_most` finds of a body, once."""
+        u = states[self.conditions[0]]
+        return structure.kept(
+            f"points {self.pressure_kPa} {self.region}", lambda: self._most(structure.model.mesh, u)
+        )
 
     def _most(self, mesh: Any, u: Array) -> tuple[Array, Array, tuple[Array, Array], tuple[Array, Array]]:
         """The points stretched most: stretches (k,), shares (k,) that sum to 1, their elements and points,
@@ -301,6 +322,13 @@ def _solid(mesh: Mesh, elements: Array, volumes: Array) -> Array:
     return volumes * filled * share**2 * (3.0 - 2.0 * share)
 
 
+def _solid_slope(mesh: Mesh, elements: Array, volumes: Array) -> Array:
+    """Derivatives (e, q) in mm3 of `_solid` by the filled shares."""
+    filled = mesh.filled[elements]
+    share = np.clip(2.0 * filled - 0.5, 0.0, 1.0)
+    return np.asarray(volumes * (share**2 * (3.0 - 2.0 * share) + 12.0 * filled * share * (1.0 - share)))
+
+
 @attrs.frozen
 class RestStiffness:
     """Force in N on the tip's end plane, spread evenly, for a mean displacement of 1 mm of it along an axis.
@@ -321,26 +349,25 @@ class RestStiffness:
     def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
         """Difference in N/mm between two bodies near to `structure`, to first order.
 
-        Of the flexibility c = w . K^-1 w: dc = 2 dw . v - v . dK v with v = K^-1 w. K v is a difference of
-        residuals at a displacement so small that the body is linear there.
+        Of the flexibility c = w . K^-1 w: dc = 2 dw . v - v . dK v with v = K^-1 w. v . K v is the work of
+        the residual along v at a displacement so small that the body is linear there.
         """
         model, weights = self._side(structure)
         moved = self._moved(structure, model, weights)
         flexibility = float(weights.ravel()[model.free] @ moved)
         small = SMALL_MM / np.abs(moved).max()
-        u = np.zeros_like(model.mesh.nodes)
-        u.ravel()[model.free] = small * moved
-        sides = []
-        for s in (plus, minus):
-            other, w = self._side(s)
-            data = other.parameters(s.materials[WITHOUT])
-            moved_by = s.following(u)
-            ahead, behind = (
-                other.residual(sign * moved_by, 0.0, data).ravel()[other.free] for sign in (1, -1)
-            )
-            forces = (ahead - behind) / (2 * small)
-            sides.append(2 * w.ravel()[other.free] @ moved - moved @ forces)
-        return -_whole(model) * float(sides[0] - sides[1]) / flexibility**2
+        sides = structure.kept(f"work {self.direction}", lambda: self._work(structure, model, moved, small))
+        dK = sum(one.between(plus, minus)[0] for one in sides) / (2.0 * small**2)
+        ahead, behind = (self._side(s)[1].ravel()[model.free] @ moved for s in (plus, minus))
+        return -_whole(model) * float(2.0 * (ahead - behind) - dK) / flexibility**2
+
+    def _work(self, structure: Structure, model: Model, moved: Array, small: float) -> list[ResidualChange]:
+        """The work along a small displacement of itself, and the other way round."""
+        v = np.zeros_like(model.mesh.nodes)
+        v.ravel()[model.free] = small * moved
+        v = model.mesh.following(v)
+        rest = Condition(WITHOUT, 0.0)
+        return [ResidualChange(structure, rest, side, [side], model) for side in (v, -v)]
 
     def _side(self, structure: Structure) -> tuple[Model, Array]:
         """The model whose supports admit the direction, and the weights (n, 3) of the tip's displacement."""
@@ -355,15 +382,13 @@ class RestStiffness:
 
     def _moved(self, structure: Structure, model: Model, weights: Array) -> Array:
         """Displacement (free,) under the weights as forces in N, found once for one body."""
-        known = structure.shared.get(f"moved {self.direction}")
-        if known is not None and known[0] is structure:
-            return np.asarray(known[1])
-        values = model.tangent(
-            np.zeros_like(model.mesh.nodes), 0.0, model.parameters(structure.materials[WITHOUT])
-        )
-        moved = model.factor.factor(values).solve(weights.ravel()[model.free])
-        structure.shared[f"moved {self.direction}"] = structure, moved
-        return np.asarray(moved)
+
+        def solved() -> Array:
+            rest, data = np.zeros_like(model.mesh.nodes), model.parameters(structure.materials[WITHOUT])
+            factor = model.factor.factor(model.tangent(rest, 0.0, data))
+            return np.asarray(factor.solve(weights.ravel()[model.free]))
+
+        return np.asarray(structure.kept(f"moved {self.direction}", solved))
 
 
 @attrs.frozen

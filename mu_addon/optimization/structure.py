@@ -62,6 +62,13 @@ class Structure:
             self.shared[name] = make()
         return self.shared[name]
 
+    def kept(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is found of this body alone, made when it is first asked for; only the last body's is kept."""
+        known = self.shared.get(name)
+        if known is None or known[0] is not self:
+            known = self.shared[name] = self, make()
+        return known[1]
+
     def following(self, u: Array) -> Array:
         """Displacements u (n, 3) in mm of its untied nodes as this body has them, its tied nodes following.
 

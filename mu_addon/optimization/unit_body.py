@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -139,18 +140,16 @@ class UnitBody:
         """
         value = float(freedom.value_of(self.unit))
         step = STEP * min(freedom.high - freedom.low, abs(value) or np.inf)
-        ends = []
-        for sign in (1.0, -1.0):
-            try:
-                ends.append(value + sign * step)
-                changed_unit(self.unit, [freedom], [ends[-1]])
-            except InputError:
-                ends[-1] = value
+        ends, units = [value, value], [self.unit, self.unit]
+        for side, sign in enumerate((1.0, -1.0)):
+            with suppress(InputError):
+                units[side] = changed_unit(self.unit, [freedom], [value + sign * step])
+                ends[side] = value + sign * step
         if ends[0] == ends[1]:
             raise InputError(
                 f"{freedom.name} = {value:g} can be moved to neither side", freedom.name, "fix it"
             )
-        plus, minus = (self.moved(changed_unit(self.unit, [freedom], [end])) for end in ends)
+        plus, minus = map(self.moved, units)
         return plus, minus, ends[0] - ends[1]
 
     def pairs(self, freedoms: Sequence[Freedom]) -> list[Callable[[], Pair]]:

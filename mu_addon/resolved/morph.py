@@ -12,16 +12,18 @@ import numpy as np
 
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
+from ..design.lattice import graph_of, with_struts
 from ..design.parameters import Unit
-from ..errors import MeshingError
+from ..errors import InputError, MeshingError
 from ..fem.elements import even_points, shape_functions, shape_gradients
 from ..fem.embedding import Footholds
 from ..meshing.mesh import Array, Mesh, mirror
-from ..meshing.morph import shrunk
+from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
 from .lattice import clearance, cuts
-from .octants import resized_nodes
+from .octants import SweptNodes
+from .strut import is_half_diagonal
 from .unit import Sizes, wall_grid, wall_of
 
 # An element that the wall cuts is divided this often along each edge to tell the share outside.
@@ -49,9 +51,13 @@ class PrintedMorph:
         if len(mesh.nodes) <= count or not np.array_equal(mesh.nodes[:count], wall.nodes):
             raise _failed("it is no printed unit's, or has other settings")
         self._struts = mesh.nodes[count:]
+        covered = self._covering(a)
+        self._graph = graph_of(covered)
+        self._lattice = with_struts(self._graph, covered)
+        self._swept = SweptNodes(self._lattice, self._struts) if is_half_diagonal(a) else None
         self._footholds = Footholds.of(wall, mesh.nodes[mesh.tied])
         self._cut, self._outside = self._cut_elements(a)
-        self._before = self._shares(mesh.nodes, a)
+        self._before = self._shares(mesh.nodes, a, np.arange(len(self._cut)))
 
     def to(self, other: Unit, checked: bool = True) -> Mesh:
         """The mesh moved to the unit `other`, of as many chambers and cells of the same kind.
@@ -68,21 +74,40 @@ class PrintedMorph:
         if factor != 1.0 and self._body is not None:
             raise _failed("a user-defined body does not grow with the cell")
         near = b if factor == 1.0 else shrunk(b, a.cell)
-        wall = wall_of(self._grid.of(near), a)
-        wall = mirror(wall, "x") if self._full else wall
-        struts = resized_nodes(self._covering(a), self._covering(near), self._struts)
-        nodes = np.vstack([wall.nodes, struts])
-        filled = mesh.filled.copy()
-        filled[self._cut] += self._shares(nodes, near) - self._before
-        found = attrs.evolve(
-            mesh,
-            nodes=factor * nodes,
-            filled=filled,
-            tied_weights=self._footholds.moved(wall.nodes, nodes[mesh.tied]),
-        )
+        same_wall = struts_alone_differ(a, near)
+        wall = mesh.nodes[: self._count]
+        if not same_wall:
+            half = wall_of(self._grid.of(near), a)
+            wall = (mirror(half, "x") if self._full else half).nodes
+        nodes = np.vstack([wall, self._struts_of(near)])
+        moved = (nodes != mesh.nodes).any(axis=1)
+        filled, weights = mesh.filled, mesh.tied_weights
+        rows = np.flatnonzero(moved[mesh.tets[self._cut]].any(axis=1) | (not same_wall))
+        if len(rows):
+            filled = filled.copy()
+            filled[self._cut[rows]] += self._shares(nodes, near, rows) - self._before[rows]
+        rows = np.flatnonzero(moved[mesh.tied] | moved[mesh.tied_to].any(axis=1))
+        if len(rows):
+            weights = weights.copy()
+            weights[rows] = self._footholds.moved(wall, nodes[mesh.tied], rows)
+        found = attrs.evolve(mesh, nodes=factor * nodes, filled=filled, tied_weights=weights)
         if checked:
             check_positive(found)
         return found
+
+    def _struts_of(self, d: Dimensions) -> Array:
+        """The struts' nodes (n, 3) in mm for other dimensions; raises InputError."""
+        other = with_struts(self._graph, self._covering(d))
+        if self._swept is not None:
+            return self._swept.of(other)
+        own, sizes = self._lattice, ("junction_radius", "midspan_radius", "growth")
+        if other.factors is not None or any(getattr(own, name) != getattr(other, name) for name in sizes):
+            raise InputError(
+                f"the mesh of struts of lattice {d.kind.name!r} cannot be moved to other diameters",
+                "[lattice] kind",
+                "choose body-centred or body-centred-straight",
+            )
+        return self._struts
 
     def _covering(self, d: Dimensions) -> Dimensions:
         return d if self._body is None else covering(d, self._body)
@@ -102,19 +127,22 @@ class PrintedMorph:
 
     def _points(self, nodes: Array, elements: Array) -> Array:
         shape = shape_functions(even_points(_STEPS), 2)
-        return np.einsum("qn,mnd->mqd", shape, nodes[self.mesh.tets[elements]])
+        return np.asarray(shape @ nodes[self.mesh.tets[elements]])
 
-    def _shares(self, nodes: Array, d: Dimensions) -> Array:
-        """Share (k, q) outside the profile of the volume at the cut elements' quadrature points."""
+    def _shares(self, nodes: Array, d: Dimensions, rows: Array) -> Array:
+        """Share (k, q) outside the profile of the volume at some cut elements' (k,) quadrature points."""
         at = even_points(_STEPS)
         own = at.argmax(axis=1)
-        corners = nodes[self.mesh.tets[self._cut]]
-        points = self._points(nodes, self._cut)
-        volume = np.linalg.det(np.einsum("mnd,qnr->mqdr", corners, shape_gradients(at, 2)))
+        elements = self._cut[rows]
+        points = self._points(nodes, elements)
+        slopes = shape_gradients(at, 2).transpose(1, 0, 2).reshape(10, -1)
+        edges = nodes[self.mesh.tets[elements]].swapaxes(1, 2) @ slopes
+        r, s, t = np.moveaxis(edges.reshape(len(rows), 3, len(at), 3), (3, 1), (0, 3))
+        volume = (np.cross(r, s) * t).sum(axis=-1)
         width = np.cbrt(np.abs(volume).mean(axis=1) / 6.0) / _STEPS
         depth = clearance(d, points.reshape(-1, 3)).reshape(volume.shape) / width[:, None]
         way = np.clip(0.5 + 0.5 * depth / _BLUR, 0.0, 1.0)
-        share = way**2 * (3.0 - 2.0 * way) * self._outside * volume
+        share = way**2 * (3.0 - 2.0 * way) * self._outside[rows] * volume
         columns = range(self.mesh.filled.shape[1])
         return np.stack(
             [share[:, own == q].sum(axis=1) / volume[:, own == q].sum(axis=1) for q in columns], axis=1

@@ -8,13 +8,15 @@ import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
-from ..design.lattice import Lattice, lattice_of
+from ..design.lattice import Lattice, graded, lattice_of
 from ..design.waveguide import Bar, strut_radii
 from ..errors import InputError
 from ..meshing.mesh import Array
-from .strut import Radius, is_half_diagonal, radius_of, thickened
+from .strut import Radius, ends, placed, places_of, radius_of, thickened
 
 _STATIONS = np.linspace(0.0, 1.0, 33)
+# In halves of a cell, within which a node lies in a plane between octants.
+_SLACK = 1e-9
 
 
 def is_thickening(d: Dimensions, bar: Bar) -> bool:
@@ -43,11 +45,9 @@ def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
 def graded_nodes(d: Dimensions, nodes: Array) -> Array:
     """Nodes (n, 3) in mm of a lattice's struts that are alike everywhere where graded struts have them.
 
-    As `thickened_nodes`. Struts that meet have one radius at their node and nearly so beside it, so the mean
-    of places between octants is within rounding of either but for steep gradings. Raises InputError for
-    struts that fill their cell.
+    As `SweptNodes` moves them. Raises InputError for struts that fill their cell.
     """
-    lattice, plain = lattice_of(d), radius_of(d)
+    lattice = lattice_of(d)
     assert lattice.factors is not None
     widest = 2.0 * float(lattice.radii(_STATIONS).max())
     if widest > 0.4 * d.cell:
@@ -56,49 +56,87 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
             "[grading]",
             f"choose factors that give at most {0.4 * d.cell:g} mm",
         )
-
-    def laws(strut: int) -> tuple[Radius, Radius]:
-        return plain, _radius(_from_corner(lattice, strut))
-
-    return _swept_again(lattice, range(len(lattice.struts)), laws, nodes)
+    return SweptNodes(attrs.evolve(lattice, factors=None), nodes).of(lattice)
 
 
-def resized_nodes(d: Dimensions, other: Dimensions, nodes: Array) -> Array:
-    """Nodes (n, 3) in mm of a lattice's struts where those of other diameters or grading have them.
+class SweptNodes:
+    """Nodes (n, 3) in mm of the struts of a lattice of half diagonals, to be swept again with other radii.
 
-    As `thickened_nodes`; both of one cell and envelope. Raises InputError for struts that are no half
-    diagonals.
+    Each node keeps its place along its octant's strut and, in radii, across it. Nodes between octants take
+    the mean of their places in them: struts that meet have one radius at their node and nearly so beside it,
+    so that these are within rounding of each other but for steep gradings.
     """
-    first, second = lattice_of(d), lattice_of(other)
-    apart = np.abs(first.radii(_STATIONS) - second.radii(_STATIONS)).max(axis=1)
-    changed = np.flatnonzero(apart > 0.0).tolist()
-    if not changed:
-        return nodes
-    if not is_half_diagonal(d):
-        raise InputError(
-            f"the mesh of struts of lattice {d.kind.name!r} cannot be moved to other diameters",
-            "[lattice] kind",
-            "choose body-centred or body-centred-straight",
-        )
 
-    if first.factors is None and second.factors is None:
-        return _all_alike(d, radius_of(other), nodes)
+    def __init__(self, lattice: Lattice, nodes: Array) -> None:
+        self._lattice, self._nodes = lattice, nodes
+        self._half = half = lattice.cell / 2.0
+        starts = lattice.is_corner[lattice.struts[:, 0]][:, None]
+        self._struts = np.where(starts, lattice.struts, lattice.struts[:, ::-1])
+        self._node, self._strut = _octants_of(lattice, nodes)
+        corner, centre = (lattice.nodes[self._struts[self._strut, end]] for end in (0, 1))
+        self._corner, self._sign = corner, np.sign(centre - corner)
+        self._count = np.bincount(self._node, minlength=len(nodes))
+        law = self._law(lattice, np.arange(len(self._node)))
+        self._places = places_of(half, law, (nodes[self._node] - corner) * self._sign)
+        self._ends = ends(half, law, self._places[:, :2])
 
-    def laws(strut: int) -> tuple[Radius, Radius]:
-        return _radius(_from_corner(first, strut)), _radius(_from_corner(second, strut))
+    def of(self, other: Lattice) -> Array:
+        """The nodes (n, 3) in mm of struts of other radii or factors, in as many cells; those given where
+        none of their struts changes."""
+        own = self._lattice
+        rows = np.flatnonzero(self._changed(other)[self._strut])
+        if not len(rows):
+            return self._nodes
+        at, near = self._places[rows], (self._ends[0][rows], self._ends[1][rows])
+        before = self._nodes[self._node[rows]]
+        after = placed(self._half, self._law(other, rows), at, near)
+        moved = self._corner[rows] + self._sign[rows] * after - before
+        total = [np.bincount(self._node[rows], column, len(self._nodes)) for column in moved.T]
+        mean = np.column_stack(total) / np.maximum(self._count, 1)[:, None]
+        # Exactly where it was: what lies in a plane between octants stays there.
+        mean[np.abs(mean) < 1e-9 * own.cell] = 0.0
+        return np.asarray(self._nodes + mean)
 
-    return _swept_again(first, changed, laws, nodes)
+    def _changed(self, other: Lattice) -> Array:
+        """Whether each strut (E,) has other radii."""
+        own = self._lattice
+        sizes = [(x.junction_radius, x.midspan_radius, x.growth) for x in (own, other)]
+        if sizes[0] != sizes[1]:
+            return np.ones(len(own.struts), bool)
+        if own.factors is None and other.factors is None:
+            return np.zeros(len(own.struts), bool)
+        first, second = (np.ones(len(x.grid)) if x.factors is None else x.factors for x in (own, other))
+        return np.asarray((first != second)[own.struts].any(axis=1))
+
+    def _law(self, lattice: Lattice, rows: Array) -> Radius:
+        """Radius of the strut of each row, from its cell's corner to the centre."""
+        if lattice.factors is None:
+            return lattice.radius
+        first, last = (lattice.factors[self._struts[self._strut[rows], end]] for end in (0, 1))
+        return lambda t: np.asarray(graded(lattice.radius(t), t, first, last, lattice.growth))
 
 
-def _all_alike(d: Dimensions, other: Radius, nodes: Array) -> Array:
-    """Nodes (n, 3) in mm of struts that are alike everywhere, all octants at once; as `_swept_again`."""
-    half = d.cell / 2.0
-    shift = np.array([half, half, 0.0])
-    corner = d.cell * np.round((nodes - shift) / d.cell) + shift
-    sign = np.where(nodes < corner, -1.0, 1.0)
-    local = np.minimum((nodes - corner) * sign, half)
-    found = corner + sign * thickened(half, local, radius_of(d), other)
-    return np.where(np.abs(found - nodes) < 1e-9 * d.cell, nodes, found)
+def _octants_of(lattice: Lattice, nodes: Array) -> tuple[Array, Array]:
+    """Numbers (k,) of nodes and (k,) of the struts in whose octant they lie: in several for those between."""
+    half = lattice.cell / 2.0
+    at_ends = lattice.nodes[lattice.struts] / half
+    least = at_ends.min(axis=(0, 1))
+    place = np.rint(at_ends.min(axis=1) - least).astype(int)
+    shape = place.max(axis=0) + 1
+    strut_at = np.full(shape, -1)
+    strut_at[tuple(place.T)] = np.arange(len(place))
+    at = nodes / half - least
+    low, high = (np.floor(at + slack).astype(int) for slack in (-_SLACK, _SLACK))
+    found: list[tuple[Array, Array]] = []
+    for side in np.ndindex(2, 2, 2):
+        # Where a node lies in no plane between octants both are one, and count once.
+        own = np.where(side, high, low)
+        other = (np.array(side) == 0) | (high != low)
+        rows = np.flatnonzero((other & (own >= 0) & (own < shape)).all(axis=1))
+        struts = strut_at[tuple(own[rows].T)]
+        found.append((rows[struts >= 0], struts[struts >= 0]))
+    node, strut = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return node, strut
 
 
 def _swept_again(

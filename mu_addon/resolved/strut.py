@@ -25,6 +25,7 @@ _ALONG = np.ones(3) / math.sqrt(3.0)
 _ACROSS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]) / np.sqrt([[6.0], [2.0]])
 # The strut's radius changes along it: its ends are found by iteration, at slopes below 0.3 to rounding.
 _ITERATIONS = 60
+_CLOSE = 1e-15
 
 
 def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
@@ -51,7 +52,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     levels = np.linspace(0.0, 1.0, layers + 1)
     at = np.column_stack([np.tile(points, (layers + 1, 1)), np.repeat(levels, count)])
     law = radius_of(d)
-    nodes = _placed(half, law, at)
+    nodes = placed(half, law, at)
     # Layers are tilted: a diagonal from what lies farther along to what lies less far leans least. The other
     # ones make E[100] of the lattice up to 70 % too high in place of 10 (docs/resolved.md).
     along = np.round(nodes @ _ALONG / half, 9).reshape(layers + 1, count)
@@ -74,7 +75,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     around = (np.abs(radius[:, 0] - radius[:, 1]) < 1e-12) & (radius[:, 0] > 0)
     chord = np.hypot(middles[:, 0], middles[:, 1])
     middles[around, :2] *= (radius[around, 0] / chord[around])[:, None]
-    nodes, tets, nothing = second_order(nodes, tets, tets[:0, :3], _placed(half, law, middles))
+    nodes, tets, nothing = second_order(nodes, tets, tets[:0, :3], placed(half, law, middles))
     return Mesh(nodes, tets, np.full(len(tets), LATTICE), nothing, tets[0, :0], tets[0, :0])
 
 
@@ -119,32 +120,51 @@ def thickened(half: float, points: Array, law: Radius, other: Radius) -> Array:
     half: edge of the octant [0, half]^3 in mm; law: the radius that the mesh was made with. Nodes keep their
     place along the strut and, in radii, across it; those on the octant's planes stay on them.
     """
-    length = half * math.sqrt(3.0)
+    return placed(half, other, places_of(half, law, points))
+
+
+def places_of(half: float, law: Radius, points: Array) -> Array:
+    """Places (n, 3) of points (n, 3) in mm of an octant, as `placed` takes them; law: the strut's radius."""
     along = points @ _ALONG
-    away = points - along[:, None] * _ALONG
-    across = (away @ _ACROSS.T) / law(np.clip(along / length, 0.0, 1.0))[:, None]
-    low, high = _ends(half, law, across @ _ACROSS)
-    return _placed(half, other, np.column_stack([across, (along - low) / (high - low)]))
+    across = ((points - along[:, None] * _ALONG) @ _ACROSS.T) / law(_fraction(half, along))[:, None]
+    low, high = ends(half, law, across)
+    return np.column_stack([across, (along - low) / (high - low)])
 
 
-def _placed(half: float, law: Radius, at: Array) -> Array:
-    """Points (n, 3) in mm of places (n, 3): two across the strut in radii, and 0 .. 1 from end to end."""
-    length = half * math.sqrt(3.0)
-    across = at[:, :2] @ _ACROSS
-    low, high = _ends(half, law, across)
+def placed(half: float, law: Radius, at: Array, near: tuple[Array, Array] | None = None) -> Array:
+    """Points (n, 3) in mm of places (n, 3): two across the strut in radii, and 0 .. 1 from end to end.
+
+    law: of the radius at n fractions of the way; near: `ends` of a strut near to it.
+    """
+    low, high = ends(half, law, at[:, :2], near)
     along = low + at[:, 2] * (high - low)
-    found = along[:, None] * _ALONG + law(np.clip(along / length, 0.0, 1.0))[:, None] * across
+    found = along[:, None] * _ALONG + law(_fraction(half, along))[:, None] * (at[:, :2] @ _ACROSS)
     for plane in (0.0, half):
         found[np.abs(found - plane) < 1e-9 * half] = plane
     return found
 
 
-def _ends(half: float, law: Radius, across: Array) -> tuple[Array, Array]:
-    """Both ends (n,) in mm of lines along the strut in its octant; across (n, 3): off its axis, in radii."""
+def ends(
+    half: float, law: Radius, across: Array, near: tuple[Array, Array] | None = None
+) -> tuple[Array, Array]:
+    """Both ends (n,) in mm of lines along the strut in its octant; across (n, 2): off its axis, in radii.
+
+    near: those of a strut near to it, from where few steps will do.
+    """
     length = half * math.sqrt(3.0)
-    least, most = across.min(axis=1), across.max(axis=1)
-    low, high = np.zeros(len(across)), np.full(len(across), length)
+    off = across @ _ACROSS
+    least, most = off.min(axis=1), off.max(axis=1)
+    low, high = near or (np.zeros(len(across)), np.full(len(across), length))
     for _ in range(_ITERATIONS):
-        low = -math.sqrt(3.0) * law(np.clip(low / length, 0.0, 1.0)) * least
-        high = length - math.sqrt(3.0) * law(np.clip(high / length, 0.0, 1.0)) * most
+        before = low, high
+        low = -math.sqrt(3.0) * law(_fraction(half, low)) * least
+        high = length - math.sqrt(3.0) * law(_fraction(half, high)) * most
+        moved = max(np.abs(a - b).max(initial=0.0) for a, b in zip(before, (low, high), strict=True))
+        if moved < _CLOSE * length:
+            break
     return low, high
+
+
+def _fraction(half: float, along: Array) -> Array:
+    """Fractions (n,) of the way from corner to centre."""
+    return np.clip(along / (half * math.sqrt(3.0)), 0.0, 1.0)

@@ -69,6 +69,22 @@ def test_force_and_tangent_are_derivatives_of_the_energy(order):
     assert_consistent(eq.model, eq.parameters, u, random, 1e-5)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_work_of_its_forces_has_a_derivative_by_the_places_as_drawn(mirrored):
+    random = np.random.default_rng(3)
+    mesh, u = onto_mirror(0.04) if mirrored else (fork(2), lean(fork(2), 0.48))
+    u = u + 1e-3 * random.standard_normal(u.shape)
+    contact = SelfContact(mesh, 0.1 if mirrored else D, K)
+    v, way = random.standard_normal((2, *u.shape))
+    sides = []
+    for step in (1e-6, -1e-6):
+        moved = contact.relocated(attrs.evolve(mesh, nodes=mesh.nodes + step * way), contact.gap_mm, K)
+        nodes, forces = moved.forces(u)
+        sides.append(np.vdot(v[nodes], forces))
+    [found] = contact.by_places(u, [v])
+    assert np.vdot(found, way) == pytest.approx((sides[0] - sides[1]) / 2e-6, rel=1e-5)
+
+
 def test_force_and_tangent_at_a_mirror_plane_are_derivatives_too():
     mesh, u = onto_mirror(0.04)
     eq = body(mesh, gap=0.1)
