@@ -290,6 +290,12 @@ def envelope(body: Body, d: Dimensions) -> Body:
     return _body_from(body.manifold ^ slab, body.name, d.height)
 
 
+def section(body: Body) -> list[NDArray[np.float64]]:
+    """Outlines (n, 2) of the body in the plane x = 0, y and z in mm."""
+    turned = body.manifold.rotate([0.0, -90.0, 0.0]).slice(0.0).to_polygons()
+    return [np.column_stack([np.asarray(p)[:, 1], -np.asarray(p)[:, 0]]) for p in turned]
+
+
 def require_sound(body: Body, found: list[Flaw], role: str = "an envelope") -> None:
     """Raise InputError for the first of these flaws and its first place; do nothing for an empty list.
 

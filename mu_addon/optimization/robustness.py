@@ -109,5 +109,6 @@ def _print_check(unit: Unit, printer: Printer, body: Body | None) -> tuple[str, 
         solid = build_solid(unit, body=None if body is None else envelope(body, unit.dimensions))
     except MuError as error:
         return "error", (f"no solid: {error.what}",)
-    found = check(solid.vertices, solid.triangles, printer, unit, stages=("thickness", "chambers"))
+    stages, in_body = ("thickness", "chambers"), body is not None
+    found = check(solid.vertices, solid.triangles, printer, unit, stages=stages, in_body=in_body)
     return found.worst, tuple(f"{f.severity}: {f.what}" for f in found.findings if f.severity != "pass")

@@ -18,6 +18,7 @@ from mu_addon.design.body import (
     inside,
     misfits,
     read_body,
+    section,
 )
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
@@ -30,6 +31,12 @@ from .bodies import arrays, box, cylinder
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions
+
+
+def test_its_section_is_the_outline_in_the_plane_of_bending():
+    [outline] = section(box([-3.0, -2.0, 1.0], [4.0, 5.0, 9.0]))
+    assert np.ptp(outline, axis=0) == pytest.approx([7.0, 8.0])
+    assert outline.min(axis=0) == pytest.approx([-2.0, 1.0])
 
 
 @pytest.fixture(scope="module")

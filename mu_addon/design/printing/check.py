@@ -75,6 +75,7 @@ def check(
     nominal: tuple[Vertices, Triangles] | None = None,
     verdict: Callable[[PrintCheck], None] | None = None,
     share: Callable[[float], None] | None = None,
+    in_body: bool = False,
 ) -> PrintCheck:
     """Printability check of a surface of vertices (n, 3) in mm and triangles (m, 3), as its STL is read back.
 
@@ -83,14 +84,15 @@ def check(
     `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
     that is entered, with its name, for each stage. nominal: surface of the unit's own solid, which a surface
     from elsewhere is compared with. verdict: called with the result before build directions are compared,
-    which adds no finding; share: called with the share of them that is done. Raises InputError for a window
-    that does not fit the unit.
+    which adds no finding; share: called with the share of them that is done. in_body: a user-defined body has
+    the place of the lattice's box, so that of the drawing's size the height alone is known. Raises InputError
+    for a window that does not fit the unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)
     with stage("faces"):
         found, triangles, sound = _faces(vertices, triangles)
-    sized = _size(vertices, printer, unit, up)
+    sized = _size(vertices, printer, unit, up, in_body)
     found += sized
     figures = {"triangles": float(len(triangles)), "volume_ml": volume(vertices, triangles) / 1e3}
     for axis, extent in zip("xyz", np.ptp(vertices, axis=0).tolist(), strict=True):
@@ -208,14 +210,15 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
     return found, triangles, not shells.inside_out
 
 
-def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) -> list[Finding]:
+def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array, in_body: bool) -> list[Finding]:
     """Whether the part has its drawing's size and fits the printer."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     found = []
     if unit is not None:
         drawn = np.array(unit.dimensions.bounds)
         drawn[2, 0] -= unit.dimensions.inlet_length
-        ratio = float(np.linalg.norm(high - low) / np.linalg.norm(drawn[:, 1] - drawn[:, 0]))
+        axes = slice(2, 3) if in_body else slice(None)
+        ratio = float(np.linalg.norm((high - low)[axes]) / np.linalg.norm((drawn[:, 1] - drawn[:, 0])[axes]))
         # A waveguide's seats may reach a little beyond the drawing's box.
         same = abs(ratio - 1.0) < 0.02
         off = np.abs(np.stack([low - drawn[:, 0], high - drawn[:, 1]])).max(axis=1)
@@ -236,8 +239,9 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array) ->
                 "",
                 NOWHERE if same else np.stack([low, high])[np.argsort(-off)][:1],
                 0 if same else 1,
-                f"nominal size of the unit, {drawn[0, 1] - drawn[0, 0]:g} x "
-                f"{drawn[1, 1] - drawn[1, 0]:g} x {drawn[2, 1] - drawn[2, 0]:g} mm",
+                f"nominal {'height' if in_body else 'size'} of the unit, "
+                + " x ".join(f"{b - a:g}" for a, b in drawn[axes])
+                + " mm",
                 remedy="" if same else "export in mm",
             )
         )

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...design.body import Body, covering, envelope, section
+from ...design.dimensions import Dimensions
 from ...design.lattice import lattice_of
 from ...design.parameters import Unit
 from ...design.profile import cavity_polygon, outer_polygon
@@ -93,22 +95,23 @@ def course(found: Optimised) -> str:
     return svg()
 
 
-def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float) -> str:
+def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None = None) -> str:
     """SVG of a unit cut along its sagittal plane, all units at one scale: wall, chambers, struts, envelope.
 
-    Struts are those of the half cell on one side of the plane, at their own thickness.
+    Struts are those of the half cell on one side of the plane, at their own thickness. body: in place of the
+    lattice's box.
 
     widest_mm, tallest_mm: size of the largest unit to be shown beside it.
     """
     with canvas(1.15, 1.15 * tallest_mm / widest_mm) as (drawn, svg):
-        _half_section(drawn, unit, widest_mm, tallest_mm)
+        _half_section(drawn, unit, widest_mm, tallest_mm, body)
     return svg()
 
 
-def picture(unit: Unit, path: Path) -> None:
+def picture(unit: Unit, path: Path, body: Body | None = None) -> None:
     """Write a unit's half section as a square PNG of 256 pixels, as a panel shows it; raises OutputError."""
-    size = 1.05 * max(sizes([unit]))
-    _write_png(path, 2.56, 256, True, lambda drawn: _half_section(drawn, unit, size, size))
+    size = 1.05 * max(sizes([unit], body))
+    _write_png(path, 2.56, 256, True, lambda drawn: _half_section(drawn, unit, size, size, body))
 
 
 def _write_png(path: Path, inches: float, pixels: int, clear: bool, draw: Callable[[Any], None]) -> None:
@@ -124,14 +127,23 @@ def _write_png(path: Path, inches: float, pixels: int, clear: bool, draw: Callab
     write_bytes(path, stream.getvalue())
 
 
-def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float) -> None:
+def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None) -> None:
     """Draw a unit over a whole figure, so many mm wide and tall."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
     d = unit.dimensions
     axes = drawn.add_axes((0.0, 0.0, 1.0, 1.0))
     (_, _), (y0, y1), (z0, z1) = d.bounds
-    (envelope,) = axes.fill([y0, y1, y1, y0], [z0, z0, z1, z1], color="#dfe6ee", linewidth=0)
-    for strut in axes.fill(*_strut_outlines(unit), color="#8a97a8", linewidth=0):
-        strut.set_clip_path(envelope)
+    outlines, filled = [np.array([[y0, z0], [y1, z0], [y1, z1], [y0, z1]])], d
+    if body is not None:
+        own = envelope(body, d)
+        outlines, filled = section(own), covering(d, own)
+        (_, y0, _), (_, y1, _) = own.bounds.tolist()
+    whole = Outline.make_compound_path(*(Outline(np.vstack([o, o[:1]]), closed=True) for o in outlines))
+    inside = axes.add_patch(PathPatch(whole, facecolor="#dfe6ee", linewidth=0))
+    for strut in axes.fill(*_strut_outlines(filled), color="#8a97a8", linewidth=0):
+        strut.set_clip_path(inside)
     for polygon, color in ((outer_polygon(d, ALONG), "#c98a3a"), (cavity_polygon(d, ALONG), "#ffffff")):
         for sign in (1, -1):
             # The edge hides the seam between the halves.
@@ -143,9 +155,9 @@ def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float) -
     axes.axis("off")
 
 
-def _strut_outlines(unit: Unit) -> list[Array]:
+def _strut_outlines(d: Dimensions) -> list[Array]:
     """Outlines of the struts beside the sagittal plane: y and z in mm of each in turn."""
-    lattice = lattice_of(unit.dimensions)
+    lattice = lattice_of(d)
     rows = struts_beside_section(lattice)
     first, last = (lattice.nodes[lattice.struts[rows, end]][:, None, 1:] for end in (0, 1))
     along = last - first
@@ -159,10 +171,11 @@ def _strut_outlines(unit: Unit) -> list[Array]:
     return [strut[:, column] for strut in outline for column in (0, 1)]
 
 
-def sizes(units: Sequence[Unit]) -> tuple[float, float]:
-    """Largest width and height in mm of some units."""
+def sizes(units: Sequence[Unit], body: Body | None = None) -> tuple[float, float]:
+    """Largest width and height in mm of some units, in a body or in the box of their lattice."""
     bounds = [u.dimensions.bounds for u in units]
-    return max(y1 - y0 for _, (y0, y1), _ in bounds), max(z1 - z0 for _, _, (z0, z1) in bounds)
+    width = max(y1 - y0 for _, (y0, y1), _ in bounds) if body is None else float(np.ptp(body.bounds[:, 1]))
+    return width, max(z1 - z0 for _, _, (z0, z1) in bounds)
 
 
 def _axis(target: Any) -> str:

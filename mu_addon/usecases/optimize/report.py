@@ -70,10 +70,11 @@ def _units(found: Optimised) -> str:
     if not found.proposals:
         return ""
     units = [found.design.unit, *(p.unit for p in found.proposals)]
-    widest, tallest = charts.sizes(units)
+    body = found.design.body
+    widest, tallest = charts.sizes(units, body)
     names = ["start", *(f"{p.place}: {_state(p)}" for p in found.proposals)]
     html = "".join(
-        figure(charts.thumbnail(unit, widest, tallest), escape(name), f"Half section of unit {name}.")
+        figure(charts.thumbnail(unit, widest, tallest, body), escape(name), f"Half section of unit {name}.")
         for unit, name in zip(units, names, strict=True)
     )
     rows = [
@@ -180,7 +181,10 @@ def _inputs(found: Optimised) -> str:
     ]
     facts = {
         "fidelity": d.settings.fidelity,
+        "body": "the lattice's box" if d.body is None else d.body.name,
         "refinement of the search's mesh": d.settings.refine,
+        "refinement of the check's mesh": d.check_refine,
+        "walls and struts kept apart": d.self_contact,
         "most units": d.search.evaluations,
         "seed": d.search.seed,
         "resin": d.resin,

@@ -252,7 +252,7 @@ class _Run:
                     )
                     self._keep(name, checked)
                 write_unit(unit, self.folder / f"proposed-{place}.toml")
-                charts.picture(unit, self.folder / f"proposed-{place}.png")
+                charts.picture(unit, self.folder / f"proposed-{place}.png", design.body)
                 proposals.append(
                     Proposal(
                         place,

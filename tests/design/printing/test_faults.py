@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from mu_addon.design import shapes
+from mu_addon.design.body import envelope
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.printing.check import check
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
 from mu_addon.design.solid import build_solid, printable
 
+from ..bodies import cylinder
 from . import parts
 from .parts import APEX
 
@@ -177,6 +179,20 @@ def test_inches_for_millimetres(factor, words):
     alone = faults((factor * solid.vertices, solid.triangles))
     assert set(alone) == {"build volume"}
     assert "inches" in alone["build volume"].what
+
+
+def test_a_unit_in_a_body_of_ones_own_has_that_size_and_still_no_other_unit_of_length():
+    unit = parts.small_unit()
+    body = envelope(cylinder(16.0, 20.0, 4.0, -1.0, 40.0), unit.dimensions)
+    solid = build_solid(unit, body=body)
+    surface, printer = (solid.vertices, solid.triangles), load_printer()
+    assert check(*surface, printer, unit, stages=()).worst == "error", "not the box's size"
+    scale = next(
+        f for f in check(*surface, printer, unit, stages=(), in_body=True).findings if f.check == "scale"
+    )
+    assert scale.severity == "pass"
+    inches = check(solid.vertices / 25.4, solid.triangles, printer, unit, stages=(), in_body=True)
+    assert "mm for inches" in next(f.what for f in inches.findings if f.check == "scale")
 
 
 def test_a_part_a_little_too_tall_is_not_taken_for_inches():
