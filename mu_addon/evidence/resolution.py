@@ -157,11 +157,10 @@ def divided(time_s: Array, values: Array, order: int) -> Array:
 def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
     """Which readings (n,) at times (n,) in s stand alone, away from all around them: (n,) bool.
 
-    step: of the display, where it is known from other records, in the readings' unit.
-
     Each is compared with the lines through its neighbours on both sides, through the next but one on both
     sides, and through two before and two after it. A corner or a step agrees with one of the latter two; what
-    lies beyond all four, on one side and by `WRONG` deviations, belongs to nothing.
+    lies beyond all four, on one side and by `WRONG` deviations, belongs to nothing. step: of the display, in
+    the readings' unit, where it is known from other records.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-
 import attrs
 import numpy as np
 
@@ -31,15 +29,23 @@ def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
     octants take the mean of their places in those whose struts are thickened.
     """
     lattice, plain = lattice_of(d), radius_of(d)
-
-    def laws(strut: int) -> tuple[Radius, Radius]:
+    moved, count = np.zeros_like(nodes), np.zeros(len(nodes))
+    for strut in np.flatnonzero(_raised(lattice, bar)).tolist():
+        inside, corner, sign = _octant(lattice, strut, nodes)
+        if not len(inside):
+            continue
         one, met = _from_corner(lattice, strut), bar.met[strut : strut + 1]
         if not lattice.is_corner[lattice.struts[strut, 0]]:
             met = met[:, ::-1]
-        own = plain if lattice.factors is None else _radius(one)
-        return own, lambda t: strut_radii(one, met, bar.half, t)[0]
-
-    return _swept_again(lattice, np.flatnonzero(_raised(lattice, bar)).tolist(), laws, nodes)
+        law = plain if lattice.factors is None else _radius(one)
+        local = (nodes[inside] - corner) * sign
+        after = thickened(lattice.cell / 2.0, local, law, _thicker(one, met, bar.half))
+        moved[inside] += corner + sign * after - nodes[inside]
+        count[inside] += 1.0
+    found = nodes + moved / np.maximum(count, 1.0)[:, None]
+    # Exactly where it was: what lies in a plane between octants stays there.
+    still = np.abs(found - nodes) < 1e-9 * lattice.cell
+    return np.where(still, nodes, found)
 
 
 def graded_nodes(d: Dimensions, nodes: Array) -> Array:
@@ -139,28 +145,6 @@ def _octants_of(lattice: Lattice, nodes: Array) -> tuple[Array, Array]:
     return node, strut
 
 
-def _swept_again(
-    lattice: Lattice,
-    struts: Iterable[int],
-    laws: Callable[[int], tuple[Radius, Radius]],
-    nodes: Array,
-) -> Array:
-    """Nodes (n, 3) in mm of octants moved from one law of their strut's radius to another, both of `laws`."""
-    moved, count = np.zeros_like(nodes), np.zeros(len(nodes))
-    for strut in struts:
-        inside, corner, sign = _octant(lattice, strut, nodes)
-        if not len(inside):
-            continue
-        local = (nodes[inside] - corner) * sign
-        law, other = laws(strut)
-        moved[inside] += corner + sign * thickened(lattice.cell / 2.0, local, law, other) - nodes[inside]
-        count[inside] += 1.0
-    found = nodes + moved / np.maximum(count, 1.0)[:, None]
-    # Exactly where it was: what lies in a plane between octants stays there.
-    still = np.abs(found - nodes) < 1e-9 * lattice.cell
-    return np.where(still, nodes, found)
-
-
 def _from_corner(lattice: Lattice, strut: int) -> Lattice:
     """A lattice of one strut, from its cell's corner to the centre."""
     ends = lattice.struts[strut : strut + 1]
@@ -169,6 +153,11 @@ def _from_corner(lattice: Lattice, strut: int) -> Lattice:
 
 def _radius(one: Lattice) -> Radius:
     return lambda t: one.radii(t)[0]
+
+
+def _thicker(one: Lattice, met: Array, half: float) -> Radius:
+    """Radius of the strut of a lattice of one that meets a waveguide (`strut_radii`)."""
+    return lambda t: strut_radii(one, met, half, t)[0]
 
 
 def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:

@@ -181,7 +181,7 @@ def test_inches_for_millimetres(factor, words):
     assert "inches" in alone["build volume"].what
 
 
-def test_a_unit_in_a_body_of_ones_own_has_that_size_and_still_no_other_unit_of_length():
+def test_a_unit_in_a_user_defined_body_has_its_size_and_inches_are_still_found():
     unit = parts.small_unit()
     body = envelope(cylinder(16.0, 20.0, 4.0, -1.0, 40.0), unit.dimensions)
     solid = build_solid(unit, body=body)
