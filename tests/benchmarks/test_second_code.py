@@ -10,6 +10,7 @@ import pytest
 
 import benchmarks.evidence.second_code as second_code
 from benchmarks.evidence.second_code import __main__ as program
+from benchmarks.evidence.second_code.battery import ROUNDS, shuffled
 from benchmarks.evidence.second_code.coverage import LAWS
 from benchmarks.evidence.second_code.judging import judged, simulator_of
 from benchmarks.evidence.second_code.recording import Instrument, Trial, read, slowly, write
@@ -24,7 +25,10 @@ FOLDER = Path(second_code.__file__).parent
 
 def test_what_makes_the_sets_knows_nothing_of_the_engine():
     # A whole unit has the program's shape and surfaces, and no physics of it.
-    shared = {"whole_unit": ("mu_addon.design.", "mu_addon.meshing.", "mu_addon.files")}
+    shared = {
+        "__main__": ("mu_addon.run.processes",),
+        "whole_unit": ("mu_addon.design.", "mu_addon.meshing.", "mu_addon.files"),
+    }
     for file in FOLDER.glob("*.py"):
         if file.stem == "judging":
             continue
@@ -122,26 +126,25 @@ def test_rates_and_wrong_names_are_counted(tmp_path, monkeypatch, capsys):
     assert "| outside: physics named with confidence | 1/3, 33.3 %" in words
     assert "1 mullins_softening" in words
     rows = tmp_path / "rows.ndjson"
-    arguments = [
-        "program",
-        "--seed",
-        "4",
-        "--only",
-        "clean",
-        "--first",
-        "12",
-        "--sets",
-        "1",
-        "--rows",
-        str(rows),
-    ]
+    (first, *_) = shuffled(["clean"], 1, 4)
+    arguments = f"program --seed 4 --only clean --sets 1 --rows {rows}".split()
     for _ in range(2):
         monkeypatch.setattr("sys.argv", arguments)
         program.main()
     # The second run finds its set in the file.
     (line,) = rows.read_text().splitlines()
-    assert json.loads(line)["number"] == 12
+    assert (json.loads(line)["part"], json.loads(line)["number"]) == first
     assert "clean: called wrong" in capsys.readouterr().out
+
+
+def test_a_round_has_each_set_once_in_an_order_of_its_seed():
+    both = shuffled(("single", "coverage"), 2, 1)
+    assert len(set(both)) == len(both) == 2 * (ROUNDS["single"] + ROUNDS["coverage"])
+    first = both[: len(both) // 2]
+    assert {part: sum(p == part for p, _ in first) for part in ("single", "coverage")} == {
+        part: ROUNDS[part] for part in ("single", "coverage")
+    }
+    assert first == shuffled(("single", "coverage"), 1, 1) != shuffled(("single", "coverage"), 1, 2)
 
 
 def test_what_no_specimen_can_have_is_a_refusal_and_no_verdict(monkeypatch):

@@ -43,6 +43,8 @@ LAWS: tuple[tuple[str, str, dict[str, Any], dict[str, tuple[str, float]]], ...] 
         {"temperature_drift.per_K": ("per_K", 1.0)},
     ),
 )
+# How many sets have each law under each noise once.
+ROUND = len(NOISES) * len(LAWS)
 
 
 def covered(number: int, battery: int) -> dict[str, Any]:

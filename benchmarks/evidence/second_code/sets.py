@@ -125,8 +125,18 @@ PAIRS: dict[str, list[tuple[str, str]]] = {
     "waveguide_bending": [("led_drift", "ambient_light"), ("clock_offset", "optical_nonlinearity")],
     "pressure_step": [("inertia", "viscoelasticity")],
 }
-CLASSES = ("clean", "single", "outside", "two")
 CLEAN_KINDS = (*SINGLE,)
+_LAWS = [(k, n, law) for k, effects in SINGLE.items() for n, each in effects.items() for law in each]
+_FAULTS = [(k, n) for k in OUTSIDE for n in OUTSIDE[k]]
+_BOTH = [(k, pair) for k in PAIRS for pair in PAIRS[k]]
+# How many sets of a class have each of its cases once.
+ROUND = {
+    "clean": len(CLEAN_KINDS) * len(NOISES),
+    "single": len(_LAWS),
+    "outside": len(_FAULTS),
+    "two": len(_BOTH),
+}
+CLASSES = (*ROUND,)
 
 
 @attrs.frozen
@@ -172,16 +182,13 @@ def _hidden(part: str, number: int, rng: Rng) -> tuple[str, Faults]:
         # Each kind with each noise in turn.
         return CLEAN_KINDS[(number // len(NOISES)) % len(CLEAN_KINDS)], {}
     if part == "single":
-        laws = [(k, n, law) for k, effects in SINGLE.items() for n, each in effects.items() for law in each]
-        kind, name, law = laws[number % len(laws)]
+        kind, name, law = _LAWS[number % len(_LAWS)]
         return kind, {name: drawn(rng, law)}
     if part == "outside":
-        cases = [(k, n) for k in OUTSIDE for n in OUTSIDE[k]]
-        group, name = cases[number % len(cases)]
-        kind = MACHINE[(number // len(cases)) % 2] if group == "machine" else group
+        group, name = _FAULTS[number % len(_FAULTS)]
+        kind = MACHINE[(number // len(_FAULTS)) % 2] if group == "machine" else group
         return kind, {name: drawn(rng, OUTSIDE[group][name])}
-    pairs = [(k, pair) for k in PAIRS for pair in PAIRS[k]]
-    kind, pair = pairs[number % len(pairs)]
+    kind, pair = _BOTH[number % len(_BOTH)]
     return kind, {n: drawn(rng, SINGLE[kind][n][int(rng.integers(len(SINGLE[kind][n])))]) for n in pair}
 
 
