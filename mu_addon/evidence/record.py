@@ -65,6 +65,12 @@ class Series:
         spread = None if self._spread is None else self._spread.tobytes()
         return self._seen.tobytes(), spread
 
+    def samples(self, block: int) -> slice:
+        """Which of the experiment's samples a block holds, by its number among those with a value."""
+        at = int(np.flatnonzero(self._kept)[block])
+        end = int(self._first[at + 1]) if at + 1 < len(self._first) else len(self._seen)
+        return slice(int(self._first[at]), end)
+
     def mean(self, values: Array) -> Array:
         """Block means (..., b) of samples (..., n), missing samples left out.
 

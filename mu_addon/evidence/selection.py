@@ -44,7 +44,7 @@ PROMISING = 4.0
 LAW = 0.05
 # Rivals of a cause that are fitted by all laws of their mechanisms: so many, that take this share of
 # what the cause takes by their first law.
-NEAREST, WORTH_LAWS = 2, 0.5
+NEAREST, WORTH_LAWS = 3, 0.5
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
@@ -343,26 +343,30 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     """A selection of the effects that take nearly all of a misfit, though structure is left; None without.
 
     Their law may be another than the library's. Several: see `_mainly_several`. A single one must take
-    `MAINLY` of the misfit, leave a tenth of what any other effect leaves in its place, predict left-out
-    experiments better, rest on no single experiment, have no value at a bound but its null, and do better
-    than a step change.
+    `MAINLY` of the misfit, predict left-out experiments better, rest on no single experiment, have no value
+    at a bound but its null, and do better than a step change. Any other effect must leave ten times as much
+    in its place; those that leave less are its rivals where they take `MAINLY` of the misfit too.
     """
     if len(found.causes) > 1 and _mainly_several(fitter, found):
         return found
     if not found.singles:
         return None
     best, base = found.singles[0], found.base
-    left = 1.0 - share_taken(fitter, base, best)
-    others = [f for f in found.singles if f.names != best.names]
-    rival = min((1.0 - share_taken(fitter, base, f) for f in others), default=1.0)
-    if left > 1.0 - MAINLY or rival < APART * max(left, 1e-6) or at_a_bound(best):
+    left = max(1.0 - share_taken(fitter, base, best), 1e-6)
+    others: dict[str, float] = {}
+    for f in found.singles:
+        if f.names != best.names:
+            own = 1.0 - share_taken(fitter, base, f)
+            others[f.effects[0].title] = min(own, others.get(f.effects[0].title, own))
+    near = sorted((title for title, own in others.items() if own < APART * left), key=lambda n: others[n])
+    if left > 1.0 - MAINLY or any(others[n] > 1.0 - MAINLY for n in near) or at_a_bound(best):
         return None
     shares = _share_by_experiment(fitter, best)
     if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
         return None
     if sudden(found.table_base, base, best) or curved_reading(fitter, base, best):
         return None
-    cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, ())
+    cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, tuple(near))
     table = tuple(strict_table(fitter, best))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
 
@@ -378,16 +382,32 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
         return False
     left, taken = max(chosen.chi2 - len(fitter.record), 0.0), base.chi2 - chosen.chi2
     for c in found.causes:
-        # So near a rival would have been told (`causes_of`).
-        near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
-        if left > (1.0 - MAINLY) * c.loss or APART * left > near:
+        if left > (1.0 - MAINLY) * c.loss:
             return False
         others = [e for e in chosen.effects if e is not c.effect]
+        # So near a rival would have been told (`causes_of`).
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
+        if APART * left > near and _any_within(fitter, found, others, APART * left):
+            return False
         last = fitter.fit([*others, c.effect], chosen.values)
         shares = _share_by_experiment(fitter, last)
         if len(shares) > 1 and max(shares.values()) > ALONE:
             return False
     return True
+
+
+def _any_within(fitter: Fitter, found: Selection, others: Sequence[Effect], margin: float) -> bool:
+    """Whether another effect beside the others comes within a margin of chi squared of the chosen model."""
+    chosen = found.chosen
+    less = fitter.best(others, [chosen.values])
+    for f in found.singles:
+        e = f.effects[0]
+        if e.name in chosen.names or not _promises(fitter, less, e):
+            continue
+        more = fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()])
+        if more.chi2 - chosen.chi2 < margin:
+            return True
+    return False
 
 
 def at_a_bound(fit: Fit) -> bool:
@@ -664,10 +684,11 @@ def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fi
     """
     found = ranked(rivals)
     reach = chosen.chi2 + (1.0 - WORTH_LAWS) * (less.chi2 - chosen.chi2)
+    lawful = {law.name for law in fitter.simulator.refinements}
     names: dict[str, int] = {}
     for i, f in enumerate(found):
         name = f.effects[-1].name
-        if name not in names and len(names) < NEAREST and f.chi2 < reach:
+        if name in lawful and name not in names and len(names) < NEAREST and f.chi2 < reach:
             names[name] = i
     for i in names.values():
         found[i] = refined(fitter, found[i])

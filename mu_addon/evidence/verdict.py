@@ -17,6 +17,8 @@ from .fit import Fit, Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
+from .outliers import NAME as OUTLIER
+from .outliers import without_outliers
 from .owned import further_owners, select_owned
 from .plausibility import require_plausible
 from .pooled import select_pooled
@@ -46,6 +48,8 @@ STRAINED = 5.0
 RENEWED = 1.5
 # Times that causes are selected anew under noise that is quieter around those found before.
 QUIETER = 2
+# Times that readings which alone stand out are set aside.
+ROUNDS = 3
 
 
 @attrs.frozen(eq=False)
@@ -57,7 +61,8 @@ class Verdict:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
     the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). refused: why
     models that were tried have no prediction, by the titles of their effects. share_taken: of the base
-    model's misfit by the chosen one; a verdict `named` may leave structure (`selection.mainly`).
+    model's misfit by the chosen one; a verdict `named` or `ambiguous` may leave structure
+    (`selection.mainly`).
     `as_json` is the content of verdict.json.
     """
 
@@ -244,9 +249,29 @@ def diagnose(
                 chosen = one_more(fitter, seen, chosen, progress)
             if _kind(fitter, chosen) == "unexplained" and not owned:
                 chosen, seen = select_owned(fitter, seen, chosen, progress)
+    before = experiments, set_aside, fitter, base, seen, chosen
+    for _ in range(ROUNDS):
+        if OUTLIER not in chosen.left or chosen.doubted:
+            break
+        experiments, more = without_outliers(experiments, fitter, chosen.chosen, len(chosen.table))
+        if not more:
+            break
+        set_aside = [*set_aside, *more]
+        if chosen.causes:
+            fitter = Fitter(_measured(experiments, again, simulator), simulator, sources)
+            base = fitter.fit()
+        else:
+            measured, fitter, base = _base(experiments, again, simulator)
+        seen = _seen(fitter, base)
+        chosen = reselected(fitter, seen, chosen) if chosen.causes else select(fitter, seen, progress)
+    if chosen.left or chosen.doubted:
+        # They were not all that was wrong.
+        experiments, set_aside, fitter, base, seen, chosen = before
+    measured, sources = fitter.record, fitter.sources
     kind = _kind(fitter, chosen)
     if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
-        kind, chosen = "named", most
+        chosen = most
+        kind = "ambiguous" if any(c.rivals for c in chosen.causes) else "named"
     progress("gain")
     gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
     set_aside += [
@@ -278,12 +303,20 @@ def _base(
     experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
 ) -> tuple[Record, Fitter, Fit]:
     """The record of what is fitted, a fitter with its noise, and the fit without effects."""
-    measured = record([e for e in experiments if e.role == "fit"], simulator)
-    if again:
-        other = {e.name: e for e in again}
-        measured = attrs.evolve(measured, again=tuple(other[e.name] for e in measured.experiments))
+    measured = _measured(experiments, again, simulator)
     fitter = Fitter(measured, simulator, noise_of(measured, simulator))
     return measured, fitter, fitter.fit()
+
+
+def _measured(
+    experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
+) -> Record:
+    """The record of what is fitted, with what a second reading of its gauges would have driven it by."""
+    found = record([e for e in experiments if e.role == "fit"], simulator)
+    if not again:
+        return found
+    other = {e.name: e for e in again}
+    return attrs.evolve(found, again=tuple(other[e.name] for e in found.experiments))
 
 
 def _among(effect: Effect) -> dict[str, Any] | None:

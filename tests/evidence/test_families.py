@@ -3,6 +3,7 @@ that a second code made by another one.
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,17 +12,21 @@ from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
 from mu_addon.evidence.effect import Parameter
+from mu_addon.evidence.prediction.amplifier import filtered
 from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
+from mu_addon.evidence.prediction.hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
 from mu_addon.evidence.prediction.instants import finer
 from mu_addon.evidence.prediction.step import PressureStep
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+from mu_addon.evidence.prediction.yielding import yielded
 from mu_addon.evidence.ringing import swinging
 from mu_addon.evidence.selection import _bounded
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
+from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic, bench
 
-BATTERY = 7711
+BATTERY, LATER = 7711, 251126
 
 
 def test_two_volumes_of_a_line_fill_one_after_the_other():
@@ -44,6 +49,101 @@ def test_two_volumes_of_a_line_fill_one_after_the_other():
     # Without a second volume it is the first law.
     alone = in_the_chambers(t, p, {"line_lag.slower_s": 0.2, "line_lag.faster_share": 0.0})
     np.testing.assert_allclose(alone, in_the_chambers(t, p, {"line_lag.time_s": 0.2}), atol=1e-12)
+
+
+def test_one_element_yields_as_wen_has_it():
+    """His differential equation, solved as such, over loops that turn before and after it yields."""
+    from scipy.integrate import solve_ivp
+
+    way = np.concatenate([np.linspace(a, b, 60) for a, b in pairwise((0.0, 0.06, -0.02, 0.09, 0.03, 0.0))])
+    values = {
+        "rate_independent_hysteresis.bouc_wen_share": 0.4,
+        "rate_independent_hysteresis.bouc_wen_per_strain": 25.0,
+        "rate_independent_hysteresis.bouc_wen_power": 1.7,
+    }
+
+    def law(e):
+        return 900.0 * e + 2000.0 * e**3
+
+    z, borne = 0.0, [0.0]
+    for before, now in pairwise(way):
+        sign = np.sign(now - before)
+
+        def grows(_, z, sign=sign):
+            return sign * (1.0 - 0.5 * (1.0 + sign * np.sign(z)) * np.abs(z) ** 1.7)
+
+        z = (
+            solve_ivp(grows, (0.0, 25.0 * abs(now - before)), [z], rtol=1e-9, atol=1e-11).y[0, -1]
+            if sign
+            else z
+        )
+        borne.append(z)
+    np.testing.assert_allclose(
+        yielded(way, law, values), 0.6 * law(way) + 0.4 * 900.0 * np.array(borne) / 25.0, atol=0.02
+    )
+    assert yielded(way, law, {}) == pytest.approx(law(way))
+
+
+@pytest.mark.parametrize("damping", [0.71, 0.87, 0.999])
+def test_a_filter_of_two_poles_is_that_of_its_transfer_function(damping):
+    from scipy.signal import TransferFunction, lsim
+
+    t = np.linspace(0.0, 6.0, 301)
+    force = np.interp(t, [0.0, 1.0, 2.0, 3.5, 6.0], [0.0, 0.0, 5.0, 1.0, 1.0])
+    w = 2.0 * np.pi / 0.8
+    _, found, _ = lsim(TransferFunction([w * w], [1.0, 2.0 * damping * w, w * w]), force, t)
+    values = {"force_lag.period_s": 0.8, "force_lag.damping": damping}
+    np.testing.assert_allclose(filtered(t, force, values), found, atol=1e-9)
+
+
+def test_a_leak_that_ends_leaves_the_pressure_that_it_had_then():
+    t = np.linspace(0.0, 200.0, 401)
+    whole = chamber_pressure(t, 150.0, loss_per_s=2e-3)
+    found = chamber_pressure(t, 150.0, loss_until_tight_per_s=2e-3, tight_s=80.0)
+    np.testing.assert_allclose(found[t < 78], whole[t < 78], atol=1e-3)
+    np.testing.assert_allclose(found[t > 82], whole[t == 80.0][0], atol=2e-3)
+
+
+def test_a_chamber_creeps_as_a_power_of_time():
+    """Gas that keeps its temperature: p V stays, with the volume that Findley's law has."""
+    t = np.linspace(0.0, 300.0, 301)
+    p = chamber_pressure(t, 200.0, findley_per_kPa=1e-4, findley_power=0.3)
+    volume = 1.0 + 1e-4 * p * (t / 100.0) ** 0.3
+    np.testing.assert_allclose((p + ATMOSPHERE_kPa) * volume, 200.0 + ATMOSPHERE_kPa, rtol=1e-6)
+
+
+def test_gas_cools_to_the_wall_and_with_the_wall():
+    t = np.linspace(0.0, 400.0, 401)
+    p = chamber_pressure(t, 100.0, cooling_per_kPa=0.05, rates=(10.0, 0.3, 6.0))
+    warm = 5.0 * (0.7 * np.exp(-t / 10.0) + 0.3 * np.exp(-t / 60.0))
+    expected = (100.0 + ATMOSPHERE_kPa) * (ROOM_K + warm) / (ROOM_K + 5.0) - ATMOSPHERE_kPa
+    np.testing.assert_allclose(p, expected, atol=1e-6)
+
+
+def test_what_pressure_did_while_samples_were_lost_is_free():
+    """A step in the middle of lost samples, early or late: its mean is a nuisance, and nothing else moves."""
+    time = np.delete(np.linspace(0.0, 2.0, 81), [20, 21, 22])
+    p = np.where(time > 0.52, 20.0, 0.0)
+    e = bench.experiment("pressure_step", {"time_s": time, "pressure_kPa": p, "angle_deg": 0.0 * time})
+    simulator = PressureStep([analytic.response()], [e])
+    (mean,) = [q for q in simulator.nuisances if q.name.startswith("mean_pressure")]
+    assert mean.experiment == e.name
+    assert mean.null == 0.0
+    still = simulator.predict(e, {})
+    # Without a memory what comes after does not know.
+    np.testing.assert_allclose(simulator.predict(e, {mean.name: 0.3}), still, atol=1e-12)
+    swings = {"inertia.period_s": 0.5, "inertia.damping": 0.1}
+    # A chord's mean is that of a step in its middle; one a quarter of the gap earlier has a quarter more.
+    fine = np.unique(np.round(np.concatenate([np.linspace(0.0, 2.0, 4001), time]), 9))
+    gap = time[20] - time[19]
+    early = np.where(fine > time[19] + 0.25 * gap, 20.0, 0.0)
+    exact = bench.experiment("pressure_step", {"time_s": fine, "pressure_kPa": early, "angle_deg": 0 * fine})
+    there = PressureStep([analytic.response()], [exact]).predict(exact, swings)[
+        :, np.searchsorted(fine, time)
+    ]
+    after = time > 0.7
+    free, chord = (simulator.predict(e, {**swings, mean.name: v})[:, after] for v in (0.25, 0.0))
+    assert np.abs(free - there[:, after]).max() < 0.15 * np.abs(chord - there[:, after]).max()
 
 
 def stepped(time):
@@ -118,9 +218,9 @@ def test_a_time_below_a_second_is_not_at_its_bound():
     assert _bounded(share, 0.7)
 
 
-def judged(tmp_path, part, number):
-    """The verdict on a set of the battery, and what is hidden in it."""
-    of = order(part, number, BATTERY)
+def judged(tmp_path, part, number, battery=BATTERY):
+    """The verdict on a set of a battery, and what is hidden in it."""
+    of = order(part, number, battery)
     write(tmp_path / "measured", made(of))
     experiments = read_folder(tmp_path / "measured").experiments
     return of, diagnose(experiments, simulator_of(experiments))
@@ -152,3 +252,50 @@ def test_a_mechanism_is_named_whatever_its_law(tmp_path, part, number):
     of, verdict = judged(tmp_path, part, number)
     assert (verdict.kind, set(verdict.names)) == ("named", set(of.truth)), verdict.selection.left
     assert all(math.isfinite(v) for ends in verdict.intervals.values() for v in ends)
+
+
+@pytest.mark.parametrize("number", [52, 76])
+def test_no_reading_that_is_wrong_decides_a_verdict(tmp_path, number):
+    """A reading by 12 standard deviations off while a coupon is unloaded, one by 25 as a unit is let go."""
+    _, verdict = judged(tmp_path, "clean", number, LATER)
+    assert verdict.kind == "none", verdict.selection.left
+    assert any("farther from the fit" in said for said in verdict.set_aside)
+
+
+def test_effects_that_leave_equally_little_are_told_as_a_choice(tmp_path):
+    """A lag of the air line, with samples lost at a step, where a load cell does as well."""
+    of, verdict = judged(tmp_path, "single", 44, LATER)
+    assert verdict.kind == "ambiguous"
+    assert {*of.truth, "force_lag"} <= verdict.ambiguity
+    assert verdict.selection.left
+    headline, said = sentence(verdict)
+    assert headline.startswith("mainly line lag")
+    assert "nearly all" in said
+
+
+def test_a_leak_that_ends_is_not_taken_for_warmth(tmp_path):
+    """A valve that is tight after 133 s: cooling alone was named."""
+    _, verdict = judged(tmp_path, "outside", 10, LATER)
+    assert verdict.kind == "ambiguous"
+    assert {"leak", "temperature_drift"} <= verdict.ambiguity
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "number"),
+    [
+        # A wall that creeps by the third root of time, and gas that cools with its wall.
+        ("single", 80),
+        ("single", 79),
+        # A load cell's filter of two poles, and Bouc and Wen's friction.
+        ("single", 11),
+        ("single", 51),
+        # Samples lost while a step was made.
+        ("single", 42),
+        # Cells that close, and a resin that creeps: one hundredth of a hundredth remains.
+        ("two", 5),
+    ],
+)
+def test_another_law_of_a_mechanism_is_named(tmp_path, part, number):
+    of, verdict = judged(tmp_path, part, number, LATER)
+    assert (verdict.kind, set(verdict.names)) == ("named", set(of.truth)), verdict.selection.left

@@ -1,4 +1,4 @@
-"""Drift of an instrument's zero while it records: one mechanism, by three laws."""
+"""Drift of an instrument's zero while it records: one mechanism, by four laws."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ def drifts(name: str, unit: str, most: float, kind: str, experiments: Sequence[E
     """The laws of a zero that drifts, as effects of one name for a kind; none without a clock.
 
     most: largest size of the drift within a record, in `unit`. Zeros drift alike in every record, from its
-    beginning: linearly, as the logarithm of time, or settling as an exponential.
+    beginning: linearly, as the logarithm of time, settling as an exponential or, where one of these is found,
+    as a power of time (heat that spreads: its root).
     """
     clocks = [e["time_s"] for e in experiments if e.kind == kind and "time_s" in e.columns and len(e) > 1]
     lasts = max((float(t[-1] - t[0]) for t in clocks), default=0.0)
@@ -39,13 +40,23 @@ def drifts(name: str, unit: str, most: float, kind: str, experiments: Sequence[E
         Effect(name, (size("per_hour", f"{unit}/h", most * 3600.0 / lasts),), (kind,)),
         Effect(name, (size("per_decade", unit, most), time("onset_s")), (kind,)),
         Effect(name, (size("settled", unit, most), time("settling_s")), (kind,)),
+        Effect(
+            name,
+            (
+                size("over_100_s", unit, most * max(1.0, 100.0 / lasts)),
+                Parameter("power", "", 0.1, 2.0, 0.5, (0.5,), "heat that spreads 0.5, a steady rate 1"),
+            ),
+            (kind,),
+            refines=True,
+        ),
     ]
 
 
 def drift(name: str, time_s: Array, values: Mapping[str, float]) -> Array | float:
     """Drift (n,) of a zero at times (n,) in s since the record's first, in the unit of its effect; 0 without.
 
-    values: by "effect.parameter", see `drifts`. The sum of r t, a log10(1 + t/onset), b (1 - exp(-t/time)).
+    values: by "effect.parameter", see `drifts`. The sum of r t, a log10(1 + t/onset), b (1 - exp(-t/time))
+    and c (t/100 s)^n.
     """
     get = values.get
     found: Array | float = 0.0
@@ -56,6 +67,8 @@ def drift(name: str, time_s: Array, values: Mapping[str, float]) -> Array | floa
         found = found + per_decade * np.log10(1.0 + t / get(f"{name}.onset_s", NULL_s))
     if settled := get(f"{name}.settled", 0.0):
         found = found - settled * np.expm1(-t / get(f"{name}.settling_s", NULL_s))
+    if over := get(f"{name}.over_100_s", 0.0):
+        found = found + over * (t / 100.0) ** get(f"{name}.power", 0.5)
     return found
 
 

@@ -27,6 +27,8 @@ SUPPLY_K = 5.0
 CHOKED = (2 / (AIR_GAMMA + 1)) ** (AIR_GAMMA / (AIR_GAMMA - 1))
 # Creep is spread over these decades after its onset.
 DECADES = 6
+# Parameters of cooling at two rates beside its size, and their values where none are given.
+_TWO_RATES = {"first_s": 10.0, "later_share": 0.0, "later_times": 6.0}
 # The readings of this time tell where a hold begins, to within this share of the absolute pressure.
 BEGINNING_s, NEAR = 1.0, 0.01
 
@@ -55,6 +57,16 @@ EFFECTS = (
         "gas flows out through a hole, choked where the pressure inside is 1.9 times that outside",
     ),
     Effect(
+        "leak",
+        (
+            Parameter("loss_until_tight_per_s", "1/s", 0.0, 0.2, 0.0, (3e-4, 0.01), "as long as it lasts"),
+            Parameter("tight_s", "s", 0.5, 3600.0, 60.0, (30.0, 100.0), "when a seal or a valve has closed"),
+        ),
+        (KIND,),
+        "gas flows out until a seal or a valve has closed",
+        refines=True,
+    ),
+    Effect(
         "viscoelasticity",
         (
             Parameter(
@@ -79,6 +91,18 @@ EFFECTS = (
         "the wall creeps under pressure, so the chamber grows by as much in each decade of time",
     ),
     Effect(
+        "viscoelasticity",
+        (
+            Parameter(
+                "findley_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's growth in the first 100 s"
+            ),
+            Parameter("findley_power", "", 0.05, 0.8, 0.3, (0.3,), "plastics 0.1 to 0.5 (Findley 1944)"),
+        ),
+        (KIND,),
+        "the wall creeps under pressure, so the chamber grows as a power of time",
+        refines=True,
+    ),
+    Effect(
         "temperature_drift",
         (
             Parameter("cooling_K", "K", -40.0, 120.0, 0.0, (-3.0, 3.0), "compressed gas is warm"),
@@ -95,6 +119,18 @@ EFFECTS = (
         ),
         (KIND,),
         "gas cools that was compressed faster than it gives off its heat, the more the higher its pressure",
+    ),
+    Effect(
+        "temperature_drift",
+        (
+            Parameter("cooling_K_per_100_kPa", "K", 0.0, 60.0, 0.0, (3.0,), "without any loss of heat 64 K"),
+            Parameter("first_s", "s", 0.5, 600.0, 10.0, (5.0, 20.0), "to the temperature of the wall"),
+            Parameter("later_share", "", 0.0, 0.9, 0.0, (0.3,), "of the cooling that waits for the wall"),
+            Parameter("later_times", "", 1.5, 60.0, 6.0, (6.0,), "as long takes the wall to the room's"),
+        ),
+        (KIND,),
+        "the gas cools to the temperature of the wall, and more slowly with the wall to that of the room",
+        refines=True,
     ),
     *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("pressure_offset", "pressure_gain")),
 )
@@ -147,15 +183,21 @@ class ChamberPressure:
             loss_per_s=get("leak.loss_per_s", 0.0),
             inertia=get("leak.inertia", 0.0),
             hole_per_s=get("leak.hole_per_s", 0.0),
+            loss_until_tight_per_s=get("leak.loss_until_tight_per_s", 0.0),
+            tight_s=get("leak.tight_s", 60.0),
             creep_per_kPa=1e-3 * get("viscoelasticity.creep_per_MPa", 0.0),
             onset_s=get("viscoelasticity.onset_s", 1.0),
             growth_per_kPa=1e-3 * get("viscoelasticity.growth_per_MPa", 0.0),
             begins_s=get("viscoelasticity.begins_s", 30.0),
+            findley_per_kPa=1e-3 * get("viscoelasticity.findley_per_MPa", 0.0),
+            findley_power=get("viscoelasticity.findley_power", 0.3),
             cooling_K=get("temperature_drift.cooling_K", 0.0),
             cooling_s=get("temperature_drift.cooling_s", 30.0),
             warmth=get("temperature_drift.warmth", 0.0),
             cools_s=get("temperature_drift.cools_s", 30.0),
             compliance_per_kPa=self._compliance,
+            cooling_per_kPa=0.01 * get("temperature_drift.cooling_K_per_100_kPa", 0.0),
+            rates=[get(f"temperature_drift.{k}", v) for k, v in _TWO_RATES.items()],
         )
         p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
         p = p + drift("pressure_drift", experiment["time_s"], values)
@@ -203,38 +245,49 @@ def chamber_pressure(
     loss_per_s: float = 0.0,
     inertia: float = 0.0,
     hole_per_s: float = 0.0,
+    loss_until_tight_per_s: float = 0.0,
+    tight_s: float = math.inf,
     creep_per_kPa: float = 0.0,
     onset_s: float = 1.0,
     growth_per_kPa: float = 0.0,
     begins_s: float = 30.0,
+    findley_per_kPa: float = 0.0,
+    findley_power: float = 0.3,
     cooling_K: float = 0.0,
     cooling_s: float = 30.0,
     warmth: float = 0.0,
     cools_s: float = 30.0,
     compliance_per_kPa: float = 0.0,
+    cooling_per_kPa: float = 0.0,
+    rates: Sequence[float] = (10.0, 0.0, 6.0),
 ) -> Array:
     """Gauge pressure (n,) in kPa at times (n,) in s after the valve was shut.
 
     Up to then it is initial_kPa. loss_per_s: k in 1/s; inertia: b, Forchheimer's, no unit; creep_per_kPa: c
     in 1/kPa; onset_s: onset of creep; growth_per_kPa, begins_s: creep as the logarithm of time, g and its
-    onset s; cooling_K, cooling_s: excess temperature of the gas at the start and
-    its time constant; warmth, cools_s: that excess as a share of what compression to this pressure without
-    loss of heat makes, and its time constant; compliance_per_kPa: C in 1/kPa. With P absolute, P0 the
-    atmosphere, V and T relative to the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where
-    x + b x^2 = (P^2 - P0^2)/(2 P0^2), so
-    that a small overpressure falls by exp(-k t), and a large b makes it nearly the flow of an orifice.
-    hole_per_s: h in 1/s of such a flow itself, P_i dm/dt = -h P0 f(P/P0) (`_through_a_hole`). The volume is
+    onset s; findley_per_kPa, findley_power: creep as a power of time, its growth f in 100 s in 1/kPa and its
+    exponent n; cooling_K, cooling_s: excess temperature of the gas at the start and its time constant;
+    warmth, cools_s: that excess as a share of what compression to this pressure without loss of heat makes,
+    and its time constant; cooling_per_kPa: excess temperature in K of each kPa, and by `rates` its first time
+    constant in s, the share that cools later, and its time constant over the first; compliance_per_kPa: C in
+    1/kPa. With P absolute, P0 the atmosphere, V and T
+    relative to the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where
+    x + b x^2 = (P^2 - P0^2)/(2 P0^2), so that a small overpressure falls by exp(-k t), and a large b makes it
+    nearly the flow of an orifice. hole_per_s: h in 1/s of such a flow itself, P_i dm/dt = -h P0 f(P/P0)
+    (`_through_a_hole`). loss_until_tight_per_s: k of a laminar flow that ends at tight_s, in s. The volume is
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
-    + g p log10(1 + t/s).
+    + g p log10(1 + t/s) + f p (t/100 s)^n.
     """
     from scipy.interpolate import CubicSpline
 
     end = float(time_s[-1])
-    if not (loss_per_s or hole_per_s or creep_per_kPa or growth_per_kPa or cooling_K or warmth) or end <= 0:
+    leaks = loss_per_s or hole_per_s or loss_until_tight_per_s
+    creeps = creep_per_kPa or growth_per_kPa or findley_per_kPa
+    if not (leaks or creeps or cooling_K or warmth or cooling_per_kPa) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
     start = initial_kPa + ATMOSPHERE_kPa
     # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
-    steps = int(np.clip(4 * end * max(loss_per_s, hole_per_s) * start / ATMOSPHERE_kPa, 200, 20000))
+    steps = int(np.clip(4 * end * leaks * start / ATMOSPHERE_kPa, 200, 20000))
     t = np.linspace(0.0, end, 2 * steps + 1)
     warm = np.ones_like(t)
     if cooling_K:
@@ -242,6 +295,11 @@ def chamber_pressure(
     if warmth:
         excess_K = warmth * _adiabatic_K(start / ATMOSPHERE_kPa)
         warm += excess_K * np.expm1(-t / cools_s) / (ROOM_K + excess_K)
+    if cooling_per_kPa:
+        first_s, later, times = rates
+        excess_K = cooling_per_kPa * initial_kPa
+        cooled = (1.0 - later) * np.expm1(-t / first_s) + later * np.expm1(-t / (times * first_s))
+        warm += excess_K * cooled / (ROOM_K + excess_K)
     p, grown = np.full_like(t, initial_kPa), np.zeros_like(t)
     for _ in range(50):
         before = p
@@ -252,17 +310,27 @@ def chamber_pressure(
             )
         elif growth_per_kPa:
             grown = growth_per_kPa * p * np.log10(1.0 + t / begins_s)
+        elif findley_per_kPa:
+            grown = findley_per_kPa * p * (t / 100.0) ** findley_power
         gas = np.ones_like(t)
-        flow = partial(_seeping, loss_per_s, inertia)
+        flow = partial(_seeping, loss_per_s or loss_until_tight_per_s, inertia)
         if hole_per_s:
             flow = partial(_through_a_hole, hole_per_s)
-        if loss_per_s or hole_per_s:
+        if leaks:
             gas = _lost(t, warm, grown, start, flow, compliance_per_kPa)
+        if loss_until_tight_per_s and tight_s < end:
+            gas = np.interp(np.minimum(t, tight_s), t, gas)
         p = _pressure(start, gas * warm, grown, compliance_per_kPa) - ATMOSPHERE_kPa
-        if not (creep_per_kPa or growth_per_kPa) or np.abs(p - before).max() < 1e-8 * start:
+        if not creeps or np.abs(p - before).max() < 1e-8 * start:
             break
-    found = np.full(len(time_s), p[0])
-    found[time_s > 0] = CubicSpline(t, p)(time_s[time_s > 0])
+    found, after = np.full(len(time_s), p[0]), time_s > 0
+    found[after] = CubicSpline(t, p)(time_s[after])
+    if findley_per_kPa:
+        # A power below 1 begins with no finite slope, which no spline follows.
+        amount = CubicSpline(t, gas * warm)(time_s[after])
+        for _ in range(50):
+            grown = findley_per_kPa * found[after] * (time_s[after] / 100.0) ** findley_power
+            found[after] = _pressure(start, amount, grown, compliance_per_kPa) - ATMOSPHERE_kPa
     return found
 
 

@@ -12,10 +12,11 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
+from .amplifier import filtered, filters
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import decades_lag, first_order_lag, spread_lag
 from .unit import REFERENCE_C, RELAXING, SPREADING, TIMED
-from .yielding import elastic_strain, yielding
+from .yielding import bouc_wen, elastic_strain, yielded, yielding
 
 Array = np.ndarray[Any, Any]
 # Stress (n,) in kPa of strain (n,) at rest: 0 at 0, and rising.
@@ -35,7 +36,6 @@ _MOST = 200
 STRAIGHT = 0.2
 # Strain up to which a preload is looked for.
 FARTHEST = 0.5
-FILTER = Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s")
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
 _TIMED = {e.name: e.parameters for e in TIMED}
 # Another law of Mullins softening, by the largest strain so far, tried where the first is found.
@@ -78,6 +78,7 @@ def machine(kind: str) -> tuple[Effect, ...]:
             refines=True,
         ),
         yielding(kind),
+        bouc_wen(kind),
         Effect(
             "anisotropy",
             # One for x and y alike: with one each, an axis left out could not be predicted from the others.
@@ -170,7 +171,7 @@ def load_cell(experiments: Sequence[Experiment], kind: str) -> tuple[Effect, ...
         return ()
     largest_N = max(largest_reading("stress_kPa", kind, [e]) / _kPa_per_N(e) for e in timed)
     wandering = drifts("force_drift", "N", ZERO_SHARE * largest_N, kind, timed)
-    return (*wandering, Effect("force_lag", (FILTER,), (kind,)))
+    return (*wandering, *filters(kind))
 
 
 def _kPa_per_N(experiment: Experiment) -> float:
@@ -191,7 +192,7 @@ def recorded(
     """
     found = _borne(experiment, law, values, past)
     if "time_s" in experiment.columns:
-        found = first_order_lag(experiment["time_s"], found, values.get("force_lag.time_s", 0.0))
+        found = filtered(experiment["time_s"], found, values)
         found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
     zero = values.get(_zero(experiment), 0.0)
     return found + zero if zero else found
@@ -279,7 +280,7 @@ def _remembering(
 ) -> Array:
     """Stress (n,) of a specimen whose strain (n,) is known, with what it remembers of earlier strain."""
     strain = elastic_strain(strain, values)
-    stress = law(strain)
+    stress = yielded(strain, law, values)
     if softening := values.get("mullins_softening.softening", 0.0):
         from scipy.special import erf
 

@@ -1,9 +1,10 @@
-"""A material that yields, as elements side by side do that slide at strains of their own (Ishlinskii)."""
+"""A material that yields: elements side by side that slide at strains of their own (Ishlinskii), or one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ Array = np.ndarray[Any, Any]
 
 NAME = "rate_independent_hysteresis"
 _HARDENING = 0.1
+# Strain at which a law's first slope is taken.
+_SMALL = np.array([1e-4])
+# Of Bouc and Wen's first loading curve, in yield strains: beyond it has its end to rounding.
+_FARTHEST = 40.0
 
 
 def yielding(kind: str) -> Effect:
@@ -37,6 +42,30 @@ def yielding(kind: str) -> Effect:
         (kind,),
         "the material yields: part of its strain stays after unloading, however slow the test",
         "loops to several strains, to zero stress and at two rates a decade apart",
+    )
+
+
+def bouc_wen(kind: str) -> Effect:
+    """Another law of `yielding`, tried where that one is found: one element that yields gradually."""
+    return Effect(
+        NAME,
+        (
+            Parameter("bouc_wen_share", "", 0.0, 0.99, 0.0, (0.3,), "that yields: 0.1 to 0.99"),
+            Parameter(
+                "bouc_wen_per_strain",
+                "",
+                1.0,
+                200.0,
+                30.0,
+                (10.0, 40.0),
+                "1 over the strain at which it yields: glassy polymers 0.02 to 0.1",
+            ),
+            Parameter("bouc_wen_power", "", 0.5, 8.0, 1.0, (1.5,), "n of Wen 1976: large is abrupt"),
+        ),
+        (kind,),
+        "the material yields at one strain, more or less abruptly, and unloads elastically",
+        "loops to several strains, to zero stress and at two rates a decade apart",
+        refines=True,
     )
 
 
@@ -75,3 +104,62 @@ def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
         last, elastic = e, first(e) if len(turns) == 1 else then + 2.0 * first(0.5 * (e - at))
         found.append(elastic)
     return np.array(found)
+
+
+def yielded(strain: Array, law: Callable[[Array], Array], values: Mapping[str, float]) -> Array:
+    """Stress (n,) by a law of strain of which a share yields as one element does, if any (`bouc_wen`).
+
+    strain (n,): of a new specimen in the order it was strained. With the law's stress s and its first slope
+    k, (1 - a) s + a k m z, where a is the share, m the yield strain, and dz/de is (1 - |z|^n)/m while |z|
+    grows and 1/m while it falls (Wen, J. Eng. Mech. 102 (1976) 249, with beta = gamma).
+    """
+    stress = law(strain)
+    share = values.get(f"{NAME}.bouc_wen_share", 0.0)
+    if not share:
+        return stress
+    per_strain = values.get(f"{NAME}.bouc_wen_per_strain", 30.0)
+    borne = _borne_by_one(per_strain * strain, values.get(f"{NAME}.bouc_wen_power", 1.0)) / per_strain
+    return np.asarray((1.0 - share) * stress + share * law(_SMALL) / _SMALL * borne)
+
+
+def _borne_by_one(x: Array, power: float) -> Array:
+    """z (n,) of Bouc and Wen's element at strains x (n,) in yield strains, in the order of loading.
+
+    Any stretch in one direction is exact, however long: elastic until z is 0, then along the curve of first
+    loading, whose strain x = int_0^z du/(1 - u^n) is tabulated.
+    """
+    way, height = _first_loading(power)
+    z, before, found = 0.0, 0.0, []
+    for now in x.tolist():
+        step, before = now - before, now
+        if z * step < 0.0:
+            # Back to zero elastically, as far as the step goes.
+            back = min(abs(step), abs(z))
+            z += math.copysign(back, step)
+            step -= math.copysign(back, step)
+        if step:
+            along = float(np.interp(abs(z), height, way)) + abs(step)
+            z = math.copysign(float(np.interp(along, way, height)), step)
+        found.append(z)
+    return np.array(found)
+
+
+@lru_cache(maxsize=16)
+def _first_loading(power: float) -> tuple[Array, Array]:
+    """Strains in yield strains and z of first loading, both ascending: dz/dx = 1 - z^n from 0."""
+    from scipy.integrate import solve_ivp
+
+    at = np.concatenate([np.linspace(0.0, 4.0, 800, endpoint=False), np.linspace(4.0, _FARTHEST, 400)])
+    found = solve_ivp(
+        lambda _, z: 1.0 - np.clip(z, 0.0, 1.0) ** power,
+        at[[0, -1]],
+        [0.0],
+        "LSODA",
+        at,
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    height = np.minimum(found.y[0], 1.0)
+    # `interp` wants them to ascend; at the end z is 1 to rounding.
+    height += 1e-12 * np.arange(len(at))
+    return at, height

@@ -68,21 +68,18 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         names = listed([readable(c.effect.title) for c in found.causes])
         if not found.left:
             return names, " ".join(sizes)
-        rest = listed([readable(n) for n in found.left])
-        sizes.append(
-            f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
-            f"depends on {rest}: the effect may follow another law, or something small acts beside it, so "
-            "the intervals are too narrow."
-        )
-        return f"mainly {names}", " ".join(sizes)
+        return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
     if verdict.kind == "ambiguous":
         choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
-        return (
-            " and ".join(choices),
+        said = (
             "The model is wrong. Each of these effects explains the data, and these data do not "
-            f"distinguish them. Fitted values: {'; '.join(sizes)}.",
+            f"distinguish them. Fitted values: {'; '.join(sizes)}."
         )
+        if not found.left:
+            return " and ".join(choices), said
+        said = said.replace("explains the data", "explains nearly all of the data")
+        return f"mainly {' and '.join(choices)}", f"{said} {_what_remains(verdict)}"
     if verdict.kind == "none":
         return (
             "no model error detected",
@@ -108,6 +105,16 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     return (
         "unexplained by any known effect",
         f"The model is wrong, and no effect of the library explains it. {tried}".strip(),
+    )
+
+
+def _what_remains(verdict: Verdict) -> str:
+    """What is left of the misfit where structure remains beside what takes nearly all of it."""
+    rest = listed([readable(n) for n in verdict.selection.left])
+    return (
+        f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
+        f"depends on {rest}: the effect may follow another law, or something small acts beside it, so "
+        "the intervals are too narrow."
     )
 
 

@@ -1,0 +1,42 @@
+"""What the amplifier of a load cell does: it averages, and so delays what is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..effect import Effect, Parameter
+from ..ringing import swinging
+from .effective_pressure import first_order_lag
+
+Array = np.ndarray[Any, Any]
+
+FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
+# Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.
+FILTER_OF_TWO = (
+    Parameter("period_s", "s", 0.0, 10.0, 0.0, (0.2, 1.0), "of two poles: 6.3 times the time of each"),
+    Parameter("damping", "", 0.5, 0.999, 0.87, (0.87,), "share of the critical damping, as filters have it"),
+)
+
+
+def filters(kind: str) -> tuple[Effect, ...]:
+    """Effects, for a kind, of the load cell's amplifier: a filter of one pole, or of two."""
+    return (
+        Effect("force_lag", FILTER, (kind,)),
+        Effect(
+            "force_lag",
+            FILTER_OF_TWO,
+            (kind,),
+            "the filter of the load cell, of two poles, delays its reading",
+            refines=True,
+        ),
+    )
+
+
+def filtered(time_s: Array, force: Array, values: Mapping[str, float]) -> Array:
+    """Force or stress (n,) as a load cell's amplifier passes it on, at times (n,) in s (`filters`)."""
+    if (period := values.get("force_lag.period_s", 0.0)) > 0.0:
+        return swinging(time_s, force[None], 1.0 / period, values.get("force_lag.damping", 0.87))[0]
+    return first_order_lag(time_s, force, values.get("force_lag.time_s", 0.0))
