@@ -94,6 +94,10 @@ LIBRARY = {
     "led_drift": ("the light source fades", "a straight waveguide over the same time"),
     "ambient_light": ("ambient light adds to the signal", "the light source switched off"),
     "optical_nonlinearity": ("the light loss is not proportional to curvature", "an amplitude ladder"),
+    "waveguide_play": (
+        "the waveguide has play in its channel, or in the stage that bends it, and stays at each reversal",
+        "bending to and fro at two paces: play is as large at either",
+    ),
     BATCH: (
         "the modulus of one specimen differs from that of the others",
         "another specimen of the same print",

@@ -48,6 +48,8 @@ NEAREST, WORTH_LAWS = 3, 0.5
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
+# Structure that something which happened once leaves.
+SUDDEN = frozenset(("jump", "break"))
 
 
 @attrs.frozen(eq=False)
@@ -360,6 +362,9 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
             others[f.effects[0].title] = min(own, others.get(f.effects[0].title, own))
     near = sorted((title for title, own in others.items() if own < APART * left), key=lambda n: others[n])
     if left > 1.0 - MAINLY or any(others[n] > 1.0 - MAINLY for n in near) or at_a_bound(best):
+        return None
+    if near and SUDDEN.intersection(structure(strict_table(fitter, best))):
+        # Effects that leave the same moment are alike in what they are not.
         return None
     shares = _share_by_experiment(fitter, best)
     if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:

@@ -280,6 +280,21 @@ def test_a_leak_that_ends_is_not_taken_for_warmth(tmp_path):
     assert {"leak", "temperature_drift"} <= verdict.ambiguity
 
 
+def test_play_of_a_waveguide_is_no_late_clock(tmp_path):
+    """A clock 0.3 s late and a loss out of proportion were named for 3.3 degrees of play."""
+    of, verdict = judged(tmp_path, "outside", 12, 260911)
+    assert (verdict.kind, verdict.names) == ("named", ("waveguide_play",))
+    low, high = verdict.intervals["waveguide_play.play_deg"]
+    assert low < of.faults["outside_play"]["deg"] < high
+
+
+def test_what_happened_at_one_moment_is_no_choice_of_drifts(tmp_path):
+    """Markers that slip by half a degree in three steps: three effects take 99 % of it alike."""
+    _, verdict = judged(tmp_path, "outside", 19, 260911)
+    assert verdict.kind == "unexplained"
+    assert "jump" in verdict.selection.left
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "number"),

@@ -23,8 +23,10 @@ def counted(rows: Sequence[Row], hit: Callable[[Row], bool]) -> str:
 
 
 def blames_physics(row: Row) -> bool:
-    """Whether something of the unit, the specimen or its resin is named with confidence."""
-    return row["verdict"] == "named" and not INSTRUMENTS.issuperset(row["names"])
+    """Whether something of the unit, the specimen or its resin is named with confidence and wrong."""
+    return (
+        row["verdict"] == "named" and row["outcome"] != "exact" and not INSTRUMENTS.issuperset(row["names"])
+    )
 
 
 def _called_wrong(row: Row) -> bool:
@@ -64,6 +66,7 @@ def report(rows: Iterable[Row]) -> str:
     line("another law: wrong with confidence", counted(single, _outcomes("wrong")))
     line("outside: physics named with confidence", counted(outside, blames_physics))
     line("outside: anything named with confidence", counted(outside, _outcomes("wrong")))
+    line("outside: named right, in the library since", counted(outside, _outcomes("exact", "in_set")))
     line("outside: unexplained", counted(outside, _outcomes("unexplained")))
     line("two effects: both named, or in the set", counted(two, _outcomes("exact", "in_set")))
     line("two effects: both named alone", counted(two, _outcomes("exact")))

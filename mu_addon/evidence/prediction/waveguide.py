@@ -9,6 +9,7 @@ import numpy as np
 
 from ...measured import Experiment
 from ..effect import Effect, Parameter
+from .effective_pressure import play_operator
 from .unit import TIMED
 
 Array = np.ndarray[Any, Any]
@@ -82,6 +83,15 @@ EFFECTS = (
         "the light loss is not proportional to curvature, by its square and cube",
         refines=True,
     ),
+    Effect(
+        "waveguide_play",
+        (
+            Parameter(
+                "play_deg", "deg", 0.0, 20.0, 0.0, (1.0, 4.0), "half a millimetre in a bend: 1 to 5 deg"
+            ),
+        ),
+        (KIND,),
+    ),
     *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("angle_offset", "clock_offset")),
 )
 
@@ -107,6 +117,8 @@ class WaveguideVoltage:
         time, angle = experiment["time_s"], experiment["angle_deg"]
         angle = _angle(time, angle, get("clock_offset.offset_s", 0.0))
         angle = angle - get("angle_offset.offset_deg", 0.0)
+        if play := get("waveguide_play.play_deg", 0.0):
+            angle = play_operator(angle, play)
         if excess := get("optical_nonlinearity.excess", 0.0):
             beyond = np.maximum(np.abs(angle) - get("optical_nonlinearity.onset_deg", 0.0), 0.0)
             angle = angle + np.sign(angle) * excess * beyond**2 / 90.0

@@ -39,6 +39,7 @@ TO_DO = {
     "frame_compliance": "take off the machine's compliance, found by a rigid block, or use an extensometer",
     "led_drift": f"let the light source warm up, or measure it beside the signal; {_INSTRUMENT}",
     "ambient_light": f"shield the waveguide from light, or take a dark reading off; {_INSTRUMENT}",
+    "waveguide_play": "take the play out of the waveguide's channel or of the stage, and record again",
     "optical_nonlinearity": "calibrate the sensor over the whole range of bending",
     "batch_variation": "print and test the specimens of one batch, or give that specimen its own modulus",
     "mesh_error": "simulate with a finer mesh, --refine",
