@@ -14,6 +14,7 @@ from ..errors import MuError
 from .curved_reading import curved_reading
 from .effect import Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
+from .outliers import NAME as OUTLIER
 from .record import KNOWN
 from .residuals import Dependence, dependence_table, strict_table, structure
 from .sensitivity import ABSORBED, Sensitivity
@@ -44,12 +45,10 @@ PROMISING = 4.0
 LAW = 0.05
 # Rivals of a cause that are fitted by all laws of their mechanisms: so many, that take this share of
 # what the cause takes by their first law.
-NEAREST, WORTH_LAWS = 3, 0.5
+NEAREST, WORTH_LAWS = 3, 0.2
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
-# Structure that something which happened once leaves.
-SUDDEN = frozenset(("jump", "break"))
 
 
 @attrs.frozen(eq=False)
@@ -250,11 +249,11 @@ def by_all_laws(
 ) -> list[Fit]:
     """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked anew.
 
-    The first one's, and where structure is left with it, those of the `SEEDS` next mechanisms that have any:
-    what does little by its first law may be what is right by another.
+    The first one's, and where structure is left with it or it lies at a bound, those of the `SEEDS` next
+    mechanisms that have any: what does little by its first law may be what is right by another.
     """
     found = [refined(fitter, pool[0], progress), *pool[1:]]
-    if not structure(strict_table(fitter, found[0])):
+    if not at_a_bound(found[0]) and not structure(strict_table(fitter, found[0])):
         return found
     lawful = {law.name for law in fitter.simulator.refinements}
     tried = {pool[0].names}
@@ -363,8 +362,8 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     near = sorted((title for title, own in others.items() if own < APART * left), key=lambda n: others[n])
     if left > 1.0 - MAINLY or any(others[n] > 1.0 - MAINLY for n in near) or at_a_bound(best):
         return None
-    if near and SUDDEN.intersection(structure(strict_table(fitter, best))):
-        # Effects that leave the same moment are alike in what they are not.
+    if near and set(structure(strict_table(fitter, best))) - {OUTLIER}:
+        # Effects that leave the same moment or the same waves are alike in what they are not.
         return None
     shares = _share_by_experiment(fitter, best)
     if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:

@@ -19,6 +19,8 @@ FILTER_OF_TWO = (
     Parameter("period_s", "s", 0.0, 10.0, 0.0, (0.2, 1.0), "of two poles: 6.3 times the time of each"),
     Parameter("damping", "", 0.5, 0.999, 0.87, (0.87,), "share of the critical damping, as filters have it"),
 )
+# Keys of values without which nothing is filtered.
+FILTERED = ("force_lag.time_s", "force_lag.period_s")
 
 
 def filters(kind: str) -> tuple[Effect, ...]:

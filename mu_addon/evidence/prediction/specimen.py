@@ -12,9 +12,10 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .amplifier import filtered, filters
+from .amplifier import FILTERED, filtered, filters
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import decades_lag, first_order_lag, spread_lag
+from .instants import finer
 from .unit import REFERENCE_C, RELAXING, SPREADING, TIMED
 from .yielding import bouc_wen, elastic_strain, yielded, yielding
 
@@ -190,12 +191,26 @@ def recorded(
     section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
     share is not found.
     """
-    found = _borne(experiment, law, values, past)
-    if "time_s" in experiment.columns:
-        found = filtered(experiment["time_s"], found, values)
+    timed = "time_s" in experiment.columns
+    if timed and any(values.get(key) for key in FILTERED):
+        # A filter sees where the machine turned, too.
+        dense, rows = _with_turns(experiment)
+        found = filtered(dense["time_s"], _borne(dense, law, values, past), values)[rows]
+    else:
+        found = _borne(experiment, law, values, past)
+    if timed:
         found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
     zero = values.get(_zero(experiment), 0.0)
     return found + zero if zero else found
+
+
+def _with_turns(experiment: Experiment) -> tuple[Experiment, Array]:
+    """The experiment with rows where it was strained to between samples (`finer`), and which its rows are."""
+    time, strain, rows = finer(experiment["time_s"], experiment["strain"])
+    if len(time) == len(experiment):
+        return experiment, rows
+    columns = {c: np.full(len(time), np.nan) for c in experiment.columns} | {"time_s": time, "strain": strain}
+    return attrs.evolve(experiment, columns=columns, rows=np.arange(len(time))), rows
 
 
 def _borne(experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory) -> Array:
