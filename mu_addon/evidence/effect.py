@@ -74,6 +74,11 @@ LIBRARY = {
         "foreshortened",
         "a square of known sides in the plane of bending",
     ),
+    "camera_perspective": (
+        "the camera does not look at right angles to the plane of bending, so that what is nearer to it "
+        "looks larger",
+        "a square of known sides in the plane of bending; the camera from farther away",
+    ),
     "lens_distortion": (
         "the camera's lens distorts its picture",
         "a calibration pattern; the camera from farther away",

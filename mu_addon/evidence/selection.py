@@ -29,7 +29,7 @@ MOST_EFFECTS = 3
 SEEDS = 4
 DRAWS = 20000
 # Faults of one camera, of which it has one at most: two of them imitate many pairs of physical effects.
-CAMERA = frozenset(("camera_scale", "camera_tilt", "lens_distortion"))
+CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
 # Between the titles of two effects that are one rival together.
 TOGETHER = " with "
 # What the model's own mesh does: there in every set of data, seen or not.

@@ -32,6 +32,7 @@ TO_DO = {
     "angle_drift": f"fix the camera, or follow a mark on the bench; {_INSTRUMENT}",
     "camera_scale": f"measure the scale by a ruler in the plane of the markers; {_INSTRUMENT}",
     "camera_tilt": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
+    "camera_perspective": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
     "lens_distortion": f"calibrate the lens, or stand farther away; {_INSTRUMENT}",
     "inertia": "read steps after they have settled, or let pressure in slowly: the simulation has no inertia",
     "clock_offset": f"record with one clock, or shift the records by the offset; {_INSTRUMENT}",
