@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MuError
 from .curved_reading import curved_reading
-from .effect import Effect, Parameter
+from .effect import SLIP, Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .record import KNOWN
 from .residuals import Dependence, dependence_table, strict_table, structure
@@ -279,9 +279,8 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     for e in chosen.effects:
         less = fitter.best([o for o in chosen.effects if o is not e], [chosen.values])
         own = attrs.evolve(chosen, effects=(*less.effects, e))
-        p = false_alarm_probability(
-            fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own)
-        )
+        gain = less.chi2 - chosen.chi2 - by_search(own) + by_search(less)
+        p = false_alarm_probability(fitter, less, seen, gain - _by_gauges(fitter, less, own))
         ps.append(p)
         if p >= FALSE_ALARM_RATE:
             doubted = (
@@ -430,6 +429,9 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
         return ""
     named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
     for d in table:
+        # A marker's slip is a jump; one that it leaves is structure of what remains.
+        if d.against == "jump" and SLIP in chosen.names:
+            continue
         gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
         if gain - 2.0 * (d.dof + 1) > named - margin:
             return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
@@ -437,8 +439,17 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
 
 
 def cost(fit: Fit) -> float:
-    """Akaike's: of models that fit alike the one with fewer parameters leads."""
-    return fit.chi2 + 2.0 * len(fit.keys)
+    """Akaike's, with `by_search`: of models that fit alike the one with fewer parameters leads."""
+    return fit.chi2 + 2.0 * len(fit.keys) + by_search(fit)
+
+
+def by_search(fit: Fit) -> float:
+    """Chi squared that noise gives the effects of a model by the search that their starts were the best of.
+
+    The best of m chi squareds exceeds g with at most m times the probability of one (Bonferroni), which in
+    the tail falls as exp(-g/2): m alternatives are worth 2 ln m.
+    """
+    return sum(2.0 * math.log(e.tried) for e in fit.effects)
 
 
 def ranked(fits: Iterable[Fit]) -> list[Fit]:
@@ -533,16 +544,18 @@ def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
-    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off.
+    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off, and what
+    a search for its starts would (`by_search`).
     """
-    gain = less.chi2 - more.chi2
+    searched = by_search(more) - by_search(less)
+    gain = less.chi2 - more.chi2 - searched
     if gain < RIVAL_DELTA_CHI2:
         return gain
     own = []
     for fit in (less, more):
         under, refitted = fitter.under_its_own_noise(fit)
         own.append(sum(under.deviance(refitted).values()))
-    return min(gain, own[0] - own[1]) - _by_gauges(fitter, less, more)
+    return min(gain, own[0] - own[1] - searched) - _by_gauges(fitter, less, more)
 
 
 def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:

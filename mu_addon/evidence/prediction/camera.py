@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import attrs
 import numpy as np
 
 from ...design.parameters import Chambers
@@ -26,33 +25,6 @@ AWAY = 3.0
 # which is turned by 20 degrees, the sine over six half lengths.
 KEYSTONE = 0.06
 _KEYSTONE = "a camera three unit lengths away, turned by 20 degrees; above 0 what lies that way is farther"
-
-# A camera that looks at an angle, to first order, along the axis or across; and as it is, tried where one of
-# the two is found: what is turned away is foreshortened, too, by the second order of the angle.
-PERSPECTIVES = (
-    *(
-        Effect("camera_perspective", (Parameter(way, "", -KEYSTONE, KEYSTONE, 0.0, (0.01,), _KEYSTONE),), ())
-        for way in ("along", "across")
-    ),
-    Effect(
-        "camera_perspective",
-        (
-            Parameter("view_deg", "deg", 0.0, 35.0, 0.0, (10.0,), "off the normal to the plane of bending"),
-            Parameter(
-                "farther_deg",
-                "deg",
-                -360.0,
-                360.0,
-                45.0,
-                (-135.0, -45.0, 45.0, 135.0),
-                "way in the picture that leads away from the camera, from across toward along the axis",
-            ),
-            Parameter("lengths_away", "", 1.5, 30.0, AWAY, (AWAY,), "cameras 10 cm to 2 m from a unit"),
-        ),
-        (),
-        refines=True,
-    ),
-)
 
 
 def camera_effects(channels: Sequence[str], kind: str, experiments: Sequence[Experiment]) -> list[Effect]:
@@ -88,13 +60,39 @@ def camera_effects(channels: Sequence[str], kind: str, experiments: Sequence[Exp
             ),
             (kind,),
         ),
-        *(attrs.evolve(e, kinds=(kind,)) for e in PERSPECTIVES),
+        *_perspectives(kind),
         *drifts("angle_drift", "deg", TURN_deg, kind, experiments),
     ]
     if any(c.startswith("marker") for c in channels):
         scale = Parameter("excess", "", -0.1, 0.1, 0.0, (0.01,), "a ruler nearer or farther than the unit")
         found.append(Effect("camera_scale", (scale,), (kind,)))
     return found
+
+
+def _perspectives(kind: str) -> tuple[Effect, ...]:
+    """Laws of a camera that looks at an angle: to first order, along the axis and across, and as it is.
+
+    The last is tried where one of the others is found: what is turned away is foreshortened, too, by the
+    second order of the angle.
+    """
+    first = (Parameter(way, "", -KEYSTONE, KEYSTONE, 0.0, (0.01,), _KEYSTONE) for way in ("along", "across"))
+    whole = (
+        Parameter("view_deg", "deg", 0.0, 35.0, 0.0, (10.0,), "off the normal to the plane of bending"),
+        Parameter(
+            "farther_deg",
+            "deg",
+            -360.0,
+            360.0,
+            45.0,
+            (-135.0, -45.0, 45.0, 135.0),
+            "way in the picture that leads away from the camera, from across toward along the axis",
+        ),
+        Parameter("lengths_away", "", 1.5, 30.0, AWAY, (AWAY,), "cameras 10 cm to 2 m from a unit"),
+    )
+    return (
+        *(Effect("camera_perspective", (p,), (kind,)) for p in first),
+        Effect("camera_perspective", whole, (kind,), refines=True),
+    )
 
 
 def read_by_camera(

@@ -19,6 +19,7 @@ from .drift import drift, drifts, largest_reading
 from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
+from .marker_slip import Recordings, slip_effects, slipped
 
 Array = np.ndarray[Any, Any]
 
@@ -373,7 +374,9 @@ class UnitPressure:
         most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
         gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
         camera = camera_effects(self.channels_known, self.kind, experiments)
-        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera)
+        self._recordings = Recordings(experiments)
+        slips = slip_effects(self.channels_known, self.kind, self._recordings)
+        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera, *slips)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
@@ -401,6 +404,7 @@ class UnitPressure:
         ]
         y = self._moving(experiment, response.at(pressure, static), values)
         y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
+        y = slipped(response.channels, y, experiment, self._recordings, values)
         y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]
