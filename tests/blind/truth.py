@@ -245,7 +245,9 @@ def observe(bench, values, unit, finer=FINER):
             )
         # On another specimen the marker is another one.
         if (slip := get("marker_slip.marker2_mm", 0.0)) and how.get("specimen", "A") == "A":
-            way = np.radians(values["marker_slip.marker2_direction_deg"])
+            # It turns with the surface, which is along the line from the marker below to the one above.
+            tilt = np.arctan2(y[5] - y[1], y[6] - y[2])
+            way = np.radians(values["marker_slip.marker2_direction_deg"]) - tilt
             after = clock > values["marker_slip.after"]
             y[3] = y[3] + slip * np.cos(way) * after
             y[4] = y[4] + slip * np.sin(way) * after

@@ -5,6 +5,7 @@ import math
 import attrs
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from mu_addon.evidence.effect import SLIP
 from mu_addon.evidence.extended import extended_model
@@ -49,12 +50,13 @@ def folder(seed, moved=lambda e, y, clock, total: y, white=0.05, slow=0.0, speci
 
 
 def slip(mm, degrees=26.0, share=SHARE, specimen="A"):
-    """The second marker slips, of one specimen."""
+    """The second marker slips, of one specimen, on a surface along the line from the first to the third."""
 
     def moved(e, y, clock, total):
         after = (clock >= share * total) & (e.specimen == specimen)
-        y[3] += mm * math.cos(math.radians(degrees)) * after
-        y[4] += mm * math.sin(math.radians(degrees)) * after
+        way = math.radians(degrees) - np.arctan2(y[5] - y[1], y[6] - y[2])
+        y[3] += mm * np.cos(way) * after
+        y[4] += mm * np.sin(way) * after
         return y
 
     return moved
@@ -162,7 +164,22 @@ def test_a_slip_of_nothing_leaves_every_reading_as_it_is():
     made = folder(10)
     y = np.arange(7.0 * len(made[0])).reshape(7, -1)
     values = {f"{KEY}mm": 0.0, f"{KEY}direction_deg": 30.0, f"{KEY}moment_s": 3.0}
-    assert slipped(analytic.CHANNELS, y, made[0], Recordings(made), values) is y
+    assert slipped(analytic.CHANNELS, y, y[:, 0], made[0], Recordings(made), values) is y
+
+
+def test_a_displacement_turns_with_the_arc_that_its_marker_sits_on():
+    made, angle = folder(10), np.radians([0.0, 30.0, -50.0])
+    # Arcs of 50 mm to the marker, by where they end.
+    s = np.linspace(0.0, 50.0, 50001)
+    places = [trapezoid([np.sin(a * s / 50.0), np.cos(a * s / 50.0)], s, axis=1) for a in angle]
+    y = np.zeros((7, 3))
+    y[3:5] = np.transpose(places)
+    e = attrs.evolve(made[3], columns={c: v[:3] for c, v in made[3].columns.items()}, rows=made[3].rows[:3])
+    values = {f"{KEY}mm": 2.0, f"{KEY}direction_deg": 90.0, f"{KEY}moment_s": 0.0}
+    changed = slipped(analytic.CHANNELS, y, np.zeros(7), e, Recordings(made), values) - y
+    # What was along the axis is along the tip of its arc.
+    np.testing.assert_allclose(changed[3:5], 2.0 * np.stack([np.sin(angle), np.cos(angle)]), atol=1e-6)
+    assert not changed[[0, 1, 2, 5, 6]].any()
 
 
 def without(experiments, *columns):
@@ -192,7 +209,7 @@ def test_a_marker_seen_along_one_axis_has_a_signed_slip():
     assert effect.parameters[0].starts[0] == pytest.approx(-0.4, abs=0.05)
     values = {effect.keys[0]: -0.4, effect.keys[1]: effect.parameters[1].starts[0]}
     y = np.zeros((7, len(made[1])))
-    changed = slipped(analytic.CHANNELS, y, made[1], Recordings(made), values)
+    changed = slipped(analytic.CHANNELS, y, y[:, 0], made[1], Recordings(made), values)
     assert changed[3].min() == -0.4
     assert not np.delete(changed, 3, axis=0).any()
 

@@ -170,7 +170,7 @@ def _effect(slip: Slip, kind: str, most: float, total_s: float, tried: int) -> E
                 360.0,
                 direction - 30.0,
                 (direction,),
-                "in the picture, from y (across) toward z (along the axis)",
+                "in the picture of the unit at rest, from y (across) toward z (along the axis)",
             ),
         )
     else:
@@ -183,29 +183,34 @@ def _effect(slip: Slip, kind: str, most: float, total_s: float, tried: int) -> E
 def slipped(
     channels: Sequence[str],
     y: Array,
+    rest: Array,
     experiment: Experiment,
     recordings: Recordings,
     values: Mapping[str, float],
 ) -> Array:
     """Channels (c, n) with the displacement, in the picture, of each marker that slipped, of those without.
 
-    y (c, n): in degrees and mm. values: by "effect.parameter", see `slip_effects`; those of no effect leave
-    the channels as they are.
+    y (c, n): in degrees and mm; rest (c,): at rest. values: by "effect.parameter", see `slip_effects`; those
+    of no effect leave the channels as they are. The displacement turns with the surface that the marker sits
+    on: by twice the angle of the line from the inlet, as on an arc. Along one axis it stays as it is.
     """
     found = y
     for number, axes in markers(channels).items():
         get, key = values.get, f"{SLIP}.marker{number}"
-        step = dict.fromkeys(axes, 0.0)
+        rows = [channels.index(f"marker{number}_{axis}_mm") for axis in axes]
         if size := get(f"{key}_mm", 0.0):
-            way = math.radians(get(f"{key}_direction_deg", 0.0))
-            step = {"y": size * math.cos(way), "z": size * math.sin(way)}
-        step = {axis: v + get(f"{key}_{axis}_mm", 0.0) for axis, v in step.items()}
-        if not any(step.values()):
+            across, along = rows
+            tilt = 2.0 * np.arctan2(y[across] - rest[across], y[along])
+            way = math.radians(get(f"{key}_direction_deg", 0.0)) - tilt
+            step = [size * np.cos(way), size * np.sin(way)]
+        else:
+            step = [np.asarray(get(f"{key}_{axis}_mm", 0.0)) for axis in axes]
+        if not any(v.any() for v in step):
             continue
         share = recordings.share(experiment, get(f"{key}_moment_s", 0.0))
         found = found.copy() if found is y else found
-        for axis in axes:
-            found[channels.index(f"marker{number}_{axis}_mm")] += step[axis] * share
+        for row, v in zip(rows, step, strict=True):
+            found[row] += v * share
     return found
 
 

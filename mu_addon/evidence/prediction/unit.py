@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -130,6 +131,11 @@ class UnitResponse:
             return found
         side = self.walls.get(int(np.sign(sizes.get(CONTACT, 0.0))))
         return found if side is None else found + side.change(pressure_kPa, abs(sizes[CONTACT]))
+
+    @cached_property
+    def rest(self) -> Array:
+        """Channels (c,) in their units without pressure and effects."""
+        return self.at(np.zeros(1), {})[:, 0]
 
     def _curve(self, sizes: tuple[tuple[str, float], ...]) -> Any:
         """The response over pressure with variants of given sizes, which many experiments ask for in turn."""
@@ -404,7 +410,7 @@ class UnitPressure:
         ]
         y = self._moving(experiment, response.at(pressure, static), values)
         y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
-        y = slipped(response.channels, y, experiment, self._recordings, values)
+        y = slipped(response.channels, y, response.rest, experiment, self._recordings, values)
         y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]

@@ -74,7 +74,7 @@ def _slipped(verdict: Verdict, cause: Cause) -> str:
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         way = f"along {axis}" if (axis := p.name.split("_")[1]) in ("y", "z") else "by"
         if p.unit == "deg":
-            way = "in the picture, from y (across) toward z (along the axis), by"
+            way = "in the picture of the unit at rest, from y (across) toward z (along the axis), by"
         words.append(f"{way} {values[key]:.3g} {p.unit} (95 %: {between(low, high)})")
     key, _ = moment
     record, second = Recordings(verdict.experiments).place(values[key])
