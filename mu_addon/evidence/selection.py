@@ -185,7 +185,8 @@ def pairs_for(
     for _, *pair in promised[:SEEDS]:
         progress(" and ".join(e.name for e in pair))
         starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
-        if fitter.best(pair, starts).chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
+        other = fitter.best(pair, starts)
+        if other.chi2 + by_search(other) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
             found[TOGETHER.join(e.title for e in pair)] = None
     return tuple(found)
 
@@ -657,7 +658,8 @@ def causes_of(
         tried = _with_their_laws(fitter, chosen, less, tried)
         rivals: dict[str, float] = {}
         for f in tried:
-            if f.chi2 - chosen.chi2 < near:
+            # What a search gives to a rival by noise is no fit.
+            if f.chi2 + by_search(f) - chosen.chi2 - by_search(chosen) < near:
                 name = f.effects[-1].title
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
@@ -706,7 +708,8 @@ def _by_numerics(
     for f in tried:
         if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
             other = meshed(f)
-            if other.chi2 - reference.chi2 < RIVAL_DELTA_CHI2:
+            searched = by_search(other) - by_search(reference)
+            if other.chi2 - reference.chi2 + searched < RIVAL_DELTA_CHI2:
                 found[f.effects[-1].title] = other.chi2
     return found
 

@@ -159,6 +159,7 @@ def _effect(slip: Slip, kind: str, most: float, total_s: float, tried: int) -> E
     )
     size = min(max(math.hypot(y, z), SMALLEST_mm), 0.9 * most)
     source = "farther than a chamber it would be taken for another marker"
+    shape: tuple[Parameter, ...]
     if slip.axes == "yz":
         direction = math.degrees(math.atan2(z, y))
         shape = (
