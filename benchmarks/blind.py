@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.circumstances import circumstances
+from mu_addon.evidence.effect import SLIP
 from mu_addon.evidence.prediction.unit import TIMED
 from mu_addon.run.processes import one_thread_each
 from tests.blind import unit_runs
@@ -43,7 +44,7 @@ REFUSED = {
     "leak": {"leak.conductance_ratio": 0.1},
     "angle_offset": {"angle_offset.offset_deg": 2.0},
 }
-EFFECTS = [e.name for e in TIMED if e.name not in REFUSED] + list(STATIC)
+EFFECTS = [e.name for e in TIMED if e.name not in REFUSED] + [*STATIC, SLIP]
 TIMES = (1.0, 2.0, 4.0, 10.0)
 # Alike in what they do to these data, and unlike.
 NEAR = (

@@ -10,6 +10,8 @@ from ..errors import InputError
 
 # Another modulus of one specimen: an effect of specimens alone, see `owned`.
 BATCH = "batch_variation"
+# Another place of one marker from some moment on, see `prediction.marker_slip`.
+SLIP = "marker_slip"
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
 
@@ -74,9 +76,18 @@ LIBRARY = {
         "foreshortened",
         "a square of known sides in the plane of bending",
     ),
+    "camera_perspective": (
+        "the camera does not look at right angles to the plane of bending, so that what is nearer to it "
+        "looks larger",
+        "a square of known sides in the plane of bending; the camera from farther away",
+    ),
     "lens_distortion": (
         "the camera's lens distorts its picture",
         "a calibration pattern; the camera from farther away",
+    ),
+    SLIP: (
+        "a marker slips on the unit's surface at one moment and stays there",
+        "a mark drawn beside the marker; the marker glued anew, and the records after that moment again",
     ),
     "inertia": (
         "the unit's mass swings after each change of pressure",
@@ -212,7 +223,8 @@ class Effect:
     experiment that has it, "specimen B"; empty where all have. among: what differs in it, "specimen",
     each with a parameter of its own; spread: their standard deviation, in the parameters' unit, with its 95 %
     interval. refines: a law with more freedom than another one of its name, fitted only in that one's place.
-    Raises InputError for a name not in `LIBRARY`.
+    tried: how many alternatives its starts were the best of, in the data themselves. Raises InputError for a
+    name not in `LIBRARY`.
     """
 
     name: str
@@ -224,6 +236,7 @@ class Effect:
     among: str = ""
     spread: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     refines: bool = False
+    tried: int = 1
 
     @mechanism.default
     def _of_library(self) -> str:

@@ -15,7 +15,7 @@ from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
 from ..reading import file_text, is_number, parse_toml
 from ..toml_writer import Commented, toml_text
-from .effect import LIBRARY
+from .effect import LIBRARY, SLIP
 from .verdict import Verdict
 
 
@@ -117,7 +117,8 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
 
     effects: dict[str, dict[str, Fitted]] = {}
     for e in fit.effects:
-        if not (e.whose or e.among):
+        # A slip is of these records: in others the marker's zero is where it sits now.
+        if not (e.whose or e.among or e.name == SLIP):
             # Two kinds of experiments may have one mechanism by parameters of their own.
             of_name = effects.setdefault(e.name, {})
             of_name |= {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from ..measured import Experiment
-from .effect import BATCH, Effect, Parameter
+from .effect import BATCH, SLIP, Effect, Parameter
 from .fit import Fit, Fitter
 from .residuals import strict_table, structure
 from .selection import (
@@ -49,8 +49,8 @@ OF_THE_BENCH = CAMERA.union(
 )
 # What may come with a specimen or with the way in which it was held once.
 OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
-# Numerics are alike for all.
-OF_NONE = frozenset(("mesh_error", "gravity"))
+# Numerics are alike for all, and a marker's slip says by its moment whose it is.
+OF_NONE = frozenset(("mesh_error", "gravity", SLIP))
 # Most effects fitted, those first that promise most.
 MOST_FITS = 12
 CHANGE = Parameter("change", "", -0.5, 1.0, 0.0, (0.1,), "prints and batches differ by 5 to 20 %")

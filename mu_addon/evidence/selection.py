@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MuError
 from .curved_reading import curved_reading
-from .effect import Effect, Parameter
+from .effect import SLIP, Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .outliers import NAME as OUTLIER
 from .record import KNOWN
@@ -30,7 +30,7 @@ MOST_EFFECTS = 3
 SEEDS = 4
 DRAWS = 20000
 # Faults of one camera, of which it has one at most: two of them imitate many pairs of physical effects.
-CAMERA = frozenset(("camera_scale", "camera_tilt", "lens_distortion"))
+CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
 # Between the titles of two effects that are one rival together.
 TOGETHER = " with "
 # What the model's own mesh does: there in every set of data, seen or not.
@@ -186,7 +186,8 @@ def pairs_for(
     for _, *pair in promised[:SEEDS]:
         progress(" and ".join(e.name for e in pair))
         starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
-        if fitter.best(pair, starts).chi2 - chosen.chi2 < RIVAL_DELTA_CHI2:
+        other = fitter.best(pair, starts)
+        if other.chi2 + by_search(other) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
             found[TOGETHER.join(e.title for e in pair)] = None
     return tuple(found)
 
@@ -280,9 +281,8 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     for e in chosen.effects:
         less = fitter.best([o for o in chosen.effects if o is not e], [chosen.values])
         own = attrs.evolve(chosen, effects=(*less.effects, e))
-        p = false_alarm_probability(
-            fitter, less, seen, less.chi2 - chosen.chi2 - _by_gauges(fitter, less, own)
-        )
+        gain = less.chi2 - chosen.chi2 - by_search(own) + by_search(less)
+        p = false_alarm_probability(fitter, less, seen, gain - _by_gauges(fitter, less, own))
         ps.append(p)
         if p >= FALSE_ALARM_RATE:
             doubted = (
@@ -454,6 +454,9 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
         return ""
     named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
     for d in table:
+        # A marker's slip is a jump; one that it leaves is structure of what remains.
+        if d.against == "jump" and SLIP in chosen.names:
+            continue
         gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
         if gain - 2.0 * (d.dof + 1) > named - margin:
             return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
@@ -461,8 +464,17 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
 
 
 def cost(fit: Fit) -> float:
-    """Akaike's: of models that fit alike the one with fewer parameters leads."""
-    return fit.chi2 + 2.0 * len(fit.keys)
+    """Akaike's, with `by_search`: of models that fit alike the one with fewer parameters leads."""
+    return fit.chi2 + 2.0 * len(fit.keys) + by_search(fit)
+
+
+def by_search(fit: Fit) -> float:
+    """Chi squared that noise gives the effects of a model by the search that their starts were the best of.
+
+    The best of m chi squareds exceeds g with at most m times the probability of one (Bonferroni), which in
+    the tail falls as exp(-g/2): m alternatives are worth 2 ln m.
+    """
+    return sum(2.0 * math.log(e.tried) for e in fit.effects)
 
 
 def ranked(fits: Iterable[Fit]) -> list[Fit]:
@@ -557,16 +569,18 @@ def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
-    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off.
+    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off, and what
+    a search for its starts would (`by_search`).
     """
-    gain = less.chi2 - more.chi2
+    searched = by_search(more) - by_search(less)
+    gain = less.chi2 - more.chi2 - searched
     if gain < RIVAL_DELTA_CHI2:
         return gain
     own = []
     for fit in (less, more):
         under, refitted = fitter.under_its_own_noise(fit)
         own.append(sum(under.deviance(refitted).values()))
-    return min(gain, own[0] - own[1]) - _by_gauges(fitter, less, more)
+    return min(gain, own[0] - own[1] - searched) - _by_gauges(fitter, less, more)
 
 
 def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
@@ -668,7 +682,8 @@ def causes_of(
         tried = _with_their_laws(fitter, chosen, less, tried)
         rivals: dict[str, float] = {}
         for f in tried:
-            if f.chi2 - chosen.chi2 < near:
+            # What a search gives to a rival by noise is no fit.
+            if f.chi2 + by_search(f) - chosen.chi2 - by_search(chosen) < near:
                 name = f.effects[-1].title
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
@@ -718,7 +733,8 @@ def _by_numerics(
     for f in tried:
         if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
             other = meshed(f)
-            if other.chi2 - reference.chi2 < RIVAL_DELTA_CHI2:
+            searched = by_search(other) - by_search(reference)
+            if other.chi2 - reference.chi2 + searched < RIVAL_DELTA_CHI2:
                 found[f.effects[-1].title] = other.chi2
     return found
 

@@ -243,10 +243,14 @@ def observe(bench, values, unit, finer=FINER):
             y = np.where(
                 after, unit.still(p, {**static, "clogged_chamber": torn}, scale, turned, stiffness), y
             )
-        if slip := get("marker_slip.mm", 0.0):
+        # On another specimen the marker is another one.
+        if (slip := get("marker_slip.marker2_mm", 0.0)) and how.get("specimen", "A") == "A":
+            # It turns with the surface, which is along the line from the marker below to the one above.
+            tilt = np.arctan2(y[5] - y[1], y[6] - y[2])
+            way = np.radians(values["marker_slip.marker2_direction_deg"]) - tilt
             after = clock > values["marker_slip.after"]
-            y[3] = y[3] + slip * after
-            y[4] = y[4] + 0.5 * slip * after
+            y[3] = y[3] + slip * np.cos(way) * after
+            y[4] = y[4] + slip * np.sin(way) * after
         if bulge := get("camera_distortion.per_mm2", 0.0):
             for k in (1, 3, 5):
                 square = y[k] ** 2 + (y[k + 1] - 40.0) ** 2

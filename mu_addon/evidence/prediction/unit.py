@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -19,6 +20,7 @@ from .drift import drift, drifts, largest_reading
 from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
+from .marker_slip import Recordings, slip_effects, slipped
 
 Array = np.ndarray[Any, Any]
 
@@ -129,6 +131,11 @@ class UnitResponse:
             return found
         side = self.walls.get(int(np.sign(sizes.get(CONTACT, 0.0))))
         return found if side is None else found + side.change(pressure_kPa, abs(sizes[CONTACT]))
+
+    @cached_property
+    def rest(self) -> Array:
+        """Channels (c,) in their units without pressure and effects."""
+        return self.at(np.zeros(1), {})[:, 0]
 
     def _curve(self, sizes: tuple[tuple[str, float], ...]) -> Any:
         """The response over pressure with variants of given sizes, which many experiments ask for in turn."""
@@ -373,7 +380,9 @@ class UnitPressure:
         most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
         gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
         camera = camera_effects(self.channels_known, self.kind, experiments)
-        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera)
+        self._recordings = Recordings(experiments)
+        slips = slip_effects(self.channels_known, self.kind, self._recordings)
+        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera, *slips)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
@@ -401,6 +410,7 @@ class UnitPressure:
         ]
         y = self._moving(experiment, response.at(pressure, static), values)
         y = read_by_camera(response.channels, y, experiment["time_s"], experiment.scale, values)
+        y = slipped(response.channels, y, response.rest, experiment, self._recordings, values)
         y = np.add(y, np.array(zeros)[:, None], order="C")
         kept = [i for i, c in enumerate(response.channels) if c in experiment.columns]
         return y if len(kept) == len(y) else y[kept]

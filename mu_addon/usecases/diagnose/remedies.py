@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ...evidence.effect import SLIP
+
 _INSTRUMENT = "the simulation is not at fault"
 _MODEL = "simulate with --model model.toml, which has it"
 
@@ -32,7 +34,12 @@ TO_DO = {
     "angle_drift": f"fix the camera, or follow a mark on the bench; {_INSTRUMENT}",
     "camera_scale": f"measure the scale by a ruler in the plane of the markers; {_INSTRUMENT}",
     "camera_tilt": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
+    "camera_perspective": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
     "lens_distortion": f"calibrate the lens, or stand farther away; {_INSTRUMENT}",
+    SLIP: (
+        "leave this marker out from that moment on, or glue it anew and repeat the records after it; "
+        f"{_INSTRUMENT}"
+    ),
     "inertia": "read steps after they have settled, or let pressure in slowly: the simulation has no inertia",
     "clock_offset": f"record with one clock, or shift the records by the offset; {_INSTRUMENT}",
     "seating": "preload the specimen until its faces bear; the simulation is not at fault",

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...evidence.effect import Parameter
+import numpy as np
+
+from ...evidence.effect import SLIP, Parameter
+from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.selection import Cause
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
@@ -44,6 +47,8 @@ def between(low: float, high: float) -> str:
 
 def sized(verdict: Verdict, cause: Cause) -> str:
     """Parameters of a cause with their intervals in words."""
+    if cause.effect.name == SLIP:
+        return _slipped(verdict, cause)
     sizes = []
     if cause.effect.among:
         value, low, high = cause.effect.spread
@@ -58,6 +63,29 @@ def sized(verdict: Verdict, cause: Cause) -> str:
         if (cause.effect.name, p.name) == ("overcure", "offset_mm"):
             sizes.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
     return ", ".join(sizes)
+
+
+def _slipped(verdict: Verdict, cause: Cause) -> str:
+    """How far a marker slipped, which way in the picture, and when: by the clock of the record it was in."""
+    values = verdict.selection.chosen.values
+    *sizes, moment = zip(cause.effect.keys, cause.effect.parameters, strict=True)
+    words = []
+    for key, p in sizes:
+        low, high = verdict.intervals.get(key, (math.nan, math.nan))
+        way = f"along {axis}" if (axis := p.name.split("_")[1]) in ("y", "z") else "by"
+        if p.unit == "deg":
+            way = "in the picture of the unit at rest, from y (across) toward z (along the axis), by"
+        words.append(f"{way} {values[key]:.3g} {p.unit} (95 %: {between(low, high)})")
+    key, _ = moment
+    record, second = Recordings(verdict.experiments).place(values[key])
+    clock = record["time_s"]
+    if second <= clock[0]:
+        return f"{', '.join(words)}, before {record.name}"
+    # When between two samples it was, no record tells.
+    half = 0.5 * float(np.median(np.diff(clock)))
+    low, high = verdict.intervals.get(key, (math.nan, math.nan))
+    ends = between(second - values[key] + low - half, second - values[key] + high + half)
+    return f"{', '.join(words)}, in {record.name} at {second:.4g} s (95 %: {ends})"
 
 
 def sentence(verdict: Verdict) -> tuple[str, str]:
