@@ -114,7 +114,8 @@ def select(
     chosen, ps, doubted, p_best = base, [], "", 1.0
     taken = 0.0
     levels: list[list[Fit]] = []
-    for level in range(min(MOST_EFFECTS, len(effects))):
+    alone = False
+    while (level := len(levels)) < min(MOST_EFFECTS, len(effects)):
         if level:
             pool = _extended(fitter, effects, levels[-1][:1], progress)
         if not pool or _of_the_law(chosen, pool[0], taken):
@@ -140,6 +141,14 @@ def select(
         if loss(fitter, chosen, pool[0]) <= 0.0:
             doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
+        if level == 1 and not alone:
+            alone = True
+            others = by_all_laws(fitter, levels[0], progress, every=True)
+            if cost(others[0]) < min(cost(pool[0]), cost(chosen)):
+                # One mechanism by another law does what two do.
+                levels[0], chosen, singles = others, others[0], tuple(others)
+                taken = base.chi2 - chosen.chi2
+                continue
         pool = by_all_laws(fitter, pool, progress)
         chosen = pool[0]
         singles = singles if level else tuple(pool)
@@ -186,8 +195,8 @@ def pairs_for(
     for _, *pair in promised[:SEEDS]:
         progress(" and ".join(e.name for e in pair))
         starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
-        other = fitter.best(pair, starts)
-        if other.chi2 + by_search(other) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
+        both = fitter.best(pair, starts)
+        if both.chi2 + by_search(both) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
             found[TOGETHER.join(e.title for e in pair)] = None
     return tuple(found)
 
@@ -246,15 +255,18 @@ def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _
 
 
 def by_all_laws(
-    fitter: Fitter, pool: Sequence[Fit], progress: Callable[[str], None] = lambda _: None
+    fitter: Fitter,
+    pool: Sequence[Fit],
+    progress: Callable[[str], None] = lambda _: None,
+    every: bool = False,
 ) -> list[Fit]:
     """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked anew.
 
-    The first one's, and where structure is left with it or it lies at a bound, those of the `SEEDS` next
-    mechanisms that have any: what does little by its first law may be what is right by another.
+    The first one's, and where structure is left with it or it lies at a bound, or for `every`, those of the
+    `SEEDS` next mechanisms that have any: what does little by its first law may be what is right by another.
     """
     found = [refined(fitter, pool[0], progress), *pool[1:]]
-    if not at_a_bound(found[0]) and not structure(strict_table(fitter, found[0])):
+    if not every and not at_a_bound(found[0]) and not structure(strict_table(fitter, found[0])):
         return found
     lawful = {law.name for law in fitter.simulator.refinements}
     tried = {pool[0].names}

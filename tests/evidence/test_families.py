@@ -280,6 +280,14 @@ def test_a_leak_that_ends_is_not_taken_for_warmth(tmp_path):
     assert {"leak", "temperature_drift"} <= verdict.ambiguity
 
 
+def test_one_mechanism_by_another_law_comes_before_two(tmp_path):
+    """A valve that is tight after 52 s: cooling and a drift of the gauge were named together."""
+    of, verdict = judged(tmp_path, "outside", 32, 260911)
+    assert (verdict.kind, verdict.names) == ("named", ("leak",))
+    low, high = verdict.intervals["leak.tight_s"]
+    assert low < of.faults["outside_shut_later"]["until_s"] < high
+
+
 def test_play_of_a_waveguide_is_no_late_clock(tmp_path):
     """A clock 0.3 s late and a loss out of proportion were named for 3.3 degrees of play."""
     of, verdict = judged(tmp_path, "outside", 12, 260911)
