@@ -305,20 +305,24 @@ def test_what_happened_at_one_moment_is_no_choice_of_drifts(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("part", "number"),
+    ("battery", "part", "number"),
     [
         # A wall that creeps by the third root of time, and gas that cools with its wall.
-        ("single", 80),
-        ("single", 79),
+        (LATER, "single", 80),
+        (LATER, "single", 79),
         # A load cell's filter of two poles, and Bouc and Wen's friction.
-        ("single", 11),
-        ("single", 51),
+        (LATER, "single", 11),
+        (LATER, "single", 51),
         # Samples lost while a step was made.
-        ("single", 42),
+        (LATER, "single", 42),
         # Cells that close, and a resin that creeps: one hundredth of a hundredth remains.
-        ("two", 5),
+        (LATER, "two", 5),
+        # A line of two volumes seen through steps: inertia at its largest damping, and a resin at its bound.
+        (260911, "single", 86),
+        # A filter on an uneven clock: where the coupon was turned between two samples decides.
+        (260911, "single", 57),
     ],
 )
-def test_another_law_of_a_mechanism_is_named(tmp_path, part, number):
-    of, verdict = judged(tmp_path, part, number, LATER)
+def test_another_law_of_a_mechanism_is_named(tmp_path, battery, part, number):
+    of, verdict = judged(tmp_path, part, number, battery)
     assert (verdict.kind, set(verdict.names)) == ("named", set(of.truth)), verdict.selection.left
