@@ -254,7 +254,7 @@ def diagnose(
                 chosen, seen = select_owned(fitter, seen, chosen, progress)
     before = experiments, set_aside, fitter, base, seen, chosen
     for _ in range(ROUNDS):
-        if OUTLIER not in chosen.left or chosen.doubted:
+        if OUTLIER not in chosen.left or (chosen.doubted and chosen.causes):
             break
         experiments, more = without_outliers(experiments, fitter, chosen.chosen, len(chosen.table))
         if not more:

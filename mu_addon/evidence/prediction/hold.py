@@ -67,6 +67,16 @@ EFFECTS = (
         refines=True,
     ),
     Effect(
+        "leak",
+        (
+            Parameter("loss_above_per_s", "1/s", 0.0, 0.5, 0.0, (1e-3, 0.01), "of what is above"),
+            Parameter("opens_kPa", "kPa", 0.0, 1000.0, 0.0, (30.0, 100.0), "relief valves, seams that part"),
+        ),
+        (KIND,),
+        "gas flows out above a pressure at which a valve or a seam opens",
+        refines=True,
+    ),
+    Effect(
         "viscoelasticity",
         (
             Parameter(
@@ -185,6 +195,8 @@ class ChamberPressure:
             hole_per_s=get("leak.hole_per_s", 0.0),
             loss_until_tight_per_s=get("leak.loss_until_tight_per_s", 0.0),
             tight_s=get("leak.tight_s", 60.0),
+            loss_above_per_s=get("leak.loss_above_per_s", 0.0),
+            opens_kPa=get("leak.opens_kPa", 0.0),
             creep_per_kPa=1e-3 * get("viscoelasticity.creep_per_MPa", 0.0),
             onset_s=get("viscoelasticity.onset_s", 1.0),
             growth_per_kPa=1e-3 * get("viscoelasticity.growth_per_MPa", 0.0),
@@ -247,6 +259,8 @@ def chamber_pressure(
     hole_per_s: float = 0.0,
     loss_until_tight_per_s: float = 0.0,
     tight_s: float = math.inf,
+    loss_above_per_s: float = 0.0,
+    opens_kPa: float = 0.0,
     creep_per_kPa: float = 0.0,
     onset_s: float = 1.0,
     growth_per_kPa: float = 0.0,
@@ -274,14 +288,15 @@ def chamber_pressure(
     relative to the start: P V = P_i m T. Gas is lost by P_i dm/dt = -k P0 x, where
     x + b x^2 = (P^2 - P0^2)/(2 P0^2), so that a small overpressure falls by exp(-k t), and a large b makes it
     nearly the flow of an orifice. hole_per_s: h in 1/s of such a flow itself, P_i dm/dt = -h P0 f(P/P0)
-    (`_through_a_hole`). loss_until_tight_per_s: k of a laminar flow that ends at tight_s, in s. The volume is
+    (`_through_a_hole`). loss_until_tight_per_s: k of a laminar flow that ends at tight_s, in s;
+    loss_above_per_s: k of a flow in proportion to what the gauge pressure is above opens_kPa. The volume is
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
     + g p log10(1 + t/s) + f p (t/100 s)^n.
     """
     from scipy.interpolate import CubicSpline
 
     end = float(time_s[-1])
-    leaks = loss_per_s or hole_per_s or loss_until_tight_per_s
+    leaks = loss_per_s or hole_per_s or loss_until_tight_per_s or loss_above_per_s
     creeps = creep_per_kPa or growth_per_kPa or findley_per_kPa
     if not (leaks or creeps or cooling_K or warmth or cooling_per_kPa) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
@@ -316,6 +331,8 @@ def chamber_pressure(
         flow = partial(_seeping, loss_per_s or loss_until_tight_per_s, inertia)
         if hole_per_s:
             flow = partial(_through_a_hole, hole_per_s)
+        elif loss_above_per_s:
+            flow = partial(_above, loss_above_per_s, 1.0 + opens_kPa / ATMOSPHERE_kPa)
         if leaks:
             gas = _lost(t, warm, grown, start, flow, compliance_per_kPa)
         if loss_until_tight_per_s and tight_s < end:
@@ -338,6 +355,11 @@ def _seeping(loss: float, inertia: float, P: float) -> float:
     """Laminar flow in 1/s at a pressure in atmospheres, with inertia after Forchheimer."""
     drive = P * P - 1
     return loss * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+
+
+def _above(loss: float, opens: float, P: float) -> float:
+    """Flow in 1/s in proportion to what a pressure is above another one, both in atmospheres."""
+    return loss * max(P - opens, 0.0)
 
 
 def _through_a_hole(hole: float, P: float) -> float:
