@@ -154,6 +154,20 @@ def test_what_pressure_did_while_samples_were_lost_is_free():
     assert np.abs(free - there[:, after]).max() < 0.15 * np.abs(chord - there[:, after]).max()
 
 
+def test_a_swing_faster_than_the_pictures_is_not_seen(tmp_path):
+    """830 Hz at 40 pictures a second came out as slow noise, and was named in a clean set."""
+    e = stepped(np.linspace(0.0, 2.0, 81))
+    simulator = PressureStep([analytic.response()], [e])
+    still = simulator.predict(e, {})
+    fast, slow = (
+        simulator.predict(e, {"inertia.period_s": period, "inertia.damping": 0.05})
+        for period in (1.2e-3, 0.2)
+    )
+    assert np.abs(fast - still).max() < 1e-3 * np.abs(slow - still).max()
+    _, verdict = judged(tmp_path, "clean", 73, 26112611)
+    assert verdict.kind == "none"
+
+
 def stepped(time):
     """A record of one step whose ramp begins and ends between samples."""
     p = np.interp(time, [0.0, 0.5031, 0.5547, 2.0], [0.0, 0.0, 20.0, 20.0])

@@ -76,6 +76,7 @@ class PressureStep(UnitPressure):
         super().__init__(responses, experiments)
         self.effects = (*self.effects, INERTIA, TWO_MODES)
         self._finer: dict[int, tuple[Experiment, Experiment, Array]] = {}
+        self._picture_s: dict[str, float] = {}
         self._lost = {e.name: _lost_while_changing(e) for e in experiments if e.kind == self.kind}
         self.nuisances = (
             *self.nuisances,
@@ -92,6 +93,7 @@ class PressureStep(UnitPressure):
         """As `UnitPressure.predict`, driven by what pressure did between samples, too (`instants.finer`)."""
         if id(experiment) not in self._finer:
             time, pressure, rows = finer(experiment["time_s"], experiment["pressure_kPa"])
+            self._picture_s[experiment.name] = float(np.median(np.diff(experiment["time_s"])))
             columns = {c: np.full(len(time), np.nan) for c in experiment.columns}
             columns |= {"time_s": time, "pressure_kPa": pressure}
             dense = attrs.evolve(experiment, columns=columns, rows=np.arange(len(time)))
@@ -111,15 +113,25 @@ class PressureStep(UnitPressure):
     def _moving(self, experiment: Experiment, still: Array, values: Mapping[str, float]) -> Array:
         time, get = experiment["time_s"], values.get
         if (period := get("inertia.period_s", 0.0)) > 0.0:
-            return swinging(time, still, 1.0 / period, get("inertia.damping", 0.1))
+            moved = swinging(time, still, 1.0 / period, get("inertia.damping", 0.1))
+            return self._seen(experiment, still, moved, period)
         if (period := get("inertia.first_s", 0.0)) > 0.0:
             loss, second = get("inertia.loss", 0.1), get("inertia.second", 0.0)
             first, fast = (
                 swinging(time, still, hertz, loss)
                 for hertz in (1.0 / period, get("inertia.faster", 6.27) / period)
             )
-            return np.asarray((1.0 - second) * first + second * fast)
+            return self._seen(experiment, still, (1.0 - second) * first + second * fast, period)
         return still
+
+    def _seen(self, experiment: Experiment, still: Array, moved: Array, period_s: float) -> Array:
+        """What a camera sees (c, n) of channels that swing: less than all where a picture takes a period.
+
+        Each picture is a mean over its exposure. Without that a swing much faster than the pictures comes out
+        as any slow one, and fits noise.
+        """
+        share = min(1.0, period_s / (2.0 * self._picture_s[experiment.name])) ** 2
+        return np.asarray(still + share * (moved - still))
 
 
 def _mean(experiment: str, start_s: float) -> str:
