@@ -46,6 +46,10 @@ LIBRARY = {
         "the zero of the pressure gauge drifts while it records",
         "the same hold at another pressure; the gauge read at rest for as long",
     ),
+    "force_gain": (
+        "the load cell has a gain error",
+        "a dead weight hung from the load cell, before and after",
+    ),
     "force_drift": (
         "the zero of the load cell drifts while it records",
         "the load cell read for as long without a specimen",

@@ -36,6 +36,7 @@ OF_THE_BENCH = CAMERA.union(
         "pressure_offset",
         "pressure_gain",
         "pressure_drift",
+        "force_gain",
         "force_drift",
         "force_lag",
         "line_lag",

@@ -8,6 +8,7 @@ import pytest
 
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.camera import read_by_camera
+from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
@@ -245,3 +246,25 @@ def test_a_camera_that_turns_moves_angle_and_markers_as_one_body():
     assert math.hypot(seen[1, 1], seen[2, 1] - 37.5) == pytest.approx(math.hypot(*about))
     turned = math.degrees(math.atan2(seen[1, 1], seen[2, 1] - 37.5) - math.atan2(*about))
     assert turned == pytest.approx(2.0)
+
+
+def test_a_load_cell_whose_gain_was_another_one_day_is_told():
+    """Six tests of one coupon on two days: on the second the cell reads 6 % too much."""
+    rng, made = np.random.default_rng(3), []
+    t = np.linspace(0.0, 60.0, 240)
+    strain = 0.15 * (1.0 - np.abs(1.0 - 2.0 * (t / 20.0 % 1.0)))
+    for number in range(6):
+        e = experiment(
+            "coupon",
+            {"time_s": t, "strain": strain, "stress_kPa": 0.0 * t},
+            name=f"test {number}",
+            specimen="A",
+            session="Monday" if number < 3 else "Tuesday",
+        )
+        stress = CouponStress([e]).predict(e, {"coupon_modulus_kPa": 900.0})[0]
+        read = stress * (1.06 if number > 2 else 1.0) + rng.normal(0.0, 0.3, len(t))
+        made.append(attrs.evolve(e, columns={**e.columns, "stress_kPa": read}))
+    found = diagnose(made, Composite(dict(bench_simulators(made))))
+    # Two sessions are too few for a spread, and a last one is like something that broke before it.
+    assert [c.effect.title for c in found.selection.causes] == ["force_gain among experiments"]
+    assert found.kind == "named"

@@ -1,4 +1,4 @@
-"""What the amplifier of a load cell does: it averages, and so delays what is read."""
+"""What a load cell and its amplifier do: a gain that is off, a mean over time that delays what is read."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from .effective_pressure import first_order_lag
 
 Array = np.ndarray[Any, Any]
 
+GAIN = Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "calibrations of load cells")
 FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
 # Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.
 FILTER_OF_TWO = (
@@ -23,9 +24,10 @@ FILTER_OF_TWO = (
 FILTERED = ("force_lag.time_s", "force_lag.period_s")
 
 
-def filters(kind: str) -> tuple[Effect, ...]:
-    """Effects, for a kind, of the load cell's amplifier: a filter of one pole, or of two."""
+def amplifier(kind: str) -> tuple[Effect, ...]:
+    """Effects, for a kind, of the load cell's amplifier: its gain, a filter of one pole, or of two."""
     return (
+        Effect("force_gain", (GAIN,), (kind,)),
         Effect("force_lag", FILTER, (kind,)),
         Effect(
             "force_lag",
@@ -37,8 +39,14 @@ def filters(kind: str) -> tuple[Effect, ...]:
     )
 
 
+def amplified(force: Array, values: Mapping[str, float]) -> Array:
+    """Force or stress (n,) with the gain that a load cell has beside the right one (`amplifier`)."""
+    gain = values.get("force_gain.gain", 0.0)
+    return force * (1.0 + gain) if gain else force
+
+
 def filtered(time_s: Array, force: Array, values: Mapping[str, float]) -> Array:
-    """Force or stress (n,) as a load cell's amplifier passes it on, at times (n,) in s (`filters`)."""
+    """Force or stress (n,) as a load cell's amplifier delays it, at times (n,) in s (`amplifier`)."""
     if (period := values.get("force_lag.period_s", 0.0)) > 0.0:
         return swinging(time_s, force[None], 1.0 / period, values.get("force_lag.damping", 0.87))[0]
     return first_order_lag(time_s, force, values.get("force_lag.time_s", 0.0))

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
 from ..effect import Effect, Parameter
-from .amplifier import filtered, filters
+from .amplifier import amplified, amplifier, filtered
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
 from .unit import (
@@ -79,7 +79,7 @@ class BlockedForce:
             *(Effect(e.name, e.parameters, (KIND,)) for e in static),
             *drifts("pressure_drift", "kPa", gauge, KIND, here),
             *drifts("force_drift", "N", ZERO_SHARE * most, KIND, here),
-            *filters(KIND),
+            *amplifier(KIND),
             *([Effect("frame_compliance", (STAND,), (KIND,))] if "seating" in self._sizes else []),
         )
         curved = tuple(p for p in self._driven.nuisances if not p.linear)
@@ -113,7 +113,7 @@ class BlockedForce:
             static["gravity"] = static["gravity"] / modulus
         force = self._balanced(response, p, static, get("frame_compliance.stand_mm_per_N", 0.0) * modulus)
         read = modulus * pressing(t, force, relaxing)
-        read = filtered(t, read, values) + drift("force_drift", t, values)
+        read = amplified(filtered(t, read, values), values) + drift("force_drift", t, values)
         return (read + get(_zero(experiment), 0.0))[None]
 
     def _balanced(self, response: UnitResponse, p: Array, static: Mapping[str, float], give: float) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .amplifier import FILTERED, filtered, filters
+from .amplifier import FILTERED, amplified, amplifier, filtered
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import decades_lag, first_order_lag, spread_lag
 from .instants import finer
@@ -162,7 +162,7 @@ def _zero(experiment: Experiment) -> str:
 
 
 def load_cell(experiments: Sequence[Experiment], kind: str) -> tuple[Effect, ...]:
-    """Effects, for a kind, of the load cell that reads experiments over time: a zero that drifts, a lag.
+    """Effects, for a kind, of the load cell that reads experiments over time: zero, gain and lag.
 
     One cell reads all specimens, so that its zero drifts in N. A specimen whose section is not given is taken
     for a cube of `LENGTH_mm`.
@@ -172,7 +172,7 @@ def load_cell(experiments: Sequence[Experiment], kind: str) -> tuple[Effect, ...
         return ()
     largest_N = max(largest_reading("stress_kPa", kind, [e]) / _kPa_per_N(e) for e in timed)
     wandering = drifts("force_drift", "N", ZERO_SHARE * largest_N, kind, timed)
-    return (*wandering, *filters(kind))
+    return (*wandering, *amplifier(kind))
 
 
 def _kPa_per_N(experiment: Experiment) -> float:
@@ -199,6 +199,7 @@ def recorded(
     else:
         found = _borne(experiment, law, values, past)
     if timed:
+        found = amplified(found, values)
         found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
     zero = values.get(_zero(experiment), 0.0)
     return found + zero if zero else found

@@ -23,6 +23,7 @@ TO_DO = {
     "pressure_offset": f"set the gauge's zero, or take the offset off the readings; {_INSTRUMENT}",
     "pressure_gain": f"have the gauge calibrated, or divide its readings by the gain; {_INSTRUMENT}",
     "pressure_drift": f"let the gauge warm up, and read its zero before and after; {_INSTRUMENT}",
+    "force_gain": f"calibrate the load cell by a dead weight; {_INSTRUMENT}",
     "force_drift": f"let the load cell warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_lag": f"switch off the load cell's filter, or test slower; {_INSTRUMENT}",
     "line_lag": f"{_MODEL}; a shorter or wider line, or a gauge at the unit",
