@@ -115,6 +115,15 @@ class Fitter:
         kept = ~left_out if self._kept is None else self._kept & ~left_out
         return Fitter(self.record, self.simulator, self.sources, kept, self.whitening)
 
+    def left_out(self, rows: Array, model: Fit) -> float:
+        """Chi squared of the values rows (N,) by a model fitted to the others; inf without prediction."""
+        found = self.without(rows).fit(model.effects, model.values)
+        predicted = self.possible(found.values)
+        if predicted is None:
+            return math.inf
+        r = self.whitening(self.record.values - predicted)[rows]
+        return float(r @ r)
+
     def whitened(self, columns: Array) -> Array:
         """Columns (N,) or (N, k) in the record's units, whitened; 0 where values do not count."""
         w = self.whitening(columns)

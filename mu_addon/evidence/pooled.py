@@ -289,11 +289,6 @@ def _predicts(fitter: Fitter, base: Fit, best: Fit) -> bool:
     lost = 0.0
     for side in (0, 1):
         left_out = quarter % 2 == side
-        rest = fitter.without(left_out)
-        chi2 = []
-        for model in (base, best):
-            again = rest.fit(model.effects, model.values)
-            r = fitter.whitening(record.values - fitter.predict(again.values))[left_out]
-            chi2.append(float(r @ r))
-        lost += chi2[0] - chi2[1]
+        before, after = (fitter.left_out(left_out, model) for model in (base, best))
+        lost += before - after if before != after else 0.0
     return lost > 0.0

@@ -619,13 +619,8 @@ def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     """
     lost = fitter.deviance(less)[PRIOR] - fitter.deviance(more)[PRIOR]
     for rows in _folds(fitter, more):
-        rest = fitter.without(rows)
-        chi2 = []
-        for model in (less, more):
-            found = rest.fit(model.effects, model.values)
-            r = fitter.whitening(fitter.record.values - fitter.predict(found.values))[rows]
-            chi2.append(float(r @ r))
-        lost += chi2[0] - chi2[1]
+        before, after = (fitter.left_out(rows, model) for model in (less, more))
+        lost += before - after if before != after else 0.0
     return lost
 
 

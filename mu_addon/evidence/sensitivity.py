@@ -38,12 +38,17 @@ def signatures(
     one specimen or found before. Drifts of zeros are left out, and columns of zeros.
     """
     base = record.predict(simulator, values)
-    columns = [
-        (record.predict(simulator, {**values, p.name: values.get(p.name, p.null) + abs(p.step)}) - base)
-        / p.step
-        for p in simulator.nuisances
-        if not p.linear
-    ]
+    columns: list[Array] = []
+
+    def slope(key: str, at: float, step: float, by: float, beside: Mapping[str, float]) -> None:
+        # A value without a prediction tells of no slope.
+        found = record.possible(simulator, {**values, **beside, key: at + step})
+        if found is not None:
+            columns.append((found - base) / by)
+
+    for p in simulator.nuisances:
+        if not p.linear:
+            slope(p.name, values.get(p.name, p.null), abs(p.step), p.step, {})
     for e in (*simulator.effects, *effects):
         size = e.parameters[0]
         if e.name in WANDERING and e not in effects:
@@ -52,11 +57,10 @@ def signatures(
             for key, p in zip(e.keys, e.parameters, strict=True):
                 now = values.get(key, p.null)
                 h = p.step if p.low <= now + p.step <= p.high else -p.step
-                columns.append((record.predict(simulator, {**values, key: now + h}) - base) / h)
+                slope(key, now, h, h, {})
             continue
         for shape in e.shapes():
-            moved = {**values, **shape, e.keys[0]: size.null + size.step}
-            columns.append((record.predict(simulator, moved) - base) / size.step)
+            slope(e.keys[0], size.null, size.step, size.step, shape)
         tried = (record.possible(simulator, {**values, **start}) for start in e.starts())
         columns += [found - base for found in tried if found is not None]
     return np.stack([c for c in columns if c.any()], axis=1) if columns else np.zeros((len(base), 0))
@@ -177,12 +181,25 @@ def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensi
 
 
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:
-    """Derivative (N,) of the prediction by one value, central unless a bound is in the way."""
+    """Derivative (N,) of the prediction by one value, central unless a bound is in the way.
+
+    Of one side alone where the other has no prediction. 0 where neither has: `Composite.refused` says why.
+    """
     at, h = values.get(key, p.null), 1.0 if p.linear else 0.05 * p.step
-    up, down = fitter.predict({**values, key: at + h}), at - h
-    if p.low <= down <= p.high:
-        return np.asarray((up - fitter.predict({**values, key: down})) / (2.0 * h))
-    return np.asarray((up - fitter.predict({**values, key: at})) / h)
+    up = fitter.possible({**values, key: at + h})
+    down = fitter.possible({**values, key: at - h}) if p.low <= at - h <= p.high else None
+    if up is not None and down is not None:
+        return np.asarray((up - down) / (2.0 * h))
+    here = fitter.predict({**values, key: at})
+    if up is not None:
+        return np.asarray((up - here) / h)
+    if down is not None:
+        return np.asarray((here - down) / h)
+    try:
+        fitter.predict({**values, key: at + h})
+    except MuError as error:
+        fitter.simulator.refused[key.partition(".")[0]] = error.what
+    return np.zeros_like(here)
 
 
 def _secant(fitter: Fitter, values: Mapping[str, float], effect: Effect) -> Array:

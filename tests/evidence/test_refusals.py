@@ -41,8 +41,12 @@ def blocks(**hidden):
 @pytest.mark.parametrize(
     ("softest", "refused"),
     # The fits of a frame's share begin at 0.3.
-    [(0.05, {"frame_compliance": "no equilibrium of the block"}), (0.31, {})],
-    ids=["at no start", "on the way"],
+    [
+        (0.0, {"frame_compliance": "no equilibrium of the block"}),
+        (0.05, {"frame_compliance": "no equilibrium of the block"}),
+        (0.31, {}),
+    ],
+    ids=["at no size", "at no start", "on the way"],
 )
 def test_a_rival_without_prediction_does_not_end_a_diagnosis(softest, refused):
     found = diagnose(blocks(overcure__offset_mm=0.1), Composite({"lattice_compression": Buckling(softest)}))
