@@ -283,7 +283,7 @@ def test_no_reading_that_is_wrong_decides_a_verdict(tmp_path, battery, number):
     """
     _, verdict = judged(tmp_path, "clean", number, battery)
     assert verdict.kind == "none", verdict.selection.left
-    assert any("farther from the fit" in said for said in verdict.set_aside)
+    assert any("farther from the fit" in words for words in verdict.set_aside)
 
 
 def test_effects_that_leave_equally_little_are_told_as_a_choice(tmp_path):
@@ -292,9 +292,9 @@ def test_effects_that_leave_equally_little_are_told_as_a_choice(tmp_path):
     assert verdict.kind == "ambiguous"
     assert {*of.truth, "force_lag"} <= verdict.ambiguity
     assert verdict.selection.left
-    headline, said = sentence(verdict)
+    headline, words = sentence(verdict)
     assert headline.startswith("mainly line lag")
-    assert "nearly all" in said
+    assert "nearly all" in words
 
 
 def test_a_leak_that_ends_is_not_taken_for_warmth(tmp_path):

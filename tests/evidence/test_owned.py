@@ -101,12 +101,15 @@ def strips(moduli, seed=0):
 
 def test_a_specimen_that_is_softer_is_another_batch_or_at_least_may_be():
     found = judged(strips([1200.0, 1200.0, 1080.0, 1200.0]))
-    said = {c.effect.title for c in found.selection.causes} | {
+    titles = {c.effect.title for c in found.selection.causes} | {
         r for c in found.selection.causes for r in c.rivals
     }
     assert found.kind in ("named", "ambiguous")
-    assert "batch_variation of specimen C" in said
-    assert all(title.endswith("of specimen C") for title in said)
+    assert "batch_variation of specimen C" in titles
+    # A load cell that was off in its only test does the same.
+    cell = {t for t in titles if t.startswith("force_gain of experiment")}
+    assert len(cell) < 2
+    assert all(title.endswith("of specimen C") for title in titles - cell)
 
 
 def test_owners_are_specimens_and_for_instruments_experiments():

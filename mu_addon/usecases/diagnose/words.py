@@ -100,14 +100,14 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     if verdict.kind == "ambiguous":
         choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
-        said = (
+        message = (
             "The model is wrong. Each of these effects explains the data, and these data do not "
             f"distinguish them. Fitted values: {'; '.join(sizes)}."
         )
         if not found.left:
-            return " and ".join(choices), said
-        said = said.replace("explains the data", "explains nearly all of the data")
-        return f"mainly {' and '.join(choices)}", f"{said} {_what_remains(verdict)}"
+            return " and ".join(choices), message
+        message = message.replace("explains the data", "explains nearly all of the data")
+        return f"mainly {' and '.join(choices)}", f"{message} {_what_remains(verdict)}"
     if verdict.kind == "none":
         return (
             "no model error detected",
