@@ -41,14 +41,17 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
     """Say how the process of a command line ended, where it stood and what to do, in its folder as well."""
     # Only now: as long as all goes well, this process needs none of it.
-    from ..run.context import last_stage, record_crash
+    from ..run.context import has_ended, last_stage, record_crash, terminated
     from ..run.progress import Progress, json_lines, terminal
     from .main import parser
 
     options = parser().parse_args(list(line))
     folder = Path(options.out) if getattr(options, "out", None) else None
+    if crash.asked and folder is not None and has_ended(folder):
+        # It has said so itself, and was writing its report.
+        return
     stage, made = last_stage(folder) if folder is not None else ("", [])
-    error = _error(options, folder, stage, made, crash)
+    error = terminated(folder) if crash.asked else _error(options, folder, stage, made, crash)
     if folder is not None:
         record_crash(folder, error, crash.stack)
     json = getattr(options, "json", False)

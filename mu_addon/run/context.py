@@ -7,6 +7,7 @@ import json
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -20,10 +21,10 @@ from ..errors import InputError, MuError, OutputError
 from ..files import output_error, plain, write_json, write_text
 from ..reading import file_bytes, parse_json
 from .lock import FolderLock
-from .progress import Progress, log_file
-from .supervisor import INTERRUPTED
+from .progress import Message, Progress, log_file
+from .supervisor import INTERRUPTED, TERMINATED
 
-DONE, UNEXPECTED, TERMINATED = 0, 70, 143
+DONE, UNEXPECTED = 0, 70
 SUMMARY = "summary.json"
 # What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
@@ -31,6 +32,7 @@ _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memo
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 # Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
 RESERVED = 1 << 14
+KEEP_EVERY_S = 2.0
 
 
 class _Interrupted(MuError):
@@ -70,6 +72,7 @@ class RunContext:
     hurried: bool = False
     console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
     _lock: FolderLock | None = None
+    _kept_s: float = 0.0
 
     def write_report(self, stopped: str = "") -> None:
         """Write the report, where there is one and it is wanted."""
@@ -110,35 +113,58 @@ class RunContext:
         """
         self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))
-        text = json.dumps(plain({"status": "running", **self.summary}), ensure_ascii=False, allow_nan=False)
-        write_text(folder / SUMMARY, text.ljust(RESERVED) + "\n")
         self.folder = folder
+        self._write_running()
+        self.progress.sinks.append(self._keep_found)
         return folder
+
+    def _write_running(self) -> None:
+        found = {**self.summary, "status": "running"}
+        text = json.dumps(plain(found), ensure_ascii=False, allow_nan=False)
+        write_text(self.folder / SUMMARY, text.ljust(RESERVED) + "\n")  # type: ignore[operator]
+
+    def _keep_found(self, message: Message) -> None:
+        """What was found goes to summary.json between stages and every few seconds: a kill takes nothing."""
+        if message.get("type") != "progress":
+            return
+        now = time.monotonic()
+        if message["state"] != "run" or now - self._kept_s > KEEP_EVERY_S:
+            self._kept_s = now
+            seconds = {**self.summary.get("seconds", {}), **self.progress.seconds}
+            if seconds:
+                self.summary["seconds"] = seconds
+            self._write_running()
 
 
 def _says_running(path: Path) -> bool:
     """Whether a summary is that of a run which has not ended."""
+    return _read_summary(path).get("status") == "running"
+
+
+def _read_summary(path: Path) -> dict[str, Any]:
     try:
         found = parse_json(file_bytes(path), SUMMARY)
     except (OSError, InputError):
-        return False
-    return isinstance(found, dict) and found.get("status") == "running"
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
     """Have a folder say how its run ended, whose process was lost: in summary.json and log.ndjson.
 
-    stack: Python's, where it crashed. Nothing is written where no run of the folder was going on, or another
-    one has the folder.
+    What its stages had found stays in the summary. stack: Python's, where it crashed. Nothing is written
+    where no run of the folder was going on, or another one has the folder.
     """
-    if not _says_running(folder / SUMMARY):
+    found = _read_summary(folder / SUMMARY)
+    if found.get("status") != "running":
         return
     # What cannot be written, or is another's, is left: the error is told all the same.
     with suppress(MuError):
         lock = FolderLock(folder)
         try:
             reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
-            _replace_summary(folder / SUMMARY, [{"status": "partial", "reason": reason}])
+            state = _ended_early(error) | {"reason": reason}
+            _replace_summary(folder / SUMMARY, [found | state, state])
             log = log_file(folder / "log.ndjson")
             if stack:
                 log({"type": "traceback", "text": stack})
@@ -179,8 +205,9 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
     """Run the body; whatever stops it becomes a message and `RunContext.status`, never a traceback.
 
     A body that ends well leaves summary.json with "status": "complete". Any other leaves what it has
-    written, and summary.json with "status": "partial" and the reason. Exit status: 0, a MuError's own,
-    130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose traceback goes to log.ndjson.
+    written, and summary.json with the reason and "status": "partial", after SIGTERM "cancelled". Exit
+    status: 0, a MuError's own, 130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose
+    traceback goes to log.ndjson.
     """
     context = RunContext(progress)
     # Blender replaces Python's handler of Ctrl-C, and leaves SIGTERM to kill the process where it stands.
@@ -198,12 +225,25 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             context.unlock()
 
 
+def terminated(folder: Path | None) -> MuError:
+    """The end of a run that was asked to stop by SIGTERM."""
+    where = f"finished results are in {folder}" if folder else ""
+    return _Terminated("cancelled", where, "run it again: it goes on from there")
+
+
+def has_ended(folder: Path) -> bool:
+    """Whether the last run of a folder has said how it ended."""
+    return _read_summary(folder / SUMMARY).get("status", "running") != "running"
+
+
 def _interrupted(context: RunContext) -> MuError:
     return _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context))
 
 
 def _failure(context: RunContext, error: Exception) -> MuError:
     """What stopped a run, in words; the stack of a fault of this program goes to log.ndjson."""
+    if isinstance(error, _Terminated):
+        return terminated(context.folder)
     if isinstance(error, MuError):
         return error
     if isinstance(error, ModuleNotFoundError):
@@ -237,10 +277,14 @@ def _stop(context: RunContext, error: MuError) -> None:
     _set_signals(signal.SIG_IGN)
     context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
-    partial = {"status": "partial", "reason": reason}
+    partial = _ended_early(error) | {"reason": reason}
     # The reason for stopping may be that nothing can be written any more.
     with suppress(MuError):
         _write_summary(context, partial)
+    terminated = isinstance(error, _Terminated)
+    if terminated:
+        # The last word before the report, for which who watches may not wait.
+        context.progress.error(error)
     if context.report is not None:
         context.hurried = isinstance(error, (_Interrupted, _Terminated))
         if isinstance(error, _Interrupted) and context.wants_report:
@@ -257,7 +301,12 @@ def _stop(context: RunContext, error: MuError) -> None:
         _set_signals(signal.SIG_IGN)
         with suppress(MuError):
             _write_summary(context, partial)
-    context.progress.error(error)
+    if not terminated:
+        context.progress.error(error)
+
+
+def _ended_early(error: MuError) -> dict[str, str]:
+    return {"status": "cancelled" if isinstance(error, _Terminated) else "partial"}
 
 
 def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
@@ -334,4 +383,4 @@ def _may_set_signals() -> bool:
 
 
 def _raise_terminated(number: int, frame: FrameType | None) -> None:
-    raise _Terminated("stopped by the process that started it")
+    raise _Terminated("cancelled")

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import make_folder, output_error
+from .supervisor import watcher
 
 LOCK = "run.lock"
 # Locked far behind the text, since on Windows nobody else may read what is locked.
@@ -71,6 +72,8 @@ class FolderLock:
     def _sign(self) -> None:
         mine = {
             "process": os.getpid(),
+            # Who watches it hears a request to stop also while a library keeps this process busy.
+            "watcher": watcher(),
             "machine": socket.gethostname(),
             "since": time.strftime("%Y-%m-%d %H:%M:%S"),
         }
@@ -82,7 +85,8 @@ class FolderLock:
 def holder(folder: Path) -> int | None:
     """Number of the process of this machine that works in a folder, or None: nobody does, or another's.
 
-    0 where one does that has not signed yet. Where the file system offers no locks nobody is found.
+    Of a process that is watched it is the number of who watches: that one is to be asked to stop. 0 where one
+    works that has not signed yet. Where the file system offers no locks nobody is found.
     """
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     try:
@@ -95,7 +99,7 @@ def holder(folder: Path) -> int | None:
         found = _signature(handle)
         if found.get("machine", socket.gethostname()) != socket.gethostname():
             return None
-        number = found.get("process")
+        number = found.get("watcher", found.get("process"))
         return number if isinstance(number, int) and number > 0 else 0
     else:
         return None
@@ -118,7 +122,8 @@ def _owner(handle: int) -> str:
     try:
         os.lseek(handle, 0, os.SEEK_SET)
         signed: Any = json.loads(os.read(handle, 1000))
-        return f"process {signed['process']:d} on {signed['machine']!s:.80}, since {signed['since']!s:.80}"
+        number = signed.get("watcher", signed["process"])
+        return f"process {number:d} on {signed['machine']!s:.80}, since {signed['since']!s:.80}"
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         # It has the lock and has not signed yet.
         return "it has just started"

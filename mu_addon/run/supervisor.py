@@ -23,7 +23,13 @@ CRASHED = 71
 """Exit status of a command whose process was ended by a signal, or by a library without a word."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
+TERMINATED = 143
+"""Exit status after SIGTERM."""
+GRACE_S = 1.0
+"""Seconds that a worker asked by SIGTERM has to write what it found: whoever cancels is answered in two. A
+library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
+_watcher: list[int] = []
 _stack_to: list[int] = []
 """Where a worker that crashes writes Python's stack: the end of the pipe to who watches."""
 
@@ -32,13 +38,15 @@ class Crash(NamedTuple):
     """A worker that ended without having said its exit status.
 
     signal: its number, or 0 for a library that ended the process by itself, with exit status `status`.
-    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing.
+    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing. asked: whether
+    it was asked to stop by SIGTERM, and so is no crash.
     """
 
     signal: int
     status: int
     memory_MB: float
     stack: str
+    asked: bool = False
 
 
 def supervised(
@@ -46,8 +54,10 @@ def supervised(
 ) -> int:
     """Exit status of `work`, done in a fork of this process; `CRASHED` where it did not live to give one.
 
-    tell: called in this process, after such an end. ends_with_input: end both once standard input ends.
-    Without fork (Windows), or where the system refuses one, `work` is done in this process.
+    A worker that does not end within `GRACE_S` of a SIGTERM is killed, and the status is `TERMINATED`.
+    tell: called in this process, after an end of which the worker said nothing. ends_with_input: end both
+    once standard input ends. Without fork (Windows), or where the system refuses one, `work` is done in
+    this process.
     """
     if not hasattr(os, "fork"):
         return _alone(work, ends_with_input)
@@ -75,16 +85,19 @@ def supervised(
         return _report_status(work, status_write)
     for end in (group_alive, alive, status_write):
         os.close(end)
-    before = _pass_on_signals(worker)
+    asked: list[int] = []
+    before = _pass_on_signals(worker, asked)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if ends_with_input:
         end_with_input()
     try:
         _, ended, usage = os.wait4(worker, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         os.set_blocking(status_read, False)
+        report = b""
         with suppress(BlockingIOError):
-            return _outcome(os.read(status_read, 1 << 16), os.waitstatus_to_exitcode(ended), usage, tell)
-        return _outcome(b"", os.waitstatus_to_exitcode(ended), usage, tell)
+            report = os.read(status_read, 1 << 16)
+        return _outcome(report, os.waitstatus_to_exitcode(ended), usage, bool(asked), tell)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -111,7 +124,7 @@ def _report_status(work: Callable[[], int], status_write: int) -> int:
         os.write(status_write, f"status {status}\n".encode())
 
 
-def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], object]) -> int:
+def _outcome(report: bytes, ended: int, usage: Any, asked: bool, tell: Callable[[Crash], object]) -> int:
     """What a worker said, else that it crashed."""
     if report.startswith(b"status "):
         return int(report.split()[1])
@@ -120,8 +133,9 @@ def _outcome(report: bytes, ended: int, usage: Any, tell: Callable[[Crash], obje
         return ended
     # Kilobytes, but on macOS, where they are bytes.
     memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace")))
-    return CRASHED
+    asked = asked or ended == -signal.SIGTERM
+    tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace"), asked))
+    return TERMINATED if asked else CRASHED
 
 
 def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
@@ -129,9 +143,15 @@ def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
     os.setpgid(0, 0)
     # A terminal may stop whoever writes from another group than its own.
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
+    _watcher[:] = [os.getppid()]
     _end_with(group_alive, alive)
     _stack_to[:] = [status_write]
     write_stack_at_crash()
+
+
+def watcher() -> int:
+    """Number of the process that watches this one and is asked to stop it; this one's own without one."""
+    return _watcher[0] if _watcher else os.getpid()
 
 
 def write_stack_at_crash() -> None:
@@ -177,12 +197,24 @@ def _wait_for_end(alive: int) -> None:
     os._exit(1)
 
 
-def _pass_on_signals(worker: int) -> dict[int, Any]:
-    """Hand what asks this process to stop on to the worker; returns the handlers that were there before."""
+def _pass_on_signals(worker: int, asked: list[int]) -> dict[int, Any]:
+    """Hand what asks this process to stop on to the worker; returns the handlers that were there before.
+
+    asked: gets SIGTERM when it came, from when on the worker has `GRACE_S` left.
+    """
 
     def stop(number: int, frame: Any) -> None:
+        if number == signal.SIGTERM and not asked:
+            asked.append(number)
+            signal.setitimer(signal.ITIMER_REAL, GRACE_S)
         with suppress(ProcessLookupError):
             os.kill(worker, number)
+
+    def end(number: int, frame: Any) -> None:
+        # Its own processes first: they would write to one that is gone.
+        with suppress(ProcessLookupError):
+            os.killpg(worker, signal.SIGTERM)
+            os.kill(worker, signal.SIGKILL)
 
     def pause(number: int, frame: Any) -> None:
         with suppress(ProcessLookupError):
@@ -191,7 +223,7 @@ def _pass_on_signals(worker: int) -> dict[int, Any]:
         with suppress(ProcessLookupError):
             os.killpg(worker, signal.SIGCONT)
 
-    handlers = {signal.SIGINT: stop, signal.SIGTERM: stop}
+    handlers = {signal.SIGINT: stop, signal.SIGTERM: stop, signal.SIGALRM: end}
     # Where nobody could bid it go on, nobody pauses it.
     if signal.getsignal(signal.SIGTSTP) is not signal.SIG_IGN:
         handlers[signal.SIGTSTP] = pause

@@ -11,11 +11,12 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.cli.watched import tell_crash
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.run.child import FAILED, RUNNING, Child
 from mu_addon.run.context import RESERVED, record_crash
 from mu_addon.run.folder import keep_inputs
-from mu_addon.run.supervisor import CRASHED
+from mu_addon.run.supervisor import CRASHED, Crash
 
 from .processes import PATIENCE_S, assert_clear_failure, command, run, worker_of
 from .test_resume import JOB
@@ -111,6 +112,18 @@ def test_a_solid_that_finds_no_memory(tmp_path):
     assert_clear_failure(done, done.returncode, "memory", "what to do")
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "partial"
     assert not list((tmp_path / "out").rglob("*.part*"))
+
+
+def test_who_was_asked_to_stop_and_could_not_answer_is_cancelled_with_what_it_had(tmp_path, capsys):
+    (tmp_path / "summary.json").write_text('{"status": "running", "angle_deg": {"40": 30.5}}')
+    asked = Crash(signal.SIGKILL, 0, 900.0, "", asked=True)
+    for _ in range(2):
+        tell_crash(["resume", str(tmp_path), "--json"], asked)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["status"], summary["angle_deg"]) == ("cancelled", {"40": 30.5})
+    assert "memory" not in str(summary)
+    (said,) = capsys.readouterr().out.splitlines()
+    assert (json.loads(said)["what"], json.loads(said)["status"]) == ("cancelled", 143)
 
 
 def test_a_folder_whose_run_has_ended_or_another_has_is_left_as_it_is(tmp_path):

@@ -137,17 +137,23 @@ def test_a_fault_before_there_is_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["ctrl-c", "terminate"]
+    ("number", "status", "state"),
+    [(signal.SIGINT, 130, "partial"), (signal.SIGTERM, 143, "cancelled")],
+    ids=["ctrl-c", "terminate"],
 )
-def test_stopped_from_outside(tmp_path, number, status):
+def test_stopped_from_outside(tmp_path, number, status, state):
     process = start("wait", tmp_path)
     assert process.stdout.readline() == "ready\n"
-    assert json.loads((tmp_path / "summary.json").read_text()) == {"status": "running"}
+    # What was found before the stage is on disk, whatever becomes of the process.
+    assert json.loads((tmp_path / "summary.json").read_text()) == {
+        "status": "running",
+        "angle_deg": [1.0, 2.0],
+    }
     process.send_signal(number)
     found, output, summary, log = finish(process, tmp_path)
     assert found == status
-    assert "error: stopped by" in output
-    assert summary["status"] == "partial"
+    assert ("error: stopped by" in output) == (number == signal.SIGINT)
+    assert summary["status"] == state
     assert log[-1]["status"] == status
     assert (tmp_path / "mesh.txt").read_text() == "kept"
     # Who asked for the end waits for it.

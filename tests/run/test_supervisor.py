@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are w
 PATIENCE_S = 1800.0
 
 RUN = """
-import atexit, ctypes, os, signal, sys, time
+import atexit, ctypes, itertools, os, signal, sys, time
 from mu_addon.run.supervisor import supervised
 
 how = sys.argv[1]
@@ -61,6 +61,9 @@ def work():
         sys.exit(2)
     if how == "is wrong":
         raise RuntimeError("a fault")
+    if how == "hears nothing":
+        # No line of Python's runs, and so no handler.
+        sum(itertools.repeat(1))
     if how == "holds the interpreter":
         ctypes.PyDLL(None).sleep(3600)
     return 5
@@ -68,7 +71,8 @@ def work():
 
 def tell(crash):
     memory = "MB" if crash.memory_MB > 1 else "nothing"
-    print("crash", crash.signal, crash.status, memory, "stack" if "in work" in crash.stack else "-")
+    stack = "stack" if "in work" in crash.stack else "-"
+    print("crash", crash.signal, crash.status, memory, stack, *["asked"] * crash.asked)
 
 
 sys.exit(supervised(work, tell, ends_with_input=len(sys.argv) > 2))
@@ -157,6 +161,17 @@ def test_a_request_to_stop_comes_once(number, to_group):
     output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 128 + number
     assert output.split() == ["worker", signal.Signals(number).name]
+    assert not alive(worker)
+
+
+def test_a_worker_that_hears_nothing_is_ended_in_two_seconds():
+    """A library holds the interpreter for minutes; whoever cancels does not wait for it."""
+    process, worker = start("hears nothing")
+    began = time.monotonic()
+    process.terminate()
+    output, _ = process.communicate(timeout=PATIENCE_S)
+    assert time.monotonic() - began < 2.0
+    assert (process.returncode, output.split()[-1]) == (143, "asked")
     assert not alive(worker)
 
 

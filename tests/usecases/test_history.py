@@ -78,6 +78,42 @@ def test_going_back_to_a_parameter_finds_its_run_again(tmp_path):
     assert history.best_of(history.runs(tmp_path), third).key == begun.key
 
 
+@pytest.mark.parametrize(
+    ("summary", "words"),
+    [
+        (RANKED, "complete"),
+        ({"status": "cancelled", "angle_deg": {"-40": 9.0, "10": 1.0}}, "cancelled; motion up to -40 kPa"),
+        ({"status": "cancelled", "angle_deg": {"-40": 9.0}, "solver": {}}, "cancelled; motion complete"),
+        ({"status": "partial", "reason": {"what": "stopped by Ctrl-C"}}, "cancelled; no motion yet"),
+        (
+            {"status": "partial", "reason": {"what": "no equilibrium"}, "solver": {}, "chosen": {}},
+            "stopped: no equilibrium; ranking complete",
+        ),
+        # Nobody works in its folder: it was killed.
+        ({"status": "running", "solver": {}, "angle_deg": {"-40": 9.0}}, "interrupted; motion complete"),
+    ],
+)
+def test_how_a_run_ended_in_words(tmp_path, summary, words):
+    assert ran(tmp_path, FULL, summary, 100).state == words
+
+
+def test_a_run_that_goes_on_says_so(tmp_path):
+    run = ran(tmp_path, FULL, {"status": "running"}, 100)
+    lock = FolderLock(run.folder)
+    assert run.state == "running; no motion yet"
+    lock.release()
+
+
+def test_runs_are_compared_where_both_have_been(tmp_path):
+    far = ran(tmp_path, FULL, {"status": "complete", "angle_deg": {"0": 0.0, "-20": 4.0, "-40": 9.0}}, 100)
+    short = ran(
+        tmp_path, thicker(FULL, 1.1), {"status": "cancelled", "angle_deg": {"0": 0.0, "-20": 5.0}}, 200
+    )
+    rows = {row.what: row.values for row in compare([far, short])}
+    assert rows["At -20 kPa"] == ("+4.00", "+5.00")
+    assert "At -40 kPa" not in rows
+
+
 def test_further_stages_and_a_new_name_take_up_the_run_of_the_same_inputs(tmp_path):
     run = ran(tmp_path, MOTION, SHORT, 100)
     assert history.place_of(tmp_path, FULL)[0] == run.folder

@@ -40,8 +40,8 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             return
         if found.stale:
             alert(layout, "Stale: these results belong to other parameters. Simulate again")
-        if found.status != "complete":
-            wrapped(layout, f"The run is {found.status or 'not finished'}", "INFO")
+        if not found.run.complete:
+            wrapped(layout, found.run.state.capitalize(), "INFO")
         if found.quick:
             wrapped(layout, "Quick look: linear elements lock, so the angles are too small", "ERROR")
         column = layout.column(align=True)

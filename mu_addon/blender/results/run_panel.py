@@ -50,7 +50,7 @@ def found_in(run) -> str:
         return f"{path_symbol(name)} {j:.3f}"
     if run.angles:
         return f"{run.angles[-1][1]:+.1f}°"
-    return str(run.summary.get("status") or "not run")
+    return run.state.partition(";")[0]
 
 
 class MU_PT_runs(UnitPanel, bpy.types.Panel):
@@ -78,6 +78,8 @@ class MU_PT_runs(UnitPanel, bpy.types.Panel):
             ended = time.strftime("%d %b %H:%M", time.localtime(run.changed_s))
             took = f", took {spell(run.seconds)}" if run.seconds else ""
             layout.label(text=f"{ended}{took}", icon="TIME")
+            if not run.complete:
+                wrapped(layout, run.state, "INFO")
         others = len(studies.runs_of(root)) > 1
         if others and not studies.run_by_key(root, root.mu_unit.study.against):
             wrapped(layout, "Tick a run to compare the shown one with it", "INFO")

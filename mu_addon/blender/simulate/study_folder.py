@@ -37,11 +37,6 @@ class Findings:
         return self.run.summary
 
     @property
-    def status(self) -> str:
-        """How far it came: `complete`, `running`, or why it stopped."""
-        return str(self.run.summary.get("status", ""))
-
-    @property
     def quick(self) -> bool:
         """Whether it was computed with linear elements, which lock in thin walls."""
         return self.run.detail == "quick"

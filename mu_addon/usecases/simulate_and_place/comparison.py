@@ -48,7 +48,9 @@ class Row:
 def compare(runs: Sequence[Run]) -> list[Row]:
     """Inputs in which runs differ, then bending angles, best path, J and seconds of each."""
     rows = [row for row in _inputs(runs) if len(set(row.values)) > 1]
-    pressures = sorted({p for run in runs for p, _ in run.angles})
+    met = [{p for p, _ in run.angles} for run in runs if run.angles]
+    # One that was stopped has not been everywhere: compared is where each one was.
+    pressures = sorted(set.intersection(*met) or set.union(*met)) if met else []
     for p in (pressures[0], pressures[-1]) if len(pressures) > 1 else pressures:
         angles = [dict(run.angles).get(p) for run in runs]
         rows.append(Row(f"At {p:g} kPa", "deg", tuple(_number(a, "+.2f") for a in angles)))

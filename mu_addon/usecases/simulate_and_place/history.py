@@ -27,7 +27,7 @@ from ...files import make_folder, output_error, write_text
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.cache import key
 from ...run.folder import ALWAYS, OWN
-from ...run.lock import LOCK, FolderLock
+from ...run.lock import LOCK, FolderLock, holder
 from ...toml_writer import toml_text
 from . import study_file
 from .study_file import FILES, LAYOUT, NAME, STAGES, Tables
@@ -76,6 +76,33 @@ class Run:
     def complete(self) -> bool:
         """Whether it came to its end."""
         return self.summary.get("status") == "complete"
+
+    @property
+    def state(self) -> str:
+        """How it ended, or that it goes on, and what is there: "cancelled; motion complete", say."""
+        status = str(self.summary.get("status") or "not run")
+        reason = self.summary.get("reason") or {}
+        if status == "complete" or not self.summary:
+            return status
+        if status == "running" and holder(self.folder) is None:
+            status = "interrupted"
+        if status == "partial":
+            what = str(reason.get("what", ""))
+            status = "cancelled" if what.startswith("stopped by") else f"stopped: {what}" if what else status
+        return f"{status}; {self.found}"
+
+    @property
+    def found(self) -> str:
+        """How far it came, in words."""
+        if "chosen" in self.summary:
+            return "ranking complete"
+        # The figures of the solver come with the last state.
+        if "solver" in self.summary:
+            return "motion complete"
+        if self.angles:
+            farthest = max((p for p, _ in self.angles), key=abs)
+            return f"motion up to {farthest:g} kPa"
+        return "no motion yet"
 
     @property
     def has_results(self) -> bool:

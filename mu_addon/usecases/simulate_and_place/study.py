@@ -287,6 +287,10 @@ class Study:
 
     def _reached(self, state: State) -> None:
         self.states.append(state)
+        if not (self.job.in_time or self.job.effects.in_time):
+            # At once: a run that is killed has said how far it came.
+            angles = self.context.summary.setdefault("angle_deg", {})
+            angles[f"{state.pressure_kPa:.6g}"] = self.bending_angle_deg(state.u)
         if self._ahead is not None:
             self._ahead.reached(state)
 
