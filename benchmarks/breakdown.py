@@ -75,12 +75,12 @@ def main():
     trajectory = simulate(equilibrium, *job.protocol.sample(job.times))
     total = time.perf_counter() - start
     iterations, factors = (
-        sum(getattr(s, name) for s in trajectory.states) for name in ("iterations", "factorisations")
+        sum(getattr(s, name) for s in trajectory.solved) for name in ("iterations", "factorisations")
     )
     print(
         f"{circumstances()}\n\n{given.preset}, refine {given.refine:g}: {len(model.free)} unknowns, ", end=""
     )
-    print(f"{len(trajectory.states)} states, {iterations} iterations, {factors} factorisations kept\n")
+    print(f"{len(trajectory.solved)} states, {iterations} iterations, {factors} factorisations kept\n")
     print("| part | calls | s | % |\n| --- | --- | --- | --- |")
     clock.seconds["rest"] = total - sum(clock.seconds.values())
     for name, seconds in clock.seconds.items():

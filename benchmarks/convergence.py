@@ -45,7 +45,7 @@ def angles(preset, refines):
         start = time.perf_counter()
         model = Model(mesh)
         path = simulate(Equilibrium(model, materials_of(job.unit, mesh)), np.arange(8.0), PRESSURES)
-        found = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.states}
+        found = {round(s.pressure_MPa * 1e3): bending_angle_deg(mesh, s.u) for s in path.solved}
         row = " | ".join(f"{found[p]:.3f}" for p in (-20, 20, 40))
         seconds = time.perf_counter() - start
         print(f"| {refine:g} | {len(mesh.nodes)} | {len(model.free)} | {row} | {seconds:.0f} |", flush=True)

@@ -53,7 +53,7 @@ def beside(sweeper, equilibrium, times, pressure, wanted):
             sweeper.submit((state,), 0)
 
     found = simulate(equilibrium, times, pressure, submit)
-    return dict(sweeper.solve([((s,), 0) for s in found.states if s.pressure_MPa in wanted]))
+    return dict(sweeper.solve([((s,), 0) for s in found.solved if s.pressure_MPa in wanted]))
 
 
 def seconds(call):
@@ -79,7 +79,7 @@ def main():
     warm = Equilibrium(model, materials)
     warm.reach(1e-4, [simulate(warm, np.zeros(1), np.zeros(1)).states[0]])
     baseline_s, baseline = seconds(lambda: simulate(Equilibrium(model, materials), times, pressure))
-    states = [s for s in baseline.states if s.pressure_MPa]
+    states = [s for s in baseline.solved if s.pressure_MPa]
     print(f"{len(model.free)} unknowns, {len(states)} pressures\n")
     print(f"| what | s | Model A |\n| --- | --- | --- |\n| Model A | {baseline_s:.1f} | 1 |", flush=True)
 
@@ -91,8 +91,8 @@ def main():
     def equilibrium():
         return Equilibrium(model, materials)
 
-    distinct = np.array([s.pressure_MPa for s in baseline.states])
-    few = [baseline.states[i] for pair in solution_order(distinct)[:2] for i in pair]
+    distinct = np.array([s.pressure_MPa for s in baseline.solved])
+    few = [baseline.solved[i] for pair in solution_order(distinct)[:2] for i in pair]
     wanted = {s.pressure_MPa for s in few}
     for name, every in (("ten", candidate_paths(points, windows(6))), ("a hundred", hundred(points))):
         jobs = tuple((c, RULE) for c in every)

@@ -38,4 +38,4 @@ def tip_section(mesh: Mesh, d: Dimensions, part: str = "plane") -> TipSection:
     weight = np.zeros(len(mesh.nodes))
     np.add.at(weight, faces, area[:, None] / 3)
     nodes = np.flatnonzero(weight)
-    return TipSection(nodes, mesh.nodes[nodes, 1:], weight[nodes])
+    return TipSection(nodes, mesh.nodes[nodes], weight[nodes])

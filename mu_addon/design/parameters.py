@@ -393,11 +393,9 @@ class Unit:
 
     Each section is an attrs class whose fields carry unit, bounds, meaning and source
     (`quantity.describe`). A value out of bounds, or one that breaks a co-design rule (`rules`), raises
-    InputError with what would fit. Units are immutable: `attrs.evolve` makes another.
+    InputError with what would fit. Units are immutable: `evolve` makes another.
 
-    >>> import attrs
-    >>> unit = Unit(scale=0.75)
-    >>> thicker = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, wall_mm=1.2))
+    >>> thicker = Unit(scale=0.75).evolve(wall_mm=1.2, midspan_diameter_mm=2.0)
     >>> round(thicker.dimensions.wall, 3)
     0.9
     """
@@ -417,6 +415,28 @@ class Unit:
     def __attrs_post_init__(self) -> None:
         rules.check(self.dimensions, self.lattice.allow_symmetric)
         rules.check_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
+
+    def evolve(self, **values: Any) -> Unit:
+        """The unit with other values of some parameters, by their names in its file; a rule sees all at once.
+
+        Whole sections can be given, too. Raises InputError for a name that is no parameter's and for a value
+        that does not fit.
+        """
+        sections = {d.name: _attribute(s) for s in SECTIONS for d in describe(s)}
+        head = [field.name for field in attrs.fields(Unit)]
+        given: dict[str, Any] = {name: values.pop(name) for name in head if name in values}
+        changes: dict[str, dict[str, Any]] = {}
+        for name, value in values.items():
+            if name not in sections:
+                known = [*head, *sections]
+                raise InputError(
+                    f"there is no parameter {name!r}{toml_text.nearest(name, known)}",
+                    "Unit.evolve",
+                    f"choose from {', '.join(known)}",
+                )
+            changes.setdefault(sections[name], {})[name] = value
+        changed = {s: attrs.evolve(given.get(s, getattr(self, s)), **own) for s, own in changes.items()}
+        return attrs.evolve(self, **{**given, **changed})
 
     @cached_property
     def printed(self) -> Dimensions:

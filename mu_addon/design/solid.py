@@ -54,6 +54,15 @@ class Solid:
     bar: Bar | None = None
     taken_off: tuple[float, float] = (0.0, 0.0)
 
+    @property
+    def volume_mm3(self) -> float:
+        """Volume in mm3 of what is printed, without the cavity."""
+        return self.gates.volume_mm3
+
+    def mass_g(self, density_g_per_ml: float) -> float:
+        """Mass in g of a resin of that density, a material's `density_g_per_ml`."""
+        return self.volume_mm3 / 1000.0 * density_g_per_ml
+
 
 def build_solid(
     unit: Unit,

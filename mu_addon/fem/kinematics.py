@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..meshing.mesh import TET_EDGES, Mesh, boundary_faces
-from .elements import shape_functions, shape_gradients
+from ..meshing.mesh import AXES, TET_EDGES, Mesh, boundary_faces
+from .elements import shape_functions, shape_gradients, triangle_shapes
 
 Array = np.ndarray[Any, Any]
 
@@ -84,29 +84,50 @@ def _outside(point: Array) -> InputError:
 class TipSection:
     """The end plane of a mesh's tip, whose rotation is the bending angle.
 
-    nodes: (t,) that integrate over it. yz: their places (t, 2) at rest in mm. area: the share of the plane
-    that each stands for, (t,) in mm2.
+    nodes: (t,) that integrate over it. places: theirs (t, 3) at rest in mm. area: the share of the plane that
+    each stands for, (t,) in mm2. symmetry: axes whose zero plane is a mirror of the body.
     """
 
     nodes: Array
-    yz: Array
+    places: Array
     area: Array
+    symmetry: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, mesh: Mesh, faces: tuple[Array, Array, Array] | None = None) -> TipSection:
         """The end plane of a mesh, at the height of its first `tip` node; faces: its `tip_faces`, if
         known."""
         nodes, area = _tip_areas(mesh, faces)
-        return cls(nodes, mesh.nodes[nodes, 1:], area)
+        return cls(nodes, mesh.nodes[nodes], area, mesh.symmetry)
 
     def angle_deg(self, u: Array) -> float:
         """Bending angle in degrees under nodal displacements (n, 3) in mm, see `bending_angle_deg`."""
-        area, before, after = self.area, self.yz, self.yz + u[self.nodes, 1:]
+        area, before = self.area, self.places[:, 1:]
+        after = before + u[self.nodes, 1:]
         before = before - np.average(before, axis=0, weights=area)
         after = after - np.average(after, axis=0, weights=area)
         sine = (area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
         cosine = (area[:, None] * before * after).sum()
         return float(-np.degrees(np.arctan2(sine, cosine)))
+
+    def middle_mm(self, u: Array) -> Array:
+        """The area's middle (3,) in mm of the whole body's end plane under displacements (n, 3) in mm."""
+        middle = np.average(self.places + u[self.nodes], axis=0, weights=self.area)
+        middle[[AXES.index(axis) for axis in self.symmetry]] = 0.0
+        return middle
+
+
+def cavity_volume_mm3(mesh: Mesh, u: Array) -> float:
+    """Volume in mm3 of the whole body's cavity under displacements (n, 3) in mm; 0 without one."""
+    if not len(mesh.cavity):
+        return 0.0
+    shape, slope, weight = triangle_shapes(mesh.order)
+    corners = (mesh.nodes + u)[mesh.cavity]
+    place = np.einsum("qn,fni->fqi", shape, corners)
+    one, other = np.einsum("qnd,fni->dfqi", slope, corners)
+    # Normals point out of the solid, into the cavity; nothing is enclosed by the mirror planes, through 0.
+    half = -float(np.einsum("q,fqi,fqi->", weight, place, np.cross(one, other))) / 3.0
+    return half * 2 ** len(mesh.symmetry)
 
 
 def bending_angle_deg(mesh: Mesh, u: Array) -> float:

@@ -85,7 +85,13 @@ def simulate_in_time(
         states.append(last.state)
         if on_state:
             on_state(last.state)
-    return Trajectory(time, np.asarray(pressure_kPa, float), tuple(states), np.arange(len(states)))
+    return Trajectory(
+        time,
+        np.asarray(pressure_kPa, float),
+        tuple(states),
+        np.arange(len(states)),
+        equilibrium.model.mesh,
+    )
 
 
 def _start(eq: Equilibrium, time: float) -> Instant:

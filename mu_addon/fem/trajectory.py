@@ -11,7 +11,9 @@ import numpy as np
 
 from ..design.quantity import in_MPa
 from ..errors import InputError
+from ..meshing.mesh import Mesh
 from .equilibrium import Equilibrium
+from .kinematics import TipSection, cavity_volume_mm3
 from .state import State, rest
 
 Array = np.ndarray[Any, Any]
@@ -19,19 +21,44 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Trajectory:
-    """Motion through a pressure protocol: states (s,) of distinct pressures, and which holds at each instant.
+    """Motion of a mesh through a pressure protocol, in the protocol's order: k instants.
 
-    time_s and pressure_kPa (k,); index (k,): number of the state that holds.
+    time_s and pressure_kPa (k,). solved (s,): the states that were solved for, each once, which `simulate`
+    orders by pressure; index (k,): which of them holds at each instant.
     """
 
     time_s: Array
     pressure_kPa: Array
-    states: tuple[State, ...]
+    solved: tuple[State, ...]
     index: Array
+    mesh: Mesh = attrs.field(repr=False)
 
     def of_time(self, values: Array) -> Array:
-        """Values (k, ...) at every instant of values (s, ...) at every state, in their unit."""
+        """Values (k, ...) at every instant of values (s, ...) at every solved state, in their unit."""
         return np.asarray(values)[self.index]
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """The state at each instant (k,)."""
+        return tuple(self.solved[i] for i in self.index)
+
+    @property
+    def angle_deg(self) -> Array:
+        """Bending angle (k,) in degrees at each instant, see `bending_angle_deg`. Needs a mesh with a tip."""
+        return self._read(TipSection.of(self.mesh).angle_deg)
+
+    @property
+    def tip_mm(self) -> Array:
+        """Where the middle of the tip's end plane is at each instant, (k, 3) in mm."""
+        return self._read(TipSection.of(self.mesh).middle_mm)
+
+    @property
+    def volume_mm3(self) -> Array:
+        """Volume (k,) in mm3 of the whole unit's cavity at each instant, without the inlet."""
+        return self._read(lambda u: cavity_volume_mm3(self.mesh, u))
+
+    def _read(self, of: Callable[[Array], float | Array]) -> Array:
+        return self.of_time(np.array([of(state.u) for state in self.solved]))
 
 
 def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
@@ -96,9 +123,5 @@ def simulate(
                 in_MPa(pressure), partial(equilibrium.reach, in_MPa(pressure), history)
             )
             history.append(found[pressure])
-    return _assemble(time_s, pressure_kPa, distinct, found)
-
-
-def _assemble(time_s: Array, pressure_kPa: Array, distinct: Array, found: dict[float, State]) -> Trajectory:
-    states = tuple(found[p] for p in distinct)
-    return Trajectory(time_s, pressure_kPa, states, np.searchsorted(distinct, pressure_kPa))
+    solved = tuple(found[p] for p in distinct)
+    return Trajectory(time_s, pressure_kPa, solved, np.searchsorted(distinct, pressure_kPa), model.mesh)

@@ -56,8 +56,9 @@ class Angle:
         """
         tip = _tip(structure)
         u = states[self.conditions[0]]
-        before = tip.yz - np.average(tip.yz, axis=0, weights=tip.area)
-        after = tip.yz + u[tip.nodes, 1:]
+        yz = tip.places[:, 1:]
+        before = yz - np.average(yz, axis=0, weights=tip.area)
+        after = yz + u[tip.nodes, 1:]
         after = after - np.average(after, axis=0, weights=tip.area)
         s = (tip.area * (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])).sum()
         c = (tip.area[:, None] * before * after).sum()

@@ -76,7 +76,7 @@ def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Arra
     monitored: the points (p, 3) in mm at rest, and their probe.
     """
     points, monitor = monitored
-    return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
+    return trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.solved]))
 
 
 @attrs.frozen(eq=False)

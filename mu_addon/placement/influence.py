@@ -80,7 +80,7 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
 
     pressures_MPa (t,): take only those at these pressures.
     """
-    states = [state for state in trajectory.states if state.loaded]
+    states = [state for state in trajectory.solved if state.loaded]
     if pressures_MPa is None:
         return states
     return [s for s in states if np.isclose(s.pressure_MPa, pressures_MPa, rtol=1e-9).any()]
@@ -110,18 +110,19 @@ def stable_part(
 
     out: set[int] = set()
     for sign in (-1.0, 1.0):
-        outward = [i for i, s in enumerate(trajectory.states) if s.loaded and sign * s.pressure_MPa > 0]
-        for i in sorted(outward, key=lambda i: -sign * trajectory.states[i].pressure_MPa):
-            if stable(trajectory.states[i]):
+        outward = [i for i, s in enumerate(trajectory.solved) if s.loaded and sign * s.pressure_MPa > 0]
+        for i in sorted(outward, key=lambda i: -sign * trajectory.solved[i].pressure_MPa):
+            if stable(trajectory.solved[i]):
                 break
             out.add(i)
-    kept = [i for i in range(len(trajectory.states)) if i not in out]
+    kept = [i for i in range(len(trajectory.solved)) if i not in out]
     holds = np.isin(trajectory.index, kept)
-    return Trajectory(
-        trajectory.time_s[holds],
-        trajectory.pressure_kPa[holds],
-        tuple(trajectory.states[i] for i in kept),
-        np.searchsorted(kept, trajectory.index[holds]),
+    return attrs.evolve(
+        trajectory,
+        time_s=trajectory.time_s[holds],
+        pressure_kPa=trajectory.pressure_kPa[holds],
+        solved=tuple(trajectory.solved[i] for i in kept),
+        index=np.searchsorted(kept, trajectory.index[holds]),
     )
 
 
@@ -217,8 +218,8 @@ def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
 
 def shares_of_time(trajectory: Trajectory) -> Array:
     """Share (s,), 0 to 1, of a trajectory's instants at which each loaded state holds."""
-    count = np.bincount(trajectory.index, minlength=len(trajectory.states)) / len(trajectory.index)
-    return count[[state.loaded for state in trajectory.states]]
+    count = np.bincount(trajectory.index, minlength=len(trajectory.solved)) / len(trajectory.index)
+    return count[[state.loaded for state in trajectory.solved]]
 
 
 def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations: int) -> Array:

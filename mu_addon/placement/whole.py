@@ -20,7 +20,7 @@ def whole_body(mesh: Mesh, trajectory: Trajectory) -> tuple[Mesh, Trajectory]:
     sides.
     """
     for axis in mesh.symmetry:
-        states = (attrs.evolve(s, u=mirror_displacement(mesh, s.u, axis)) for s in trajectory.states)
-        trajectory = attrs.evolve(trajectory, states=tuple(states))
+        states = [attrs.evolve(s, u=mirror_displacement(mesh, s.u, axis)) for s in trajectory.solved]
         mesh = mirror(mesh, axis)
+        trajectory = attrs.evolve(trajectory, solved=tuple(states), mesh=mesh)
     return mesh, trajectory

@@ -79,7 +79,7 @@ class PrintedWaveguides:
         time_s (k,), pressure_kPa (k,): as `simulate_in_time` takes them. Raises ConvergenceError.
         """
         motion = simulate_in_time(self._equilibrium(self.paths[number]), time_s, pressure_kPa)
-        return motion.of_time(self.points(motion.states))
+        return self.points(motion.states)
 
     def points(self, states: Sequence[State]) -> Array:
         """Anchors (s, p, 3) in mm moved by some states."""

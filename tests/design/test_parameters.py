@@ -205,6 +205,21 @@ def test_unreadable_files_are_refused(tmp_path):
         read_unit(tmp_path / "latin.toml")
 
 
+def test_parameters_are_changed_by_their_names_all_at_once():
+    unit = load_preset("mu-1.0x")
+    # The rule of nodes on apices forbids either alone.
+    found = unit.evolve(cell_mm=14.0, bladder_diameter_mm=28.0, scale=0.5, midspan_diameter_mm=2.0)
+    assert (found.scale, found.dimensions.R, found.lattice.midspan_diameter_mm) == (0.5, 7.0, 2.0)
+    assert found.chambers.wall_mm == unit.chambers.wall_mm
+    assert unit.evolve(chambers=found.chambers, wall_mm=0.8).chambers == attrs.evolve(
+        found.chambers, wall_mm=0.8
+    )
+    with pytest.raises(InputError, match="no parameter 'wal_mm'; did you mean 'wall_mm'"):
+        unit.evolve(wal_mm=1.0)
+    with pytest.raises(InputError, match="wall_mm = 60 mm is out of bounds"):
+        unit.evolve(wall_mm=60)
+
+
 def test_unknown_preset_names_those_there_are():
     with pytest.raises(InputError) as caught:
         load_preset("mu_1.0")

@@ -99,6 +99,13 @@ def test_waveguide_adds_its_bar_and_takes_its_wells():
     assert plain.gates.volume_mm3 - wells.gates.volume_mm3 == pytest.approx(6 * 1.5 * 1.0 * 0.65, rel=0.01)
 
 
+def test_mass_is_volume_times_density():
+    made = built("mu-0.75x")
+    enclosed = gates.volume(made.vertices, made.triangles)
+    assert made.volume_mm3 == pytest.approx(enclosed, rel=1e-6)
+    assert made.mass_g(1.1) == pytest.approx(1.1e-3 * enclosed, rel=1e-6)
+
+
 def test_unknown_quality_is_refused():
     with pytest.raises(InputError, match="no quality 'fine'"):
         solid.build_solid(Unit(), quality="fine")

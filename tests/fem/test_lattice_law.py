@@ -101,7 +101,7 @@ def test_sensors_in_lockstep_find_what_each_finds_alone(mesh, baseline):
     every = {c.name: c for c in candidate_paths(points, windows(6))}
     shares = [sensor_share("intersect", roi(mesh, every[n], 1.0)) for n in ("alpha2", "alpha10")]
     sweep = CandidateBatch(Model(mesh), materials, (points, probe(mesh, points)), shares, 2.5)
-    together = sweep.at(baseline.states[-1])
+    together = sweep.at(baseline.solved[-1])
     for number, found in enumerate(together):
         alone = sweep.alone(number, np.array([0.015]))[0]
         np.testing.assert_allclose(found, alone, atol=1e-6)
@@ -137,7 +137,7 @@ def test_the_map_is_the_derivative_by_all_layers_of_an_element(mesh, baseline):
 def test_more_shear_stiffness_bends_the_unit_less(mesh, baseline):
     soft = LatticeLaw("soft", LAW.layers[:1])
     path = Equilibrium(Model(mesh), materials_of(UNIT, mesh, soft)).path([0.015], rest(mesh))
-    stiff = bending_angle_deg(mesh, baseline.states[-1].u)
+    stiff = bending_angle_deg(mesh, baseline.solved[-1].u)
     assert 0 < stiff < 0.97 * bending_angle_deg(mesh, path[-1].u)
 
 

@@ -170,7 +170,7 @@ def test_motion_begins_where_the_weight_has_taken_the_body():
     found = simulate(
         body, np.arange(2.0), np.zeros(2), seen.append, kept.get, lambda s: kept.update({s.pressure_MPa: s})
     )
-    np.testing.assert_array_equal(found.states[0].u, start.u)
+    np.testing.assert_array_equal(found.solved[0].u, start.u)
     assert [s.pressure_MPa for s in seen] == list(kept) == [0.0]
     # What was kept is not solved again.
     again = simulate(body, np.arange(2.0), np.zeros(2), load=kept.get)

@@ -56,7 +56,7 @@ def swept(half, monitored):
     """Evaluations of some candidates, all solved in lockstep."""
     mesh, model, baseline = half
     sweep = CandidateBatch(model, materials(mesh), monitored, sensors(mesh, JOBS), 2.5)
-    moved = baseline.of_time(np.array([sweep.at(s) for s in baseline.states]))
+    moved = baseline.of_time(np.array([sweep.at(s) for s in baseline.solved]))
     still = moved_points(monitored, baseline)
     every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
     return {
@@ -69,7 +69,7 @@ def test_a_sensor_as_soft_as_the_lattice_changes_nothing(half, monitored):
     mesh, model, baseline = half
     soft = UNIT.material.lattice_modulus_kPa / 1e3
     sweep = CandidateBatch(model, materials(mesh), monitored, sensors(mesh, [("alpha2", "intersect")]), soft)
-    moved = sweep.at(baseline.states[-1])[0]
+    moved = sweep.at(baseline.solved[-1])[0]
     assert np.abs(moved - moved_points(monitored, baseline)[-1]).max() < 1e-6
 
 
@@ -106,7 +106,7 @@ def test_lockstep_finds_what_each_finds_alone_along_its_whole_path(half, monitor
 
 def test_the_angle_grows_with_pressure_and_changes_sign_with_it(half):
     mesh, _, baseline = half
-    angles = [bending_angle_deg(mesh, s.u) for s in baseline.states]
+    angles = [bending_angle_deg(mesh, s.u) for s in baseline.solved]
     assert angles[0] < 0 == angles[1] < angles[2]
 
 
@@ -115,7 +115,7 @@ def test_a_mirrored_mesh_answers_symmetrically_and_as_its_half(half):
     whole = mirror(mesh, "x")
     state = simulate(Equilibrium(Model(whole), materials(whole)), np.arange(2.0), PRESSURES[2:]).states[-1]
     n = len(mesh.nodes)
-    np.testing.assert_allclose(state.u[:n], baseline.states[-1].u, atol=1e-6)
+    np.testing.assert_allclose(state.u[:n], baseline.solved[-1].u, atol=1e-6)
     off = np.abs(mesh.nodes[:, 0]) > 0
     np.testing.assert_allclose(state.u[n:], state.u[:n][off] * [-1, 1, 1], atol=1e-6)
 
@@ -130,7 +130,7 @@ baseline = simulate(Equilibrium(model, materials(mesh)), np.arange(2.0), PRESSUR
 points = anchor_points(UNIT)
 every = candidate_paths(points, windows(6))
 batch = CandidateBatch(model, materials(mesh), (points, probe(mesh, points)), sensors(mesh, JOBS[2:4]), 2.5)
-moved = batch.at(baseline.states[-1])
+moved = batch.at(baseline.solved[-1])
 sys.stdout.write(mesh.hash() + " " + moved.tobytes().hex())
 """
     answers = [

@@ -145,7 +145,7 @@ def test_the_deviation_of_a_slightly_stiffer_element_is_the_map_times_its_stiffe
         factor[element] += step
         stiffer = solve(mesh, model, factor)
         curves = [
-            t.of_time(centreline(np.array([POINTS + monitor.displacement(s.u) for s in t.states]), 21))
+            t.of_time(centreline(np.array([POINTS + monitor.displacement(s.u) for s in t.solved]), 21))
             for t in (stiffer, baseline)
         ]
         J = centreline_deviation(*curves).J_hat
@@ -223,10 +223,10 @@ def test_what_is_unstable_out_of_its_plane_is_left_out():
     states = (pressed(1.3), pressed(1.1), pressed(0.9), pressed(0.5), State(0.0, np.zeros_like(mesh.nodes)))
     order = np.array([4, 3, 2, 1, 0, 1, 4])
     pressures = np.array([s.pressure_kPa for s in states])[order]
-    found = stable_part(model, material, Trajectory(np.arange(7.0), pressures, states, order))
-    assert found.states == states[2:]
+    found = stable_part(model, material, Trajectory(np.arange(7.0), pressures, states, order, mesh))
+    assert found.solved == states[2:]
     assert found.time_s.tolist() == [0.0, 1.0, 2.0, 6.0]
-    assert [found.states[i].pressure_kPa for i in found.index] == found.pressure_kPa.tolist()
+    assert [s.pressure_kPa for s in found.states] == found.pressure_kPa.tolist()
     even, odd = parities(model)
     data = model.parameters(material)
     even.model.factor.factor(even.model.tangent(states[0].u, 0.0, data))

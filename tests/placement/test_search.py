@@ -64,8 +64,8 @@ def exact(half_mesh, rule, chains):
         for c in chains
     ]
     sweep = CandidateBatch(model, made, (POINTS, monitor), shares, SENSOR_MPA)
-    moved = np.stack([sweep.at(state) for state in baseline.states], axis=1)
-    still = centreline(np.array([POINTS + monitor.displacement(s.u) for s in baseline.states]), 21)
+    moved = np.stack([sweep.at(state) for state in baseline.solved], axis=1)
+    still = centreline(np.array([POINTS + monitor.displacement(s.u) for s in baseline.solved]), 21)
     curves = (baseline.of_time(centreline(points, 21)) for points in moved)
     return np.array([centreline_deviation(curve, baseline.of_time(still)).J_hat for curve in curves])
 

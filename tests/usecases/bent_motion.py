@@ -39,7 +39,7 @@ def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, refine=0.5, un
         State(pressure_MPa=p / 1e3, u=bent(mesh, a)) for p, a in zip(pressures, angles, strict=True)
     )
     index = np.arange(len(pressures))
-    trajectory = Trajectory(index.astype(float), np.asarray(pressures), states, index)
+    trajectory = Trajectory(index.astype(float), np.asarray(pressures), states, index, mesh)
     write_model_a(folder, mesh, materials_of(unit, mesh), trajectory)
     return mesh
 

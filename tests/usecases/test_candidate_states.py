@@ -76,7 +76,7 @@ def test_what_is_solved_beside_model_a_is_kept_at_once(model_a, tmp_path):
     mesh, trajectory = model_a
     job, cache = attrs.evolve(JOB, workers=2), Cache(tmp_path)
     sweep = CandidateSolver(job, cache, mesh, JOBS, PRESSURES)
-    loaded = [state for state in trajectory.states if state.pressure_MPa]
+    loaded = [state for state in trajectory.solved if state.pressure_MPa]
     for state in loaded:
         sweep.reached(state)
     for _ in range(600):

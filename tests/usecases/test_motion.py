@@ -93,7 +93,7 @@ def test_model_a_comes_back(study, motion):
     _, mesh, trajectory, *_ = study
     assert motion.mesh.hash() == mesh.hash()
     assert np.array_equal(motion.pressure_kPa, PRESSURES)
-    assert np.allclose(motion.displacement(MODEL_A), [s.u for s in trajectory.states], atol=1e-5)
+    assert np.allclose(motion.displacement(MODEL_A), [s.u for s in trajectory.solved], atol=1e-5)
     for region in REGIONS:
         at_rest = motion.fields[region]["von_mises_kPa"][motion.state_kPa == 0.0]
         assert np.allclose(at_rest, 0.0, atol=1e-3)
@@ -125,9 +125,9 @@ def test_surfaces_are_closed_and_face_outward(study, motion, region, cut):
 def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
     _, mesh, trajectory, *_ = study
     whole = mirror(mesh, "x")
-    rest = attrs.evolve(trajectory.states[0], u=np.zeros_like(whole.nodes))
-    states = tuple(attrs.evolve(rest, pressure_MPa=s.pressure_MPa) for s in trajectory.states)
-    write_model_a(tmp_path, whole, materials_of(UNIT, whole), attrs.evolve(trajectory, states=states))
+    rest = attrs.evolve(trajectory.solved[0], u=np.zeros_like(whole.nodes))
+    states = tuple(attrs.evolve(rest, pressure_MPa=s.pressure_MPa) for s in trajectory.solved)
+    write_model_a(tmp_path, whole, materials_of(UNIT, whole), attrs.evolve(trajectory, solved=states))
     found = read_motion(tmp_path)
     assert not found.halved
     assert np.array_equal(found.skin("membrane", True).triangles, found.skin("membrane", False).triangles)
@@ -140,7 +140,7 @@ def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
     name = motion.paths[-1]
     job = next(i for i, (c, rule) in enumerate(JOBS) if (c.name, rule) == (name, "volume_fraction"))
     moved = motion.displacement(name)
-    for number, state in enumerate(trajectory.states):
+    for number, state in enumerate(trajectory.solved):
         if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
             continue
         kept = sweep._cache.get("sweep", sweep._name(state, 0))["moved_mm"][job]
@@ -156,7 +156,7 @@ def test_stress_is_that_of_the_sensors_own_material(study):
     _, mesh, trajectory, *_ = study
     materials, material = materials_of(UNIT, mesh), UNIT.material
     nodes = {region: surface_of(mesh, number).node for region, number in REGIONS.items()}
-    looked, bent = SurfaceFields(mesh, nodes), [trajectory.states[-1].u]
+    looked, bent = SurfaceFields(mesh, nodes), [trajectory.solved[-1].u]
     before = looked.of_states(bent, materials)
     share = (mesh.region == REGIONS["lattice"]).astype(float)
     filled = looked.of_states(bent, with_sensor(materials, share, material.sensor_modulus_kPa / 1e3))
@@ -189,7 +189,7 @@ def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     ((_, pressure_kPa, difference_mm),) = sweep.whole(there)
     number = int(np.argmax(np.abs(pressure_kPa)))
     state = int(np.flatnonzero(found.state_kPa == pressure_kPa[number])[0])
-    moved = whole.nodes + there.states[state].u + difference_mm[number]
+    moved = whole.nodes + there.solved[state].u + difference_mm[number]
     skin = found.skin("lattice", False)
     shown = skin.of_nodes(mesh.nodes) + skin.of_nodes(*found.sides("aside"))[state]
     _, nearest = KDTree(whole.nodes).query(skin.of_nodes(mesh.nodes))
@@ -202,7 +202,7 @@ def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     # An embedded body goes with its own side.
     inside = whole.nodes[whole.tets[::50, :4]].mean(axis=1)
     carried = found.embedding(inside)
-    weights = (there.states[state].u + difference_mm[number])[whole.tets[::50, :4]].mean(axis=1)
+    weights = (there.solved[state].u + difference_mm[number])[whole.tets[::50, :4]].mean(axis=1)
     assert np.allclose(found.carried("aside", carried)[state], weights, atol=1e-4)
 
 

@@ -48,7 +48,7 @@ def simulated(folder, job):
     study.make_mesh()
     trajectory = study.simulate()
     study.context.unlock()
-    return trajectory.of_time(np.array([study.bending_angle_deg(s.u) for s in trajectory.states])), study
+    return trajectory.of_time(np.array([study.bending_angle_deg(s.u) for s in trajectory.solved])), study
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ def write_grasp(folder: Path, gripper: Gripper, mesh: Mesh, materials: Materials
     """Write a grasp's motion into `folder`. Raises OutputError."""
     make_folder(folder)
     states = tuple(State(in_MPa(p), u) for p, u in zip(found.pressure_kPa, found.u, strict=True))
-    every = Trajectory(found.time_s, found.pressure_kPa, states, np.arange(len(states)))
+    every = Trajectory(found.time_s, found.pressure_kPa, states, np.arange(len(states)), mesh)
     write_model_a(folder, mesh, materials, every)
     write_trajectory(folder / "finger.pvd", mesh, list(zip(found.time_s.tolist(), states, strict=True)))
     motion = read_motion(folder)

@@ -183,8 +183,7 @@ def _printed(
         if name != "model_a":
             return units.simulated_in_time(names.index(name), *_samples())
         base = Equilibrium(model_of(mesh), materials, newton, explains=False)
-        motion = simulate_in_time(base, *_samples())
-        return motion.of_time(units.points(motion.states))
+        return units.points(simulate_in_time(base, *_samples()).states)
 
     return alone
 
@@ -201,5 +200,5 @@ def _together(
     points, _ = monitored
     batch = CandidateBatch(model, materials, monitored, list(shares.values()), sensor_MPa)
     at_rest = np.broadcast_to(points, (len(shares), *points.shape))
-    moved = np.array([batch.at(s) if s.pressure_MPa else at_rest for s in base.states])
+    moved = np.array([batch.at(s) if s.pressure_MPa else at_rest for s in base.solved])
     return {name: base.of_time(moved[:, i]) for i, name in enumerate(shares)}

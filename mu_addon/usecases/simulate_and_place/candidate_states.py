@@ -144,12 +144,12 @@ class CandidateSolver:
         verify: whether one of them is also followed along its whole path from rest, and all of them should
         that lead elsewhere.
         """
-        distinct = np.array([s.pressure_MPa for s in trajectory.states])
+        distinct = np.array([s.pressure_MPa for s in trajectory.solved])
         order = self._rounds(distinct)
         loaded = sum(map(len, order))
         weight = np.bincount(trajectory.index, minlength=len(distinct))
         monitor = probe(self._mesh, self._anchors)
-        still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.states])
+        still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.solved])
         known: dict[int, Array] = {}
         for pair in order:
             for numbers in self._together(distinct, pair):
@@ -236,7 +236,7 @@ class CandidateSolver:
         missing = []
         for row, number in enumerate(numbers):
             for part in self._parts:
-                state = trajectory.states[number]
+                state = trajectory.solved[number]
                 kept = self._cache.get("sweep", self._name(state, part))
                 if kept is None or not self._is_kept(state, part):
                     missing.append((row, part))
@@ -244,7 +244,7 @@ class CandidateSolver:
                     points[row, list(setting.parts[part])] = kept["moved_mm"]
         total = len(numbers) * len(self._parts)
         done = total - len(missing)
-        ways = {row: _way(trajectory.states, trajectory.states[numbers[row]]) for row, _ in missing}
+        ways = {row: _way(trajectory.solved, trajectory.solved[numbers[row]]) for row, _ in missing}
         tasks = [(ways[row], part) for row, part in missing]
         on_progress(done / total)
         for task, found in self._sweeper.solve(tasks):
@@ -265,7 +265,7 @@ class CandidateSolver:
             return
         setting = self._sweeper.setting
         states = [
-            s for s in trajectory.states if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
+            s for s in trajectory.solved if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
         ]
         for part in self._parts:
             kept = [self._cache.get("whole", self._name(s, part)) for s in states]

@@ -69,7 +69,7 @@ def evaluations(
             moved[n] = found
             on_progress(len(moved) / len(jobs))
     monitor = probe(mesh, points)
-    still = trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.states]))
+    still = trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.solved]))
     return [
         evaluation(mesh, candidate, rule, radius, moved[n], still, job.stations)
         for n, (candidate, rule) in enumerate(jobs)

@@ -87,8 +87,8 @@ def _stable(
     """Model A's motion as far as it is stable; the study warns of the pressures that `what_leaves` out."""
     assert study.trajectory is not None
     found = stable_part(model, materials, study.trajectory, sides)
-    kept = {s.pressure_MPa for s in found.states}
-    out = [in_kPa(s.pressure_MPa) for s in study.trajectory.states if s.pressure_MPa not in kept]
+    kept = {s.pressure_MPa for s in found.solved}
+    out = [in_kPa(s.pressure_MPa) for s in study.trajectory.solved if s.pressure_MPa not in kept]
     if out:
         study.warn(
             f"{what_leaves} out {', '.join(f'{p:g}' for p in sorted(out))} kPa: there the unit is unstable "

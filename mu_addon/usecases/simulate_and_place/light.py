@@ -50,7 +50,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     unit = study.job.unit
     with study.progress.stage("light", expected_s=10.0):
         law = cached_law(unit.printed, optics, study.cache, study.progress.update)
-        states = study.trajectory.states
+        states = study.trajectory.solved
         # What no pressure acts on comes first, whether or not a sample meets it.
         still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
         displacements = [still, *(s.u for s in states)]

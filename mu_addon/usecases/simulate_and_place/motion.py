@@ -226,7 +226,7 @@ def write_model_a(
     for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
     looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
-    found = looked.of_states([state.u for state in trajectory.states], materials, history)
+    found = looked.of_states([state.u for state in trajectory.solved], materials, history)
     for name, surface in surfaces.items() if len(contact_kPa) else ():
         found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
     write_npz(folder / FOLDER / "mesh.npz", arrays)
@@ -236,8 +236,8 @@ def write_model_a(
             "time_s": trajectory.time_s,
             "pressure_kPa": trajectory.pressure_kPa,
             "state": trajectory.index,
-            "state_kPa": np.array([s.pressure_kPa for s in trajectory.states]),
-            "displacement_mm": np.array([s.u for s in trajectory.states], np.float32),
+            "state_kPa": np.array([s.pressure_kPa for s in trajectory.solved]),
+            "displacement_mm": np.array([s.u for s in trajectory.solved], np.float32),
             **found,
         },
     )

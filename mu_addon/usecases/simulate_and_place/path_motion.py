@@ -40,7 +40,7 @@ def keep_motion(
     both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
     looked, materials = SurfaceFields(mesh, both), job.materials(mesh)
     candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
-    by_pressure = {state.pressure_kPa: state.u for state in trajectory.states}
+    by_pressure = {state.pressure_kPa: state.u for state in trajectory.solved}
     without: dict[str, Array] = {}
     for name, pressure_kPa, difference_mm in solver.whole(trajectory):
         still = [by_pressure[p] for p in pressure_kPa]

@@ -281,7 +281,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         )
     ]
     if study.trajectory is not None and study.mesh is not None:
-        states = sorted(study.trajectory.states, key=lambda s: s.pressure_MPa)
+        states = sorted(study.trajectory.solved, key=lambda s: s.pressure_MPa)
         shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
         shown = list({state.pressure_MPa: state for state in shown}.values())
         texts = []
@@ -311,7 +311,7 @@ def _painted(study: Study, field: str, low: float, least: float, word: str) -> P
     if any(field not in found for found in played.fields.values()):
         return None
     ends = int(played.state_kPa.argmin()), int(played.state_kPa.argmax())
-    shown = [k for k in dict.fromkeys(ends) if study.trajectory.states[k].loaded]
+    shown = [k for k in dict.fromkeys(ends) if study.trajectory.solved[k].loaded]
     painted = {name: played.fields[name][field] for name in REGIONS}
     shown = [k for k in shown if any((values[k] > low).any() for values in painted.values())]
     if not shown:

@@ -261,18 +261,18 @@ class Study:
                     self._ahead.close()
                 self._keep_partial_motion()
                 raise
-            self._write_motion(self.trajectory.states)
+            self._write_motion(self.trajectory.solved)
             self._write_contact()
-            self._write_stretch(self.trajectory.states)
+            self._write_stretch(self.trajectory.solved)
             materials = self.job.materials(self.mesh)
-            touching = self._write_self_contact(model, self.trajectory.states)
+            touching = self._write_self_contact(model, self.trajectory.solved)
             remembered = self._remembered(model)
             supplied = attrs.evolve(self.trajectory, pressure_kPa=self.job.supplied_kPa)
             write_model_a(self.folder, self.mesh, materials, supplied, remembered, touching)
-            self._look_for_self_intersection(self.trajectory.states)
-            self._tell_of_snaps(self.trajectory.states)
-            self._look_beyond_the_fit(self.trajectory.states)
-        states = [s for s in self.trajectory.states if s.loaded]
+            self._look_for_self_intersection(self.trajectory.solved)
+            self._tell_of_snaps(self.trajectory.solved)
+            self._look_beyond_the_fit(self.trajectory.solved)
+        states = [s for s in self.trajectory.solved if s.loaded]
         self.solver = {
             "method": model.solver,
             "device": model.device,
@@ -462,7 +462,7 @@ class Study:
 
         One state a pressure, ascending; one an instant where contact, the wall or an effect remembers.
         """
-        states = self.trajectory.states if self.trajectory else tuple(self.states)
+        states = self.trajectory.solved if self.trajectory else tuple(self.states)
         if self.job.in_time or self.job.effects.in_time:
             shown = [(p, s) for _, p, s in self._instants(states)]
         else:
