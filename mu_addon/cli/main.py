@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 from typing import Any
 
 from . import all_commands
@@ -74,6 +75,13 @@ def _require_usable(options: argparse.Namespace) -> None:
                 )
 
 
+def _short_report(folder: Path, why: str) -> None:
+    # Only for a run that is asked to stop.
+    from ..report.stopped import write_stopped_report
+
+    write_stopped_report(folder, why)
+
+
 def main(arguments: list[str]) -> int:
     """Run one command line; returns its exit status and never raises."""
     options = parser().parse_args(arguments)
@@ -88,6 +96,7 @@ def main(arguments: list[str]) -> int:
     with run_to_end(progress) as context:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)
+        context.short_report = _short_report
         command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
     """Say how the process of a command line ended, where it stood and what to do, in its folder as well."""
     # Only now: as long as all goes well, this process needs none of it.
-    from ..run.context import has_ended, last_stage, record_crash, terminated
+    from ..run.context import asked_to_stop, has_ended, last_stage, record_crash
     from ..run.progress import Progress, json_lines, terminal
     from .main import parser
 
@@ -51,9 +52,15 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
         # It has said so itself, and was writing its report.
         return
     stage, made = last_stage(folder) if folder is not None else ("", [])
-    error = terminated(folder) if crash.asked else _error(options, folder, stage, made, crash)
+    error = asked_to_stop(crash.asked, folder) if crash.asked else _error(options, folder, stage, made, crash)
     if folder is not None:
         record_crash(folder, error, crash.stack)
+    if folder is not None and crash.asked and getattr(options, "report", True):
+        from ..report.stopped import write_stopped_report
+
+        # Whatever it is: the words below are still to be said.
+        with suppress(Exception):
+            write_stopped_report(folder, error.what)
     json = getattr(options, "json", False)
     if not json and sys.stderr.isatty():
         # Off the line in which its progress stood.

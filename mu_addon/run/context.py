@@ -26,6 +26,8 @@ from .supervisor import INTERRUPTED, TERMINATED
 
 DONE, UNEXPECTED = 0, 70
 SUMMARY = "summary.json"
+STOPPED = "<!-- of a run that stopped early -->"
+"""Last line of a report that says so at once, and which the run's next start therefore removes."""
 # What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
 # What a disk refuses to whoever writes.
@@ -58,8 +60,9 @@ class RunContext:
     """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps.
 
     report: writes the report of what was found so far; its argument says why the run stops early, and is
-    empty where it does not. wants_report: whether it is written. hurried: whether who asked the run to stop
-    waits for its end, and so for its report. console_summary: the lines that end the run at a terminal, of
+    empty where it does not. short_report: writes a report of a folder at once that says why its run was asked
+    to stop. wants_report: whether any is written. hurried: whether who asked the run to stop waits for its
+    end, and so for its report. console_summary: the lines that end the run at a terminal, of
     its summary.
     """
 
@@ -68,6 +71,7 @@ class RunContext:
     summary: dict[str, Any] = attrs.field(factory=dict)
     status: int = DONE
     report: Callable[[str], None] | None = None
+    short_report: Callable[[Path, str], None] | None = None
     wants_report: bool = True
     hurried: bool = False
     console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
@@ -113,6 +117,10 @@ class RunContext:
         """
         self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))
+        report = folder / "report.html"
+        with suppress(OSError):
+            if file_bytes(report).rstrip().endswith(STOPPED.encode()):
+                report.unlink()
         self.folder = folder
         self._write_running()
         self.progress.sinks.append(self._keep_found)
@@ -217,18 +225,22 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
             _write_summary(context, {"status": "complete"})
             progress.result({"folder": context.folder, "summary": context.summary})
         except KeyboardInterrupt:
-            _stop(context, _interrupted(context))
+            _stop(context, asked_to_stop(signal.SIGINT, context.folder))
         except Exception as error:  # noqa: BLE001 - the last resort: told, logged and turned into a status
             # A library that Ctrl-C meets while it is loaded makes an ImportError of it.
-            _stop(context, _interrupted(context) if asked else _failure(context, error))
+            _stop(
+                context, asked_to_stop(signal.SIGINT, context.folder) if asked else _failure(context, error)
+            )
         finally:
             context.unlock()
 
 
-def terminated(folder: Path | None) -> MuError:
-    """The end of a run that was asked to stop by SIGTERM."""
+def asked_to_stop(number: int, folder: Path | None) -> MuError:
+    """The end of a run that was asked to stop by a signal, SIGINT or SIGTERM."""
     where = f"finished results are in {folder}" if folder else ""
-    return _Terminated("cancelled", where, "run it again: it goes on from there")
+    if number == signal.SIGTERM:
+        return _Terminated("cancelled", where, "run it again: it goes on from there")
+    return _Interrupted("stopped by Ctrl-C", where, "run it again: it goes on from there" if folder else "")
 
 
 def has_ended(folder: Path) -> bool:
@@ -236,14 +248,10 @@ def has_ended(folder: Path) -> bool:
     return _read_summary(folder / SUMMARY).get("status", "running") != "running"
 
 
-def _interrupted(context: RunContext) -> MuError:
-    return _Interrupted("stopped by Ctrl-C", remedy=_where_results_are(context))
-
-
 def _failure(context: RunContext, error: Exception) -> MuError:
     """What stopped a run, in words; the stack of a fault of this program goes to log.ndjson."""
     if isinstance(error, _Terminated):
-        return terminated(context.folder)
+        return asked_to_stop(signal.SIGTERM, context.folder)
     if isinstance(error, MuError):
         return error
     if isinstance(error, ModuleNotFoundError):
@@ -281,19 +289,20 @@ def _stop(context: RunContext, error: MuError) -> None:
     # The reason for stopping may be that nothing can be written any more.
     with suppress(MuError):
         _write_summary(context, partial)
-    terminated = isinstance(error, _Terminated)
-    if terminated:
-        # The last word before the report, for which who watches may not wait.
-        context.progress.error(error)
-    if context.report is not None:
-        context.hurried = isinstance(error, (_Interrupted, _Terminated))
-        if isinstance(error, _Interrupted) and context.wants_report:
-            # A second or more goes by before the last word.
+    context.hurried = isinstance(error, (_Interrupted, _Terminated))
+    if context.hurried:
+        # For what follows who watches may not wait.
+        if context.folder is not None and context.short_report is not None and context.wants_report:
+            with suppress(Exception):
+                context.short_report(context.folder, error.what)
+        if isinstance(error, _Interrupted) and context.report is not None and context.wants_report:
             with suppress(MuError):
                 context.progress.warning(
-                    "stopping: a report of what was found so far is written first",
-                    what_to_do="press Ctrl-C again to leave it out",
+                    "stopping: the report shows what was found so far",
+                    what_to_do="press Ctrl-C again for a short one",
                 )
+        context.progress.error(error)
+    if context.report is not None:
         # What takes long can be cut short by a second Ctrl-C; a failure here would only hide the first one.
         _set_signals(signal.default_int_handler)
         with suppress(Exception, KeyboardInterrupt):
@@ -301,7 +310,7 @@ def _stop(context: RunContext, error: MuError) -> None:
         _set_signals(signal.SIG_IGN)
         with suppress(MuError):
             _write_summary(context, partial)
-    if not terminated:
+    if not context.hurried:
         context.progress.error(error)
 
 

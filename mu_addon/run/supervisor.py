@@ -25,9 +25,9 @@ INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 TERMINATED = 143
 """Exit status after SIGTERM."""
-GRACE_S = 1.0
-"""Seconds that a worker asked by SIGTERM has to write what it found: whoever cancels is answered in two. A
-library may hold the interpreter for longer, and a report takes longer."""
+GRACE_S = {signal.SIGTERM: 1.0, signal.SIGINT: 2.5}
+"""Seconds that a worker asked to stop has to write what it found: whoever cancels is answered in two, whoever
+presses Ctrl-C in five. A library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _watcher: list[int] = []
 _stack_to: list[int] = []
@@ -38,15 +38,15 @@ class Crash(NamedTuple):
     """A worker that ended without having said its exit status.
 
     signal: its number, or 0 for a library that ended the process by itself, with exit status `status`.
-    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing. asked: whether
-    it was asked to stop by SIGTERM, and so is no crash.
+    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing. asked: the
+    signal that asked it to stop, SIGINT or SIGTERM, whose end is no crash, else 0.
     """
 
     signal: int
     status: int
     memory_MB: float
     stack: str
-    asked: bool = False
+    asked: int = 0
 
 
 def supervised(
@@ -54,7 +54,7 @@ def supervised(
 ) -> int:
     """Exit status of `work`, done in a fork of this process; `CRASHED` where it did not live to give one.
 
-    A worker that does not end within `GRACE_S` of a SIGTERM is killed, and the status is `TERMINATED`.
+    A worker that does not end within `GRACE_S` of Ctrl-C or SIGTERM is killed: status 128 + that signal.
     tell: called in this process, after an end of which the worker said nothing. ends_with_input: end both
     once standard input ends. Without fork (Windows), or where the system refuses one, `work` is done in
     this process.
@@ -97,7 +97,7 @@ def supervised(
         report = b""
         with suppress(BlockingIOError):
             report = os.read(status_read, 1 << 16)
-        return _outcome(report, os.waitstatus_to_exitcode(ended), usage, bool(asked), tell)
+        return _outcome(report, os.waitstatus_to_exitcode(ended), usage, next(iter(asked), 0), tell)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -124,7 +124,7 @@ def _report_status(work: Callable[[], int], status_write: int) -> int:
         os.write(status_write, f"status {status}\n".encode())
 
 
-def _outcome(report: bytes, ended: int, usage: Any, asked: bool, tell: Callable[[Crash], object]) -> int:
+def _outcome(report: bytes, ended: int, usage: Any, asked: int, tell: Callable[[Crash], object]) -> int:
     """What a worker said, else that it crashed."""
     if report.startswith(b"status "):
         return int(report.split()[1])
@@ -133,9 +133,10 @@ def _outcome(report: bytes, ended: int, usage: Any, asked: bool, tell: Callable[
         return ended
     # Kilobytes, but on macOS, where they are bytes.
     memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    asked = asked or ended == -signal.SIGTERM
+    # A library may have put the signal's own handler back, which ends a process where it stands.
+    asked = asked or (-ended if -ended in GRACE_S else 0)
     tell(Crash(max(-ended, 0), max(ended, 0), memory, report.decode("utf-8", "replace"), asked))
-    return TERMINATED if asked else CRASHED
+    return 128 + asked if asked else CRASHED
 
 
 def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
@@ -200,13 +201,16 @@ def _wait_for_end(alive: int) -> None:
 def _pass_on_signals(worker: int, asked: list[int]) -> dict[int, Any]:
     """Hand what asks this process to stop on to the worker; returns the handlers that were there before.
 
-    asked: gets SIGTERM when it came, from when on the worker has `GRACE_S` left.
+    asked: gets the first signal to stop when it comes, from when on the worker has `GRACE_S` left; a second
+    one leaves it no more than SIGTERM does.
     """
 
     def stop(number: int, frame: Any) -> None:
-        if number == signal.SIGTERM and not asked:
-            asked.append(number)
-            signal.setitimer(signal.ITIMER_REAL, GRACE_S)
+        left, _ = signal.getitimer(signal.ITIMER_REAL)
+        grace = GRACE_S[signal.SIGTERM if asked else signal.Signals(number)]
+        if not asked or left > grace:
+            signal.setitimer(signal.ITIMER_REAL, grace)
+        asked.append(number)
         with suppress(ProcessLookupError):
             os.kill(worker, number)
 

@@ -14,8 +14,9 @@ import pytest
 from mu_addon.cli.watched import tell_crash
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.run.child import FAILED, RUNNING, Child
-from mu_addon.run.context import RESERVED, record_crash
+from mu_addon.run.context import RESERVED, record_crash, run_to_end
 from mu_addon.run.folder import keep_inputs
+from mu_addon.run.progress import Progress
 from mu_addon.run.supervisor import CRASHED, Crash
 
 from .processes import PATIENCE_S, assert_clear_failure, command, run, worker_of
@@ -116,7 +117,7 @@ def test_a_solid_that_finds_no_memory(tmp_path):
 
 def test_who_was_asked_to_stop_and_could_not_answer_is_cancelled_with_what_it_had(tmp_path, capsys):
     (tmp_path / "summary.json").write_text('{"status": "running", "angle_deg": {"40": 30.5}}')
-    asked = Crash(signal.SIGKILL, 0, 900.0, "", asked=True)
+    asked = Crash(signal.SIGKILL, 0, 900.0, "", asked=signal.SIGTERM)
     for _ in range(2):
         tell_crash(["resume", str(tmp_path), "--json"], asked)
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -124,6 +125,28 @@ def test_who_was_asked_to_stop_and_could_not_answer_is_cancelled_with_what_it_ha
     assert "memory" not in str(summary)
     (said,) = capsys.readouterr().out.splitlines()
     assert (json.loads(said)["what"], json.loads(said)["status"]) == ("cancelled", 143)
+
+
+def test_after_ctrl_c_a_run_that_could_not_answer_leaves_a_report_that_says_so(tmp_path, capsys):
+    """Its tables are shown; the next start removes it: it never passes for that of a run that ended."""
+    (tmp_path / "summary.json").write_text('{"status": "running", "seconds": {"mesh <1>": 61.0}}')
+    (tmp_path / "designs.csv").write_text("# of a search\nwall_mm,mass_g\n" + "0.9,31.5\n" * 25)
+    (tmp_path / "report.html").write_text("<html>that of a run before</html>")
+    tell_crash(["resume", str(tmp_path)], Crash(signal.SIGKILL, 0, 900.0, "", asked=signal.SIGINT))
+    assert "error: stopped by Ctrl-C" in capsys.readouterr().err
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["status"], summary["reason"]["what"]) == ("partial", "stopped by Ctrl-C")
+    report = (tmp_path / "report.html").read_text()
+    for words in ("This run is partial: stopped by Ctrl-C", "mesh &lt;1&gt;", "1 min 01 s", "5 rows more"):
+        assert words in report
+    assert report.count("31.5") == 20
+    with run_to_end(Progress()) as context:
+        context.open_folder(tmp_path)
+    assert not (tmp_path / "report.html").exists()
+    # Without a report where none is wanted.
+    (tmp_path / "summary.json").write_text('{"status": "running"}')
+    tell_crash(["resume", str(tmp_path), "--no-report"], Crash(9, 0, 900.0, "", asked=signal.SIGINT))
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_a_folder_whose_run_has_ended_or_another_has_is_left_as_it_is(tmp_path):

@@ -185,7 +185,7 @@ def test_a_second_ctrl_c_cuts_short_what_takes_long(tmp_path):
     assert status == 130
     assert "error: stopped by Ctrl-C" in output
     # Said before the report is written, or nobody would know of the second one.
-    assert "press Ctrl-C again to leave it out" in output.partition("error: stopped")[0]
+    assert "press Ctrl-C again for a short one" in output.partition("error: stopped")[0]
     assert summary["status"] == "partial"
     assert not (tmp_path / "last_words.txt").exists()
 

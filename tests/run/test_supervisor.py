@@ -61,6 +61,10 @@ def work():
         sys.exit(2)
     if how == "is wrong":
         raise RuntimeError("a fault")
+    if how == "has its own handler":
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        print("ready", flush=True)
+        time.sleep(3600)
     if how == "hears nothing":
         # No line of Python's runs, and so no handler.
         sum(itertools.repeat(1))
@@ -72,7 +76,7 @@ def work():
 def tell(crash):
     memory = "MB" if crash.memory_MB > 1 else "nothing"
     stack = "stack" if "in work" in crash.stack else "-"
-    print("crash", crash.signal, crash.status, memory, stack, *["asked"] * crash.asked)
+    print("crash", crash.signal, crash.status, memory, stack, *[f"asked:{crash.asked}"] * bool(crash.asked))
 
 
 sys.exit(supervised(work, tell, ends_with_input=len(sys.argv) > 2))
@@ -164,14 +168,30 @@ def test_a_request_to_stop_comes_once(number, to_group):
     assert not alive(worker)
 
 
-def test_a_worker_that_hears_nothing_is_ended_in_two_seconds():
+@pytest.mark.parametrize(
+    ("numbers", "within_s"),
+    [([signal.SIGTERM], 2.0), ([signal.SIGINT], 5.0), ([signal.SIGINT, signal.SIGINT], 2.0)],
+)
+def test_a_worker_that_hears_nothing_is_ended_all_the_same(numbers, within_s):
     """A library holds the interpreter for minutes; whoever cancels does not wait for it."""
     process, worker = start("hears nothing")
     began = time.monotonic()
-    process.terminate()
+    for number in numbers:
+        process.send_signal(number)
+        time.sleep(0.2)
     output, _ = process.communicate(timeout=PATIENCE_S)
-    assert time.monotonic() - began < 2.0
-    assert (process.returncode, output.split()[-1]) == (143, "asked")
+    assert time.monotonic() - began < within_s
+    assert process.returncode == 128 + numbers[0]
+    assert output.split()[-1] == f"asked:{int(numbers[0])}"
+
+
+def test_a_library_that_put_the_signals_own_handler_back_is_no_crash():
+    process, _ = start("has its own handler")
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert output.split()[-1] == f"asked:{int(signal.SIGINT)}"
     assert not alive(worker)
 
 
