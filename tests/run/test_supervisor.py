@@ -183,10 +183,11 @@ def test_a_worker_that_hears_nothing_is_ended_all_the_same(numbers, within_s):
     assert time.monotonic() - began < within_s
     assert process.returncode == 128 + numbers[0]
     assert output.split()[-1] == f"asked:{int(numbers[0])}"
+    assert not alive(worker)
 
 
 def test_a_library_that_put_the_signals_own_handler_back_is_no_crash():
-    process, _ = start("has its own handler")
+    process, worker = start("has its own handler")
     assert process.stdout.readline() == "ready\n"
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=PATIENCE_S)
