@@ -1,6 +1,6 @@
 """The picture at the top of the README: a unit cut open at five pressures, with its bending angles.
 
-    python benchmarks/film_strip.py out/mu-1.0x docs/film-strip.png
+    python benchmarks/film_strip.py out/mu-1.0x docs/pictures/film-strip.png
 
 Takes the folder of a finished `place`. The printable solid is carried by the simulated motion of Model A; the
 chosen path is drawn in orange.

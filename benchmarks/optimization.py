@@ -3,7 +3,7 @@
     python benchmarks/optimization.py --method ours --budget 60 --seed 1
 
 On a coarse mesh. NSGA-II needs pymoo, and TPE optuna, which mu_addon does not depend on. A gradient counts as
-half a Model A (docs/optimize.md).
+half a Model A.
 """
 
 from __future__ import annotations

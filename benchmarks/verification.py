@@ -1,4 +1,4 @@
-"""Every answer that is known, on several meshes of each element: the tables of docs/verification.md.
+"""Every answer that is known, on several meshes of each element: docs/engineering/verification.md.
 
     python benchmarks/verification.py [--cases cook beam ...] [--meshes 2]
 

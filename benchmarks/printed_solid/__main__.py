@@ -4,9 +4,8 @@
 
 Half of the solid as drawn, its inlet left out, one resin. Its surface is remeshed to triangles of one size
 (`remesh`), filled by gmsh (HXT), and mid-edge nodes are moved onto a finer surface. The angle of the tip's
-cap and that of all that lies in its plane, struts as well, are not the same: docs/resolved.md. Fails where
-the remeshed surface crosses itself: docs/decisions.md says how often that was. --resolved: the same unit and
-resin as `mesh_printed` meshes it, too.
+cap and that of all that lies in its plane, struts as well, are not the same. Fails where the remeshed surface
+crosses itself (two of five settings). --resolved: the same unit and resin as `mesh_printed` meshes it, too.
 """
 
 from __future__ import annotations

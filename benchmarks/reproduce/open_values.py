@@ -40,7 +40,7 @@ def _range(name: str, low: float, high: float, why: str, log: bool = False) -> O
 
 
 # Beyond these, units snap between -20 and 40 kPa: tip caps below 3.4 mm, necks above 15 mm and the
-# thinnest of the softest walls have limit points there (docs/reproduce.md). The paper's units move smoothly.
+# thinnest of the softest walls have limit points there. The paper's units move smoothly.
 OPEN = (
     _range("chambers.wall_mm", 0.7, 1.2, "thinner ones snap; thicker ones are no membrane"),
     _range("chambers.neck_diameter_mm", 10.0, 15.0, "below, the inlet fills it; above, it balloons"),

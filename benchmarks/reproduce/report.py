@@ -159,7 +159,7 @@ def _sets(found: LongFound, solved: list[OpenPoint]) -> str:
     words = (
         "Named sets, and the five sampled sets without self-contact that agree best. Rank correlation; "
         "magnitude, the mean J_hat over the paper's; path chosen at 0.75x, 1.0x and 1.5x; angles at 1.0x; "
-        "distance as docs/reproduce.md has it."
+        "distance as docs/engineering/verification.md has it."
     )
     return table(words, head, rows)
 

@@ -21,7 +21,7 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py optimize assets/examples/stronger-finger/design.toml --out out/finger",
     )
     command.add_argument(
-        "file", metavar="FILE", help="Targets and freedoms, a design.toml: see docs/optimize.md."
+        "file", metavar="FILE", help="Targets and freedoms, a design.toml: see docs/guide/search.md."
     )
     add_results(command)
     add_model(command)

@@ -32,7 +32,7 @@ SHIPPED = "responses"
 REVISION = 1
 # Of every surface at 1.0x. Smaller prints are looked up further out: 0.25 mm at 0.75x is 0.33 mm here.
 OFFSETS_mm = (-0.05, 0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
-# Order 2 with one element across a strut is within 2.5 % (docs/homogenize.md), the same at every offset.
+# Order 2 with one element across a strut is within 2.5 % at every offset (docs/engineering/method.md).
 MESH = CellMeshSettings(per_diameter=1.0)
 STRAIN = 0.005
 # Only ratios of moduli are used.

@@ -21,7 +21,7 @@ def nested_dissection(pattern: sparse.csr_matrix) -> Array:
     """Fill-reducing order (n,) of the nodes of a symmetric pattern, by METIS.
 
     By minimum degree where pymetis is missing, as it has no wheel for Windows: a factor of the default unit
-    then took 0.50 instead of 0.44 s (docs/mechanics.md).
+    then took 0.50 instead of 0.44 s.
     """
     graph = pattern - sparse.diags(pattern.diagonal())
     graph = sparse.csr_matrix(graph)

@@ -153,7 +153,7 @@ def law_weight(law: Any, moduli: Moduli) -> Array:
     Of a law from `homogenize` the foam stands for struts in bending and follows E[100], cubic shear and
     diagonal stretch for struts in tension, and follow C44 and C12. The one isotropic modulus of a unit was
     measured on a block that plates hold: such blocks follow the geometric mean of E[100] and C44, within 6 %
-    over the print offsets of docs/homogenize.md.
+    over print offsets of 0.12 and 0.17 mm (docs/engineering/method.md).
     """
     return {
         Foam: moduli.E100,

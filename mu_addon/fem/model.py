@@ -36,7 +36,7 @@ Array = np.ndarray[Any, Any]
 LEAST_STRAIN = 1e-5
 # With mean dilatation, a bulk modulus up to this many shear moduli still acts point by point. Without it, a
 # wall one element thick bends 40 % too easily: one face grows, the other shrinks, and the mean sees neither.
-# Chosen by the tables in docs/locking.md.
+# Chosen by the table of tests/fem/test_locking.py; see docs/engineering/method.md.
 POINTWISE_BULK = 5.0
 # Entries of self-contact stay in the tangent's pattern until it has grown by this factor.
 MOST_GROWTH = 1.1
@@ -136,7 +136,7 @@ class Model:
         self.mean_dilatation = mean_dilatation
         self._takes_means = mesh.resolved if mean_dilatation is None else mean_dilatation
         # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor does not fit into memory; up
-        # to 436k unknowns a load step is faster with the factor (docs/performance.md).
+        # to 436k unknowns a load step is faster with the factor (docs/engineering/performance.md).
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self.obstacles: tuple[Obstacle, ...] = ()

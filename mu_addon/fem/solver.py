@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
 
 METHODS = ("auto", "direct", "iterative")
-# Of these many unknowns a factorisation on the CPU takes some 8 s and a load step 12 s (docs/performance.md);
+# At so many unknowns a factorisation on the CPU takes 8 s, a load step 12 (docs/engineering/performance.md);
 # below it an iterative solution on a device has little to win, above it that much. Reckoned, not measured.
 CUDA_PAYS = 200_000
 # Measured peak of a quadratic body's factorisation: 6.26 GB at 435 819 unknowns, to the power 0.93 of them.

@@ -32,7 +32,7 @@ _SKIN_STEPS = 4
 # Of a graded strut's diameter, logarithmic, in which depths below its surface are looked up.
 _FACTOR = 0.02
 # Of self-contact: the gap over the wall's thickness, and the barrier's stiffness over the resin's modulus;
-# docs/mechanics.md says what they move.
+# docs/engineering/method.md says what they move.
 _GAP_SHARE, _BARRIER_SHARE = 1 / 9, 0.04
 
 

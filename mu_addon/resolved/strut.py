@@ -54,7 +54,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     law = radius_of(d)
     nodes = placed(half, law, at)
     # Layers are tilted: a diagonal from what lies farther along to what lies less far leans least. The other
-    # ones make E[100] of the lattice up to 70 % too high in place of 10 (docs/resolved.md).
+    # ones make E[100] of the lattice up to 70 % too high in place of 10 (docs/engineering/method.md).
     along = np.round(nodes @ _ALONG / half, 9).reshape(layers + 1, count)
     first = np.argsort(np.argsort(-(along[1:] + along[:-1]), axis=1, kind="stable"), axis=1)
     turn = np.argsort(first[:, triangles], axis=2)

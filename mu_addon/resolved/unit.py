@@ -28,13 +28,13 @@ TIE_MM = 0.1
 """Struts' nodes this near the wall outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
 
 Nodes within the wall alone leave it free to dent between them: three chambers then bend by 5 to 10 % more
-than in a mesh that joins both (docs/resolved.md). The distance shrinks with the elements.
+than in a mesh that joins both (docs/engineering/method.md). The distance shrinks with the elements.
 """
 
 
 @attrs.frozen
 class Sizes:
-    """Element sizes of a resolved mesh; docs/resolved.md says what they cost and how they were chosen.
+    """Element sizes of a resolved mesh; how they were chosen: docs/engineering/decisions.md.
 
     Of the wall in mm for a cell of 12.5 mm, growing with it: along its meridian, and around its largest
     radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.

@@ -129,5 +129,5 @@ class Accounts:
             )
         return (
             "what comes is text in no format that is known",
-            "send `label:value` pairs, CSV, JSON lines or frames (docs/sensing.md), or choose another port",
+            "send `label:value` pairs, CSV, JSON lines or frames (docs/guide/bench.md), or try another port",
         )

@@ -39,7 +39,7 @@ def test_the_presets_blocks_are_shipped(preset, cells):
 
 
 def test_what_is_shipped_is_what_would_be_computed(tmp_path):
-    """pytetwild has no seed: meshes of one size differ by up to 1 % (docs/homogenize.md)."""
+    """pytetwild has no seed: meshes of one size differ by up to 1 % (docs/engineering/method.md)."""
     two = block_of(block(cells=(2, 2, 2)), UNIT)
     modulus, density = at_offset(two, 0.3, tmp_path)
     shipped = response(two)

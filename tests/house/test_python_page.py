@@ -1,4 +1,4 @@
-"""The examples of docs/python.md run as they stand, and print what the page shows."""
+"""The examples of the pages on Python and on extending run as they stand, and print what is shown."""
 
 import re
 import subprocess
@@ -8,8 +8,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"```python\n(.*?)```\s*```text\n(.*?)```", PAGE, re.DOTALL)
+PAGES = ("guide/python.md", "guide/print.md", "engineering/extend.md")
+EXAMPLES = [
+    example
+    for page in PAGES
+    for example in re.findall(
+        r"```python\n(.*?)```\s*```text\n(.*?)```",
+        (ROOT / "docs" / page).read_text(encoding="utf-8"),
+        re.DOTALL,
+    )
+]
 
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")

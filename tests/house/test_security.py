@@ -1,4 +1,4 @@
-"""docs/security.md says what the code does: its limits, who reads files, what is never called."""
+"""docs/engineering/security.md says what the code does: its limits, who reads files, what is never called."""
 
 import ast
 import importlib
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "engineering" / "security.md").read_text(encoding="utf-8")
 LIMITS = re.findall(r"^\| (\d+)[^|]*\|[^|]+\| `(mu_addon[\w.]*)\.(\w+)` \|$", PAGE, re.MULTILINE)
 SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
 

@@ -11,10 +11,10 @@ import pytest
 from mu_addon.cli.main import parser
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
 
-# Phrases of texts, with the term of docs/glossary.md that took their place.
+# Phrases of texts, with the term of the glossary that took their place.
 PHRASES = {
     "beaten by none": "Pareto-optimal",
     "no other beats": "Pareto-optimal",
@@ -152,7 +152,7 @@ def test_the_search_for_identifiers_can_find_one(name, retired):
 
 
 def test_the_messages_that_the_page_explains_are_those_of_the_code():
-    text = (ROOT / "docs" / "blender.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "guide" / "blender.md").read_text(encoding="utf-8")
     section = text.split("## When something is wrong")[1]
     starts = re.findall(r"^- ((?:\*[^*\n]+\*(?:, )?)+)", section, re.MULTILINE)
     assert len(starts) == len(re.findall(r"^- ", section, re.MULTILINE))
@@ -194,7 +194,9 @@ def test_links_into_pages_meet_a_heading():
 
 
 def test_the_glossary_gives_every_term_once():
-    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").split("## Words with")[0]
+    text = (
+        (ROOT / "docs" / "engineering" / "glossary.md").read_text(encoding="utf-8").split("## Words with")[0]
+    )
     rows = re.findall(r"^\| ([^|]+?) \|", text, re.MULTILINE)
     terms = [term for row in rows for term in row.split(", ") if term not in ("term", "---")]
     assert len(terms) > 100

@@ -1,5 +1,6 @@
 """Laws fitted to Treloar's rubber and to data whose law is known."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -61,21 +62,17 @@ def test_ogdens_published_parameters_lie_in_the_intervals_of_a_fit_by_relative_e
     assert [values[n].value for n in ("alpha1", "alpha2", "alpha3")] == pytest.approx([1.3, -2, 5], abs=0.25)
 
 
-def test_the_tables_of_the_documentation_are_what_comes_out(to_all_modes, to_uniaxial):
-    page = (Path(__file__).parents[2] / "docs" / "materials.md").read_text(encoding="utf-8")
-    whole, uniaxial = page.split("law, fitted to all three")[1].split("law, fitted to uniaxial alone")
-    for text, fits in ((whole, to_all_modes), (uniaxial, to_uniaxial)):
-        rows = {
-            cells[0]: cells[1:]
-            for line in text.splitlines()
-            if len(cells := line.strip("| ").split(" | ")) == 5
-        }
+def test_the_figures_of_the_documentation_are_what_comes_out(to_all_modes, to_uniaxial):
+    kept = Path(__file__).parents[2] / "docs" / "engineering" / "figures" / "treloar.csv"
+    rows = list(csv.reader(line for line in kept.open(encoding="utf-8") if not line.startswith("#")))
+    for fitted, fits in (("all three", to_all_modes), ("uniaxial alone", to_uniaxial)):
+        shown = {row[1]: row[2:] for row in rows if row[0] == fitted}
         for found in fits.values():
-            row = rows[found.form.title]
+            row = shown[found.form.title]
             assert row[3].startswith("yes") == found.stable
             for e, number in zip(found.errors, row, strict=False):
                 assert number.startswith("**") == (e.mode in found.fails)
-                # Powers of ten and rounded thousands are told to a figure or two.
+                # Powers of ten and rounded thousands are given to a figure or two.
                 if (plain := number.strip("*").replace(" ", "")) and "⁶" not in plain and "⁹" not in plain:
                     assert float(plain) == pytest.approx(100 * e.share, rel=0.06, abs=0.051)
 

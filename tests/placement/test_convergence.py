@@ -1,4 +1,4 @@
-"""Answers against the mesh: the figures that docs/mechanics.md and docs/placement.md give in full."""
+"""Answers against the mesh, whose figures docs/engineering/verification.md gives."""
 
 import numpy as np
 import pytest

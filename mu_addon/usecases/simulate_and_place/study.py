@@ -70,7 +70,7 @@ _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen
 # What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
 _BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 _BYTES_A_NODE = {"simulate": 300, "place": 1000}
-# With self-contact, refine 0.7: docs/resolved.md, the paper's bending ranges.
+# With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
 HOMOGENISED = (
     "The lattice is simulated as a homogenised continuum. With its struts as printed, which buckle, mu-1.0x "
     "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
