@@ -123,7 +123,7 @@ class PlateBody:
 
     @property
     def size(self) -> Array:
-        """What makes a logarithm's components (6,) comparable: 1 rad, and the height in mm."""
+        """Scale of a logarithm's components (6,): 1 rad, and the height in mm."""
         return np.array([1.0, 1.0, 1.0, self.height, self.height, self.height])
 
     def carried(self, u: Array, before: Array, after: Array) -> Array:
@@ -156,7 +156,7 @@ class PlateBody:
         return u
 
     def state(self, u: Array, eta: Array, pressure_MPa: float) -> PlateState:
-        """What there is to know of an equilibrium u (n, 3) with the plate at a logarithm eta (6,)."""
+        """Loads and stiffness of an equilibrium u (n, 3) with the plate at a logarithm eta (6,)."""
         model, x = self._open, self.mesh.nodes + u
         force = model.residual(u, pressure_MPa, self.parameters)[self.tip]
         at = x[self.tip]

@@ -37,7 +37,7 @@ class Link:
 
 @attrs.frozen(eq=False)
 class Loads:
-    """What acts on a chain besides pressure, in the frame of its base.
+    """Loads on a chain besides pressure, in the frame of its base.
 
     down (3,): the way things fall, of length 1, or 0 without gravity. tip_mass_g hangs at the middle of the
     tip's plate. tip_force_N (3,) and tip_couple_N_mm (3,) keep their direction; a couple in space has no

@@ -1,4 +1,4 @@
-"""Which pressures bring a chain's tip to a point: Gauss and Newton's method within bounds."""
+"""Pressures that bring a chain's tip to a point: Gauss and Newton's method within bounds."""
 
 from __future__ import annotations
 

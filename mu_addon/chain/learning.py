@@ -42,7 +42,7 @@ def _share(low: float, high: float) -> Any:
 
 @attrs.frozen
 class Sampling:
-    """Which states a joint is learned from.
+    """States from which a joint is learned.
 
     Range about the free state: bend_deg of the tip against the base, twist_deg about the axis, shear and
     stretch as shares of the height. pressure_step_kPa: largest distance of the pressures of the fit. loaded:

@@ -32,9 +32,8 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--repair",
         action="store_true",
-        help="Repair the STL file before it is checked, where there is only one way to: flipped and doubled "
-        "faces, tiny gaps. part.stl of the output folder is then the repaired part; what has more than one "
-        "remedy is refused.",
+        help="Repair the STL file before the check and write part.stl: flipped and doubled faces, tiny gaps. "
+        "A fault with more than one remedy is refused.",
     )
     command.add_argument("--path", metavar="NAME", help="Path of the unit's waveguide: alpha1, alpha2, ...")
     command.add_argument(

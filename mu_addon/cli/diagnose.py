@@ -27,8 +27,8 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--model",
         metavar="FILE",
-        help="What an earlier diagnosis found, its model.toml: these effects are in the model from the start "
-        "and stay; new causes are added to them.",
+        help="Extended model of an earlier diagnosis, its model.toml. Its effects stay in the model; new "
+        "causes are added.",
     )
     add_report(command)
 

@@ -62,8 +62,8 @@ def add(commands: Commands[Any]) -> None:
         nargs=3,
         type=float,
         metavar=("X", "Y", "Z"),
-        help="Vent what traps resin if the unit is built along this direction, away from the platform: STL "
-        "and 3MF get a hole through the wall for each cup of the print check, and plug-1.stl .. close them.",
+        help="Vent the cups that trap resin when the unit is built along this direction, away from the "
+        "platform: a hole through the wall for each cup, in STL and 3MF, and plug-1.stl, ... to close it.",
     )
     command.add_argument(
         "--resin",

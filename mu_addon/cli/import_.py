@@ -19,8 +19,8 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `import`."""
     command = commands.add_parser(
         "import",
-        help="Read files as test machines and data loggers export them (CSV, text, Excel), propose kind, "
-        "columns, units and signs, ask what they do not say, and write a folder of measured data.",
+        help="Import files of test machines and data loggers (CSV, text, Excel): propose kind, columns, "
+        "units and signs, ask for what is missing, and write a folder of measured data.",
         epilog="example: run.py import tension.csv --set mode=uniaxial --set length_mm=40 --out measured",
     )
     command.add_argument("files", nargs="+", metavar="FILE", help="CSV, text, .xlsx, .xls or .ods file.")

@@ -113,7 +113,7 @@ def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> No
 
 
 def add_solid(command: argparse.ArgumentParser) -> None:
-    """How fine the STL is."""
+    """Add the option for the STL's facet resolution."""
     command.add_argument(
         "--quality",
         choices=("interactive", "export"),
@@ -170,41 +170,39 @@ class _Friction(argparse.Action):
 
 
 def add_fidelity(command: argparse.ArgumentParser) -> None:
-    """What is simulated of a unit's lattice, and whether its parts feel each other, many times over."""
+    """Add fidelity and self-contact of a job that simulates a unit many times: homogenised by default."""
     from ..meshing.settings import FIDELITIES, HOMOGENISED
 
     command.add_argument(
         "--fidelity",
         choices=FIDELITIES,
         default=HOMOGENISED,
-        help="What is simulated: the printed body with its struts, or a continuum in place of the lattice "
-        "(default: homogenised).",
+        help="Model of the lattice: every strut as printed, or a continuum (default: homogenised).",
     )
     command.add_argument(
         "--self-contact",
         action=argparse.BooleanOptionalAction,
         default=False,
-        help="Keep walls and struts of a resolved unit apart, at several times the cost (default: they may "
-        "cross, and the run says from which pressure on).",
+        help="Keep walls and struts of a resolved unit apart, at several times the cost. Without it they may "
+        "cross; the run gives the pressure (default: no).",
     )
 
 
 def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
-    """What is simulated of a unit's lattice, and whether its parts feel each other, once."""
+    """Add fidelity and self-contact of a study, which simulates a unit once: resolved by default."""
     from ..meshing.settings import FIDELITIES
 
     command.add_argument(
         "--fidelity",
         choices=FIDELITIES,
-        help="What is simulated: the printed body with its struts, or, in a fraction of the time and for a "
-        "quick look, a continuum in place of the lattice (default: resolved; homogenised with --lattice, "
-        "--rule, --mesher or --order 1, which only that has).",
+        help="Model of the lattice: every strut as printed, or a continuum for a quick look (default: "
+        "resolved; homogenised with --lattice, --rule, --mesher or --order 1, which need it).",
     )
     command.add_argument(
         "--self-contact",
         action=argparse.BooleanOptionalAction,
-        help="Keep walls and struts of a resolved unit apart; without it they may cross, and the run says "
-        "from which pressure on (default: they are kept apart).",
+        help="Keep walls and struts of a resolved unit apart. Without it they may cross; the run gives the "
+        "pressure (default: yes).",
     )
 
 
@@ -219,13 +217,13 @@ def fidelity_of(options: argparse.Namespace) -> str:
 
 
 def add_self_friction(command: argparse.ArgumentParser) -> None:
-    """How parts of a resolved unit slide on each other."""
+    """Add the friction of a resolved unit's parts on each other."""
     command.add_argument(
         "--self-friction",
         type=float,
         default=0.0,
         metavar="MU",
-        help="Coulomb friction coefficient of walls and struts on each other, with --self-contact; the "
+        help="Coulomb friction coefficient of walls and struts on each other, with --self-contact. The "
         "motion is then solved in order of time (default: 0).",
     )
 

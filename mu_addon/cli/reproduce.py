@@ -59,7 +59,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
-    """What the options ask for; raises InputError."""
+    """Settings that the options ask for; raises InputError."""
     from ..meshing.settings import MeshSettings
     from ..usecases.reproduce.settings import Settings, read_set
 

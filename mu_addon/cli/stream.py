@@ -28,7 +28,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def add_source(command: argparse.ArgumentParser) -> None:
-    """Where the samples come from, for how long, and where they go."""
+    """Add the options for source, duration and folder of a recording."""
     add_results(command)
     command.add_argument(
         "--port",
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 
 def shown(options: argparse.Namespace) -> Sink:
-    """Who shows the stream: a line for people, or JSON for programs."""
+    """Display of the stream: a line for people, or JSON for programs."""
     from ..run.progress import json_lines
     from ..usecases.sensor.stream import Display
 

@@ -44,7 +44,7 @@ _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "microme
 
 @attrs.frozen
 class Flaw:
-    """Why a surface cannot be used: what is wrong, what to do, and the places (n, 3) in mm where it shows."""
+    """Reason against a surface: what is wrong, what to do, and the places (n, 3) in mm."""
 
     what: str
     remedy: str
@@ -171,7 +171,7 @@ def _surface(mesh: Any) -> tuple[Vertices, Triangles]:
 
 
 def flaws(body: Body) -> list[Flaw]:
-    """What keeps a surface from bounding one solid body; an empty list if nothing does.
+    """Reasons why a surface does not bound one solid body; empty if it does.
 
     Checked are open and inconsistently oriented edges, edges of more than two faces, self-intersection and,
     only where these are in order, the number of separate bodies and the sign of the volume.
@@ -217,7 +217,7 @@ def flaws(body: Body) -> list[Flaw]:
 
 
 def misfits(body: Body, d: Dimensions) -> list[Flaw]:
-    """Why a body without `flaws` cannot be the envelope of a unit of these dimensions; empty if it can.
+    """Reasons why a body without `flaws` cannot be the envelope of a unit of these dimensions.
 
     Checked are a size that suggests another unit of length, the extent along z against the unit's height, and
     whether the chambers lie inside.
@@ -259,7 +259,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
 
 
 def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:
-    """Where a body without `flaws` overlaps a unit of these dimensions: one Flaw with all places, or empty.
+    """Overlap of a body without `flaws` with a unit of these dimensions: one Flaw with all places, or empty.
 
     own: the body that replaces the lattice's box as envelope. The lattice counts as filled, since that is how
     it is simulated.
@@ -348,7 +348,7 @@ def half(body: Body) -> Body | None:
 
 
 def inside(body: Body, points: ArrayLike) -> NDArray[np.bool_]:
-    """Whether points (..., 3) in mm lie in a closed body: a result of shape (...,), by ray casting along z.
+    """True where points (..., 3) in mm lie in a closed body, shape (...,), by ray casting along z.
 
     A point is inside if its ray leaves through an odd number of triangles. Rays are shifted by two nanometres
     in an irrational direction, so that they miss the edges of drawn bodies. Triangles are found through the

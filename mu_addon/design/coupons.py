@@ -90,7 +90,7 @@ def gauge() -> tuple[Vertices, Triangles]:
 
 
 def offsets(features: list[Feature], measured: ArrayLike) -> dict[str, tuple[float, float, float]]:
-    """What measured sizes (n,) in mm of features say of the printer, for "xy" and "z" apart.
+    """Print offsets from measured sizes (n,) in mm of features, for "xy" and "z" apart.
 
     Values are the outward offset o of every surface, its standard error, and the scale s, by least squares of
     measured - nominal = +-2 o + s nominal, minus for gaps. A direction of fewer than three sizes is left

@@ -1,4 +1,4 @@
-"""What a unit comes to as a whole: its size, its resin, how long it takes to print; in milliseconds."""
+"""Figures of a whole unit: size, resin, print time; computed in milliseconds."""
 
 from __future__ import annotations
 

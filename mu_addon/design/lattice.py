@@ -34,22 +34,22 @@ class Graph:
 
     @property
     def is_centre(self) -> NDArray[np.bool_]:
-        """Whether each node is the centre of a cell, (N,)."""
+        """True for each node that is the centre of a cell, (N,)."""
         return self._at(self.kind.divisions // 2)
 
     @property
     def is_corner(self) -> NDArray[np.bool_]:
-        """Whether each node is a corner of a cell, (N,)."""
+        """True for each node that is a corner of a cell, (N,)."""
         return self._at(0)
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether each node lies in the interior of a cell, (N,)."""
+        """True for each node that lies in the interior of a cell, (N,)."""
         return np.asarray(((self.grid - self.cells[0]) % self.kind.divisions != 0).all(axis=1))
 
     @property
     def on_face(self) -> NDArray[np.bool_]:
-        """Whether each strut lies in a face of a cell, (E,)."""
+        """True for each strut that lies in a face of a cell, (E,)."""
         first, second = (self.grid[self.struts[:, k]] for k in (0, 1))
         level = (first - self.cells[0]) % self.kind.divisions == 0
         return np.asarray(((first == second) & level).any(axis=1))

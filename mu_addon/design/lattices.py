@@ -118,18 +118,18 @@ class LatticeKind:
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """Whether each node lies in the interior of the cell, (n,), and belongs to no neighbour."""
+        """True for each node that lies in the interior of the cell, (n,), and belongs to no neighbour."""
         return np.asarray(((self.grid > 0) & (self.grid < self.divisions)).all(axis=1))
 
     @cached_property
     def on_face(self) -> NDArray[np.bool_]:
-        """Whether each strut lies in a face of the cell, (e,), where a neighbour may share it."""
+        """True for each strut that lies in a face of the cell, (e,), where a neighbour may share it."""
         first, second = self.grid[self.struts[:, 0]], self.grid[self.struts[:, 1]]
         return np.asarray(((first == second) & (first % self.divisions == 0)).any(axis=1))
 
     @cached_property
     def is_half_diagonals(self) -> bool:
-        """Whether the struts are the eight half diagonals of the cell, from its centre to its corners."""
+        """True if the struts are the eight half diagonals of the cell, from its centre to its corners."""
         apart = np.abs(np.diff(self.nodes[self.struts], axis=1)) == 0.5
         return bool(apart.all() and len(self.struts) == 8)
 
@@ -150,7 +150,7 @@ class LatticeKind:
 
     @cached_property
     def mirrors(self) -> tuple[bool, bool, bool]:
-        """Whether the periodic lattice is symmetric about the cell's mid-planes normal to x, y and z."""
+        """True if the periodic lattice is symmetric about the cell's mid-planes normal to x, y and z."""
         period = self.divisions
 
         def skeleton(grid: NDArray[np.int64]) -> set[tuple[int, ...]]:

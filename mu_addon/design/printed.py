@@ -59,7 +59,7 @@ def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:
 
 
 def _outward(normals: Array, offset: Array) -> Array:
-    """How far (n,) surfaces of unit normals (n, 3) move along them."""
+    """Outward move (n,) of surfaces along their unit normals (n, 3)."""
     return np.asarray(np.sum(offset_along(normals, offset) * normals, axis=1))
 
 

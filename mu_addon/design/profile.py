@@ -214,7 +214,7 @@ def _samples(d: Dimensions, low: float, high: float, per_arc: int) -> Array:
 
 
 def _moves(d: Dimensions, s: Array, offset: Array) -> Array:
-    """How far (n, 2) along (radius, z) the outer profile moves at heights s for an offset (3,)."""
+    """Move (n, 2) along (radius, z) of the outer profile at heights s for an offset (3,)."""
     slope = outer_slope(d, s)
     normals = np.stack([np.ones_like(s), np.zeros_like(s), -slope], axis=1) / np.hypot(1.0, slope)[:, None]
     return offset_along(normals, offset)[:, [0, 2]]

@@ -36,7 +36,7 @@ def in_kPa(value_MPa: Number) -> Number:
 
 
 class Description(NamedTuple):
-    """What one parameter is: type, default, unit, closed bounds in that unit, meaning and source.
+    """Description of one parameter: type, default, unit, closed bounds in that unit, meaning and source.
 
     fixed: whether it is a length that is the same at every scale. A choice among names has `choices` and no
     bounds, a text (of type str) neither.
@@ -62,7 +62,7 @@ class Description(NamedTuple):
 
     @property
     def assumed(self) -> bool:
-        """Whether the source paper gives no value."""
+        """True if the source paper gives no value."""
         return self.source.startswith("assumed")
 
 

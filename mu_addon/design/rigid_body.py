@@ -51,7 +51,7 @@ def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None 
 
 
 def mirrored(bodies: Sequence[RigidBody]) -> bool:
-    """Whether every body is its own mirror image across x = 0 and extends to both sides of that plane.
+    """True if every body is its own mirror image across x = 0 and extends to both sides of that plane.
 
     The bodies must have no `flaws`. Raises InputError as `half` does.
     """

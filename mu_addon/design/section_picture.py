@@ -47,7 +47,7 @@ def struts_beside_section(lattice: Lattice) -> Array:
 
 
 def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
-    """Which points lie on a strut beside the section, seen along x."""
+    """Mask of the points on a strut beside the section, seen along x."""
     lattice = lattice_of(unit.dimensions)
     rows = struts_beside_section(lattice)
     at = np.stack([y, z], axis=-1)
@@ -61,7 +61,7 @@ def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
 
 
 def _within(polygon: Array, r: Array, z: Array) -> Array:
-    """Which points lie in a closed polygon (n, 2), by how often a line along r crosses it."""
+    """Mask of the points in a closed polygon (n, 2), by how often a line along r crosses it."""
     inside = np.zeros(r.shape, bool)
     for (r0, z0), (r1, z1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         if z0 != z1:

@@ -46,7 +46,7 @@ KEPT = 12
 
 @attrs.frozen
 class StepInputs:
-    """What the steps are made from: a unit, the name of a path or "", and the names of muted steps.
+    """Inputs of the steps: a unit, the name of a path or "", and the names of muted steps.
 
     quality: as in `build_solid`; body: a body in place of the lattice's box, cut by `body.envelope`, or None.
     Raises InputError for a muted step that does not exist or cannot be muted.

@@ -240,7 +240,7 @@ def _section_depth(cell: StrutCell, axis: Array, away: Array) -> Array:
 
 @attrs.frozen
 class _Shape:
-    """What a cell's surface depends on, in cells, rounded so that scaled cells are equal."""
+    """Inputs of a cell's surface, in cells, rounded so that scaled cells are equal."""
 
     kind: LatticeKind
     junction_radius: float
@@ -275,7 +275,7 @@ def _near(shape: _Shape, reach: float) -> Array:
 
 
 def _descending(ends: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether the first of two ends (e, 2, 3) comes after the second, by x, then y, then z."""
+    """True if the first of two ends (e, 2, 3) comes after the second, by x, then y, then z."""
     step = ends[:, 1] - ends[:, 0]
     first = step[np.arange(len(step)), np.argmax(step != 0, axis=1)]
     return np.asarray(first < 0)
@@ -330,7 +330,7 @@ def _octant_solid(shape: _Shape, facets: Facets) -> Any:
 
 
 def _spans(directions: Array) -> bool:
-    """Whether every direction in space is within less than 90 degrees of one of these (k, 3)."""
+    """True if every direction in space is within less than 90 degrees of one of these (k, 3)."""
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return bool((unit @ _SPHERE.T).max(axis=0).min() > 0.1)
 

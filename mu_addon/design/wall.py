@@ -167,7 +167,7 @@ class Wall:
 
     @property
     def has_memory(self) -> bool:
-        """Whether the stress depends on the history of deformation, so that motions are solved in time."""
+        """True if the stress depends on the history of deformation, so that motions are solved in time."""
         return self.law in ("prony", "ogden-roxburgh") or self.friction_share > 0
 
     def require_without_memory(self, what: str) -> None:

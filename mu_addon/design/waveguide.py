@@ -361,7 +361,7 @@ def _normals(points: Array) -> Array:
 
 
 def _leg_moves(way: Array, normals: Array, offset: Array) -> Array:
-    """How far (n, 3) the faces across, outer and beside of each leg move."""
+    """Moves (n, 3) of the faces across, outer and beside of each leg."""
     return np.stack([face_moves(v, offset) for v in (way, normals, np.cross(way, normals))], axis=1)
 
 
@@ -371,7 +371,7 @@ def _moved(block: Block, offset: Array | None) -> Block:
 
 @attrs.frozen(eq=False)
 class _End:
-    """Where the bar ends, and the seat there."""
+    """An end of the bar, and the seat there."""
 
     face: Array
     seat: Seat | None
@@ -430,7 +430,7 @@ def _seat(d: Dimensions, face: Array, outward: Array, normal: Array, length: flo
 
 
 def _obstacle(d: Dimensions, struts: _Struts, seat: Seat) -> str | None:
-    """What is in the way of a seat, of the part on its way in, or of its wires; None where nothing is."""
+    """Obstacle to a seat, to the part on its way in, or to its wires; None without one."""
     low, high = np.array(d.bounds).T
     if ((seat.body.corners < low - 1e-6) | (seat.body.corners > high + 1e-6)).any():
         return "the envelope ends"

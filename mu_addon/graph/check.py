@@ -1,4 +1,4 @@
-"""What is wrong with a node tree, found without making anything."""
+"""Faults of a node tree, found before anything is computed."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def _of_link(
 
 
 def _offer(taken: Input, definitions: Definitions) -> str:
-    """Which nodes have what an input takes, in words."""
+    """Nodes whose outputs an input takes, in words."""
     kinds = [
         d.label for d in definitions.values() if any(taken.refusal(output) == "" for output in d.outputs)
     ]
@@ -124,7 +124,7 @@ def _missing(name: str, node: Node, definition: Definition) -> Iterator[Fault]:
 
 
 def _on_circles(tree: NodeTree, suspects: Iterable[str]) -> Iterator[str]:
-    """Of nodes in circles or behind one, those in a circle: they are upstream of themselves."""
+    """Nodes of a circle among those in or behind one: they are upstream of themselves."""
     for name in suspects:
         if name in tree.upstream(tree.sources(name)):
             yield name

@@ -1,4 +1,4 @@
-"""What a kind of node is: its inputs and outputs, each of a type, its settings, and what it makes of them."""
+"""Definition of a kind of node: inputs, outputs, their types, settings, and the computation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Setting:
 
     @property
     def is_number(self) -> bool:
-        """Whether its value is a number, so that a link may give it."""
+        """True if its value is a number, so that a link may give it."""
         return self.description.type in (int, float)
 
     def checked(self, value: Any) -> Any:
@@ -78,7 +78,7 @@ def setting(
 
 @attrs.frozen
 class Input:
-    """What a node takes: outputs of these types, where `only` is given of these names alone.
+    """An input of a node: outputs of these types; where `only` is given, of these names alone.
 
     needed: whether nothing is made without it; many: whether it takes several links.
     """
@@ -91,7 +91,7 @@ class Input:
     many: bool = False
 
     def refusal(self, output: Output) -> str:
-        """Why an output cannot be linked here, in words; "" where it can."""
+        """Reason why an output cannot be linked here, in words; "" if it can."""
         if output.type not in self.types:
             return f"{self.name} takes a {' or '.join(self.types)}, not a {output.type}"
         if self.only and output.name not in self.only:
@@ -101,7 +101,7 @@ class Input:
 
 @attrs.frozen
 class Output:
-    """What a node gives, by name, and its type."""
+    """An output of a node: its name and type."""
 
     name: str
     type: str
@@ -151,7 +151,7 @@ class Definition:
 
     @property
     def runs(self) -> bool:
-        """Whether its work is a run of its own, in a folder."""
+        """True if its work is a run of its own, in a folder."""
         return self.order is not None
 
     def setting(self, name: str) -> Setting | None:
@@ -159,7 +159,7 @@ class Definition:
         return next((s for s in self.settings if s.name == name), None)
 
     def input(self, name: str) -> Input | None:
-        """What may be linked under that name: an input, or a setting that is a number; None without one."""
+        """The input, or the setting that is a number, of that name; None without one."""
         found = next((i for i in self.inputs if i.name == name), None)
         own = self.setting(name)
         if found is None and own is not None and own.is_number:

@@ -56,7 +56,7 @@ class Order:
     answers: bool = False
 
     def is_done(self, summary: Mapping[str, Any]) -> bool:
-        """Whether the run that left this summary need not be repeated."""
+        """True if the run that left this summary need not be repeated."""
         return summary.get("status") == "complete" or (self.answers and "verdict" in summary)
 
     @property
@@ -93,7 +93,7 @@ class Runs(Protocol):
 
 @attrs.frozen
 class Record:
-    """What an evaluation left of a node: words on its outputs, those that are numbers, folder of its run.
+    """Record of an evaluated node: words on its outputs, those that are numbers, folder of its run.
 
     cost_s: how long it took to compute.
     """
@@ -106,7 +106,7 @@ class Record:
 
 @attrs.frozen
 class State:
-    """What became of a node: one of the states, the seconds it took, its key and a few words on its outputs.
+    """State of a node after evaluation: the seconds it took, its key and a few words on its outputs.
 
     cost_s: how long it took when it was computed, now or before; folder: of its run; error: why it failed;
     because: the node that it waits for, or that failed.
@@ -133,7 +133,7 @@ class Kept:
     _values: OrderedDict[str, Any] = attrs.field(factory=OrderedDict)
 
     def get(self, key: str) -> Any:
-        """What is kept under a key, or None."""
+        """Entry of a key, or None."""
         if key in self._values:
             self._values.move_to_end(key)
         return self._values.get(key)
@@ -332,7 +332,7 @@ class Evaluation:
 
 
 def _content(path: str, value: str) -> Any:
-    """What tells whether a named file or folder has changed."""
+    """Digest by which a change of a named file or folder is noticed."""
     if not value:
         return ""
     place = Path(value)

@@ -1,4 +1,4 @@
-"""What evaluations have left in a folder, by the keys of nodes, for a refresh, which starts no run."""
+"""Records of evaluations in a folder, by the keys of nodes, for a refresh, which starts no run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONGEST, MOST_RECORDS = 1 << 24, 5000
 
 
 def record_of(definition: Definition, outputs: Outputs, state: State) -> Record:
-    """What is kept of a node that was made."""
+    """Record of a node that was made."""
     numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
     return Record(state.remark, state.cost_s, numbers, state.folder)
 

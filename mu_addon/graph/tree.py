@@ -12,7 +12,7 @@ from .definition import Definitions
 
 
 class Source(NamedTuple):
-    """Where an input comes from: name of a node and of one of its outputs."""
+    """Source of an input: name of a node and of one of its outputs."""
 
     node: str
     output: str

@@ -1,4 +1,4 @@
-"""What no isotropic arrangement of given phases can exceed: the bounds of Hashin and Shtrikman."""
+"""Hashin and Shtrikman's upper bounds on the moduli of an isotropic arrangement of given phases."""
 
 from __future__ import annotations
 

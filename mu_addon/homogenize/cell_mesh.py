@@ -27,7 +27,7 @@ _TRIES = (1.0, 0.8, 0.6, 0.4)
 
 @attrs.frozen
 class CellMeshSettings:
-    """How fine a cell's mesh is; raises InputError for a value out of bounds.
+    """Element sizes of a cell's mesh; raises InputError for a value out of bounds.
 
     order of the elements; per_diameter: elements to a diameter of the thinnest printed strut; facets of the
     surface that is meshed, and tolerance, as a share of an element, of the mesh's distance from it.

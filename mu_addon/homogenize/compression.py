@@ -84,7 +84,7 @@ class Compression:
 
     @property
     def valid(self) -> Array:
-        """Whether each point (k,) of `curve`, in its order, is no farther than `valid_to_strain`."""
+        """True for each point (k,) of `curve`, in its order, that is no farther than `valid_to_strain`."""
         return np.array([state.strain <= self.valid_to_strain for state in self.states[::-1]])
 
     @property

@@ -1,4 +1,4 @@
-"""What a virtual test gives: nominal stress and lateral stretches of a body stretched along one axis."""
+"""Curve of a virtual test: nominal stress and lateral stretches of a body stretched along one axis."""
 
 from __future__ import annotations
 

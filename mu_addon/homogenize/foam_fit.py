@@ -156,7 +156,7 @@ def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> Fo
 
 
 def misfit(curve: Curve, parameters: Array, diagonal_MPa: float = 0.0) -> Misfit:
-    """What a foam of parameters (6,), with diagonal stretch in MPa, leaves of a curve.
+    """Misfit to a curve of a foam of parameters (6,), with diagonal stretch in MPa.
 
     Raises InputError for a curve with fewer than 3 points on a side of stretch 1, or with held sides.
     """
@@ -171,7 +171,7 @@ def _rms(values: Array) -> float:
 
 
 def _sides(curve: Curve) -> tuple[Array, Array]:
-    """Which points (k,) are under tension and which under compression."""
+    """Masks (k,) of the points under tension and of those under compression."""
     sides = curve.stretch > 1, curve.stretch < 1
     for name, side in zip(("tension", "compression"), sides, strict=True):
         if side.sum() < 3:
@@ -190,7 +190,7 @@ def _sides(curve: Curve) -> tuple[Array, Array]:
 
 
 def _residuals(curve: Curve, parameters: Array, diagonal_MPa: float) -> tuple[Array, Array]:
-    """What is left of stress and lateral strain (k,), over their largest value on each side of stretch 1."""
+    """Residuals of stress and lateral strain (k,), over their largest value on each side of stretch 1."""
     side = curve.stretch > 1, curve.stretch < 1
     stress, lateral = uniaxial(parameters, curve.stretch, diagonal_MPa)
     largest = np.where(side[0], *(np.abs(curve.stress_MPa[s]).max() for s in side))
@@ -216,7 +216,7 @@ class _Form:
         return np.array([np.exp(x[0]), x[1], np.exp(compression), x[2], volume, gamma])
 
     def residuals(self, x: Array) -> Array:
-        """Of stress and lateral strain; every side of 1 counts the same, whatever its number of points."""
+        """Residuals of stress and lateral strain; both sides of 1 count alike."""
         axial = self.C12_MPa if self.diagonal else 0.0
         stress, lateral = _residuals(self.curve, self.parameters(x), axial)
         side = self.curve.stretch > 1, self.curve.stretch < 1

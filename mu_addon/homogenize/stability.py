@@ -1,4 +1,4 @@
-"""Whether a compressed specimen could buckle into a shape that is not its own mirror image.
+"""Buckling of a compressed specimen into a shape that is not its own mirror image.
 
 A small motion of a body with three mirror planes is a sum of eight parts, each kept or turned into its
 negative by each mirror, and no force couples them. So an eighth with other supports on its mirror planes
@@ -103,7 +103,7 @@ class SymmetryBreakingModes:
 def first_loss(
     motions: SymmetryBreakingModes, strains: Sequence[float], moves: Sequence[Array]
 ) -> Loss | None:
-    """Where along displacements (n, 3) in mm at ascending strains, the first at rest, stability is lost.
+    """Strain at which displacements (n, 3) in mm at ascending strains, the first at rest, lose stability.
 
     None where it is not. Found by halving, first among the states and then between two, where equilibria are
     taken from the polynomial through their neighbours: what is lost is taken to stay lost.

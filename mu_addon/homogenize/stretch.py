@@ -22,7 +22,7 @@ _TOUCH = 1e-6
 
 @attrs.frozen
 class StretchSettings:
-    """How a virtual test of a periodic lattice is run.
+    """Settings of a virtual test of a periodic lattice.
 
     axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
     confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also ask whether
@@ -65,7 +65,7 @@ class Point:
 
 @attrs.frozen(eq=False)
 class Stretched:
-    """What a virtual test gave: the curve, its points in the order of the curve, and why it stops short.
+    """Result of a virtual test: the curve, its points in the order of the curve, and why it stops short.
 
     stopped: where and why, "" where it reaches both ends.
     """
@@ -325,7 +325,7 @@ class Stretching:
         return np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
 
     def _first_contact(self, path: Sequence[Point]) -> str:
-        """Where on a path, straight between its states, walls first meet, in words; "" if nowhere."""
+        """Place on a path, straight between its states, where walls first meet, in words; "" if nowhere."""
         for before, after in itertools.pairwise(path):
             if not self._meeting(after.stretch, after.u):
                 continue
@@ -342,7 +342,7 @@ class Stretching:
         return ""
 
     def _meeting(self, stretch: Array, u: Array) -> str:
-        """What walls of the deformed lattice cut each other, in words, or "".
+        """Walls of the deformed lattice that cut each other, in words, or "".
 
         An eighth meets its mirror images exactly where it crosses a mirror plane.
         """

@@ -1,4 +1,4 @@
-"""Where struts of a compressed specimen first meet each other or a plate, which no contact here prevents."""
+"""First contact of a compressed specimen's struts with each other or a plate; nothing here resists it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class StrutContact:
 
 @attrs.frozen(eq=False)
 class _Plane:
-    """What is met at a plane across an axis, on its upper (1) or lower (-1) side, and the nodes on it."""
+    """A plane across an axis, met from its upper (1) or lower (-1) side, and the nodes on it."""
 
     what: str
     axis: int

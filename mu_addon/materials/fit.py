@@ -26,7 +26,7 @@ WEIGHTS = ("absolute", "relative")
 
 @attrs.frozen
 class ModeError:
-    """How far a law is from one coupon.
+    """Misfit of a law to one coupon.
 
     rms_MPa: root mean square of the deviation in MPa; share: norm of the deviations over the norm of the
     stresses; worst: largest deviation over the largest stress; fitted: whether the law was fitted to the
@@ -64,7 +64,7 @@ class Fit:
 
     @property
     def stable(self) -> bool:
-        """Whether the parameters are valid and the law is stable over all ranges that were checked."""
+        """True if the parameters are valid and the law is stable over all ranges that were checked."""
         return not self.invalid and all(s.stable for s in self.stability)
 
     @property
@@ -74,7 +74,7 @@ class Fit:
 
     @property
     def follows(self) -> bool:
-        """Whether the law misses no coupon that it was fitted to by a share of more than TOLERANCE."""
+        """True if the law misses no coupon that it was fitted to by a share of more than TOLERANCE."""
         return all(e.share <= TOLERANCE for e in self.errors if e.fitted)
 
     @property
@@ -111,7 +111,7 @@ class Fit:
         return self.form.law, self.parameters
 
     def instability(self) -> str:
-        """Why the law is not stable, in words; "" where it is."""
+        """Reason why the law is unstable, in words; "" if it is stable."""
         if self.invalid:
             return self.invalid
         return "; ".join(s.where() for s in self.stability if not s.stable)
@@ -190,7 +190,7 @@ def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "ab
 
 
 def mode_error(form: Form, row: Array, coupon: Coupon, fitted: bool) -> ModeError:
-    """How far a law with a row of parameters (count,) is from a coupon, in MPa and as shares.
+    """Misfit of a law with a row of parameters (count,) to a coupon, in MPa and as shares.
 
     Raises InputError as `incompressible` does.
     """
@@ -207,7 +207,7 @@ def mode_error(form: Form, row: Array, coupon: Coupon, fitted: bool) -> ModeErro
 
 
 def _weights(coupons: Sequence[Coupon], weights: str) -> Array:
-    """What residuals are divided by, (n,) in MPa."""
+    """Divisors of the residuals, (n,) in MPa."""
     parts = []
     for c in coupons:
         size = np.abs(c.stress_MPa)

@@ -81,7 +81,7 @@ def intervals(
 
 
 def _free(form: Form, row: Array) -> tuple[Array, list[str]]:
-    """Which parameters are not held by a bound, and a note for each that is."""
+    """Parameters away from their bounds, and a note for each that is at one."""
     free, notes = np.ones(form.count, bool), [""] * form.count
     if form.exponents:
         for p in range(form.exponents):
@@ -127,7 +127,7 @@ def _profiled(problem: Problem, row: Array, k: int, half: float, margin: float) 
 def _end(
     fixed: Callable[[float], float], value: float, half: float, margin: float, side: int, farthest: float
 ) -> tuple[float, bool]:
-    """How far from its value a parameter may go until the sum of squares has grown by `margin`.
+    """Distance from a parameter's value at which the sum of squares has grown by `margin`.
 
     fixed: least sum of squares at a value; half: a guess. Returns the step, and whether it ran to `farthest`.
     """

@@ -33,11 +33,11 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """Whether the incremental stiffness is positive over the whole range."""
+        """True if the incremental stiffness is positive over the whole range."""
         return self.unstable_at is None
 
     def where(self) -> str:
-        """Where the law is unstable, in words."""
+        """Mode and stretch at which the law is unstable, in words."""
         if self.unstable_at is None:
             return "nowhere"
         side = "at" if self.unstable_at == 1 else "above" if self.unstable_at > 1 else "below"

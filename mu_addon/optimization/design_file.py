@@ -42,7 +42,7 @@ FINER = 1.5
 
 @attrs.frozen
 class Design:
-    """What design.toml says.
+    """Contents of design.toml.
 
     unit: where the search starts, with fixed values in it; check_refine: of the mesh that proposed units are
     simulated on again; print_tolerance_mm, modulus_tolerance: standard errors of a print's surfaces, and of
@@ -76,7 +76,7 @@ class Design:
 
     @property
     def uncertainty(self) -> Uncertainty:
-        """What differs from print to print."""
+        """Scatter from print to print."""
         return Uncertainty(self.print_tolerance_mm, self.modulus_tolerance)
 
     def texts(self) -> dict[str, str]:
@@ -135,7 +135,7 @@ class Design:
         return found
 
     def choice(self, design: tuple[Any, ...]) -> dict[str, str]:
-        """Of a design's values the path and the resin, as far as they are free, by the freedom's name."""
+        """Path and resin among a design's values, as far as they are free, by the freedom's name."""
         return {f.name: v for f, v in zip(self.freedoms, design, strict=True) if not f.is_of_unit}
 
     def chosen(self, choice: Mapping[str, str]) -> Design:

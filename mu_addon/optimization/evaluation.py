@@ -26,7 +26,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Evaluated:
-    """What was found of one unit.
+    """Evaluation of one unit.
 
     values (q,) of the targets' quantities, nan where it failed; gradient (q, f) by the continuous freedoms,
     nan where there is none; why: what stopped it, "" where nothing did; model_a: solutions of the unit along
@@ -44,7 +44,7 @@ class Evaluated:
 
     @property
     def sound(self) -> bool:
-        """Whether it was simulated."""
+        """True if it was simulated."""
         return not self.why
 
     def plain(self) -> dict[str, Any]:
@@ -60,7 +60,7 @@ class Evaluated:
 
 
 def restored(unit: Unit, plain: dict[str, Any]) -> Evaluated:
-    """What `Evaluated.plain` gave, of a unit."""
+    """Evaluation of a unit restored from `Evaluated.plain`."""
 
     def numbers(row: Sequence[float | None]) -> list[float]:
         return [np.nan if v is None else v for v in row]
@@ -153,7 +153,7 @@ class Evaluator:
     model_a: int = 0
 
     def of(self, units: Sequence[Unit | Candidate]) -> list[Evaluated]:
-        """What is found of some units, in their order."""
+        """Evaluations of some units, in their order."""
         candidates = [u if isinstance(u, Candidate) else Candidate(u) for u in units]
         found: list[Evaluated | None] = [self._kept(c) for c in candidates]
         todo = [i for i, known in enumerate(found) if known is None]

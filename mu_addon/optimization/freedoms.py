@@ -113,12 +113,12 @@ class Freedom:
 
     @property
     def discrete(self) -> bool:
-        """Whether it has values in place of a range."""
+        """True if it has values in place of a range."""
         return bool(self.values)
 
     @property
     def is_of_unit(self) -> bool:
-        """Whether it is a parameter of the unit."""
+        """True if it is a parameter of the unit."""
         return self.name not in (PATH, RESIN)
 
     def value_of(self, unit: Unit) -> Any:

@@ -1,4 +1,4 @@
-"""What a design is judged by, each read off a body in equilibrium, with its slope by the displacements."""
+"""Quantities of a design, read off a body in equilibrium, with their slopes by the displacements."""
 
 from __future__ import annotations
 
@@ -282,7 +282,7 @@ class Stretch:
         return Sensitivity(factor * nodes, factor * filled, ties, np.zeros(len(mesh.tets)))
 
     def _known(self, structure: Structure, states: States) -> Any:
-        """What `_most` finds of a body, once."""
+        """Result of `_most` for a body, computed once."""
         u = states[self.conditions[0]]
         return structure.kept(
             f"points {self.pressure_kPa} {self.region}", lambda: self._most(structure.model.mesh, u)
@@ -439,7 +439,7 @@ def _whole_x(structure: Structure, vector: Array) -> Array:
 
 
 def _whole(model: Model) -> int:
-    """How often the mesh fills the whole body."""
+    """Number of copies of the mesh that make the whole body."""
     return 2 ** len(model.mesh.symmetry)
 
 

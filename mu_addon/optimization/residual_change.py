@@ -1,4 +1,4 @@
-"""How the work of the residual along given displacements differs between two bodies near to one."""
+"""Difference in the residual's work along given displacements between two bodies near to one."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class ResidualChange:
 
     @cached_property
     def sensitivities(self) -> list[Sensitivity]:
-        """Of each v . r without contact and dead loads, by the body's mesh and elements."""
+        """Sensitivities of each v . r without contact and dead loads to the body's mesh and elements."""
         data = self._model.parameters(self._own)
         return of_residual(self._model, self._u, self._pressure, data, self._along)
 
     def between(self, plus: Structure, minus: Structure) -> Array:
-        """How much more each v . r (k,) in mJ is of one neighbour than of another, to first order."""
+        """First-order difference of each v . r (k,) in mJ between one neighbour and another."""
         first, second = plus.model.mesh, minus.model.mesh
         found = self._by_materials(*(s.materials[self._condition.materials] for s in (plus, minus)))
         if first is not second:

@@ -54,7 +54,7 @@ class Verified:
 
     @property
     def is_robust(self) -> bool:
-        """Whether it meets every target robustly, and is printable where that was asked for."""
+        """True if it meets every target robustly, and is printable where that was asked for."""
         return not self.why and bool(self.robust.all()) and self.print_worst != "error"
 
 

@@ -46,7 +46,7 @@ class SearchSettings:
 
 @attrs.frozen(eq=False)
 class Observed:
-    """What is known of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
+    """Observation of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
 
     sound: whether it could be computed. margins (q,): how far to either side of each value its target shall
     be met too; None for no margin.
@@ -223,7 +223,7 @@ class _Search:
         )
 
     def _models(self) -> Sequence[Surrogate]:
-        """Of every value, and where there are margins of those after them."""
+        """Models of every value, then of the margins where there are any."""
         sound = [o for o in self.observed if o.sound]
         x = self.coordinates(np.array([self.places(o.design) for o in sound]))
         widths = np.array([self.freedoms[i].high - self.freedoms[i].low for i in self.continuous])
@@ -247,7 +247,7 @@ class _Search:
     # How good values are.
 
     def _met(self, o: Observed) -> list[bool]:
-        """Whether each target is met, within its margin."""
+        """True for each target that is met, within its margin."""
         assert o.margins is not None
         rows = zip(self.targets, o.values, o.margins, strict=True)
         return [t.met(float(v), float(margin)) for t, v, margin in rows]
@@ -322,7 +322,7 @@ class _Search:
         return min(factors)
 
     def _improved(self, number: int, before: int, weights: Array) -> bool:
-        """Whether a design is better for some weights than all of those before."""
+        """True if a design is better for some weights than all of those before."""
         if not self.observed[number].sound:
             return False
         rows = [o for o in self.observed[:before] if o.sound]
@@ -408,7 +408,7 @@ class _Search:
         return chosen
 
     def _within(self, trial: Array, sound: Array, failed: Array) -> Array:
-        """Which of some places (m, f) are within reach of a computed design and not nearer to a failed
+        """Mask of the places (m, f) within reach of a computed design and not nearer to a failed
         one."""
         if not self.continuous:
             return np.ones(len(trial), bool)

@@ -57,13 +57,13 @@ class Structure:
     shared: dict[str, Any] = attrs.field(factory=dict)
 
     def once(self, name: str, make: Callable[[], Any]) -> Any:
-        """What is found of the elements, made when it is first asked for."""
+        """Figure of the elements, computed when first asked for."""
         if name not in self.shared:
             self.shared[name] = make()
         return self.shared[name]
 
     def kept(self, name: str, make: Callable[[], Any]) -> Any:
-        """What is found of this body alone, made when it is first asked for; only the last body's is kept."""
+        """Figure of this body, computed when first asked for; only the last body's is kept."""
         known = self.shared.get(name)
         if known is None or known[0] is not self:
             known = self.shared[name] = self, make()

@@ -1,4 +1,4 @@
-"""What a design shall do: targets, bounds and objectives, and how far a unit is from them."""
+"""Targets, bounds and objectives of a design, and a unit's distance from them."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ class Target:
 
     @property
     def is_bound(self) -> bool:
-        """Whether it can be missed, as an objective cannot."""
+        """True if it can be missed, as an objective cannot."""
         return self.goal is None
 
     def misfit(self, found: float) -> float:
-        """How far a value is from what is asked, in tolerances, with its sign; 0 where a bound is kept.
+        """Distance of a value from the target, in tolerances, with its sign; 0 where a bound is kept.
 
         A target's misfit is its whole distance: within one tolerance it is met.
         """
@@ -94,7 +94,7 @@ class Target:
         return 0.0
 
     def met(self, found: float, margin: float = 0.0) -> bool:
-        """Whether a value keeps it: a target within its tolerance, a bound to a millionth of its own.
+        """True if a value meets it: a target within its tolerance, a bound to a millionth of its own.
 
         margin: so far to either side of the value too.
         """
@@ -103,7 +103,7 @@ class Target:
 
     @property
     def words(self) -> str:
-        """What is asked, in words."""
+        """The target in words."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind in ("walls_apart", "printable"):
             return "yes"
@@ -121,7 +121,7 @@ class Target:
 
 @attrs.frozen
 class Supplies:
-    """What targets need besides: elongation at break as a ratio, density in g/ml and a printer, and paths.
+    """Further inputs of targets: elongation at break as a ratio, density in g/ml, a printer, paths.
 
     has_gravity: whether the unit bears its weight, so that it is bent at 0 kPa. path_is_free: whether a
     target may leave its path out, which is the free one then; body: in place of the lattice's box, or None.

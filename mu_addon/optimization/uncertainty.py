@@ -1,4 +1,4 @@
-"""What differs from print to print, and how far it moves what is asked of a unit, to first order."""
+"""Scatter from print to print, and its first-order effect on a unit's quantities."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Uncertainty:
     modulus_share: float
 
     def freedoms(self, unit: Unit) -> list[Freedom]:
-        """What differs from print to print, as freedoms: the surfaces' offset, and all moduli together."""
+        """Scatter from print to print as freedoms: the surfaces' offset, and all moduli together."""
         m = unit.material
         return [
             Freedom("print.offset_xy_mm", -0.3, 0.5, also={"print.offset_z_mm": 1.0}, unit="mm"),

@@ -54,7 +54,7 @@ def _materials(unit: Unit, mesh: Mesh) -> Materials:
 
 @attrs.frozen(eq=False)
 class Mechanics:
-    """How units are simulated: mesh settings, and what an extended model changes.
+    """Settings of a unit's simulation: mesh, and the changes of an extended model.
 
     as_printed: a drawn unit with the parts of the model that a unit has parameters for; materials, model: of
     such a unit and its mesh; load: dead forces (n, 3) in N, or None; newton: settings, None for the
@@ -114,7 +114,7 @@ class UnitBody:
 
     @cached_property
     def morph(self) -> Morph | PrintedMorph:
-        """What moves its mesh to units near to it. Raises MeshingError."""
+        """Morph of its mesh to units near to it. Raises MeshingError."""
         m = self.mechanics
         if self.mesh.resolved:
             return PrintedMorph(self.mesh, self.printed, m.settings, self.envelope)

@@ -50,7 +50,7 @@ class PrintTime:
         return print_time(height, self.printer) / 3600.0
 
     def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
-        """Of layers that are not rounded to whole ones."""
+        """Change of the print time in h, of layers that are not rounded to whole ones."""
         heights = [s.about.dimensions.height + s.about.dimensions.inlet_length for s in (plus, minus)]
         return (heights[0] - heights[1]) / self.printer["layer_mm"] * self.printer["layer_s"] / 3600.0
 

@@ -32,7 +32,7 @@ def _positive(_: object, field: attrs.Attribute[float], value: float) -> None:
 
 @attrs.frozen
 class Limits:
-    """What a path may be: its least length, its largest, and its sharpest bend.
+    """Limits of a path: its least and largest length, and its sharpest bend.
 
     Lengths are in cells; a window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2
     cells. The bend is assumed, since the paper's paths are straight: 75 degrees admits the zigzag from
@@ -91,11 +91,11 @@ class Graph:
             yield from extend([start], None, 0.0)
 
     def _stands_for_both(self, chain: list[int]) -> bool:
-        """Whether a chain is the one of two mirror images that is listed."""
+        """True if a chain is the one of two mirror images that is listed."""
         return chain <= [int(i) for i in self.image[chain]]
 
     def count(self, limits: Limits) -> int:
-        """How many chains there are within the limits, mirror images counted once."""
+        """Number of chains within the limits, mirror images counted once."""
         return sum(1 for _ in self.chains(limits))
 
     def steps_of(self, chain: tuple[int, ...]) -> list[int]:
@@ -144,7 +144,7 @@ def lattice_graph(d: Dimensions, clearance_mm: float | None = None) -> Graph:
 
 
 def _clear(d: Dimensions, ends: Array, clearance: float) -> Array:
-    """Whether steps (e, 2, 3) keep clear of the membrane's outer surface and the envelope's faces, (e,)."""
+    """True for steps (e, 2, 3) clear of the membrane's outer surface and the envelope's faces, (e,)."""
     from scipy.spatial import cKDTree
 
     t = np.linspace(0.0, 1.0, _ALONG_STEP)[:, None]

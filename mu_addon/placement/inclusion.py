@@ -123,7 +123,7 @@ class Inclusion:
 
     @property
     def touched(self) -> Array:
-        """Whether the cylinder touches each element, (m,) bool: the paper's region of interest."""
+        """True for each element that the cylinder touches, (m,): the paper's region of interest."""
         return self.share > 0
 
     @property

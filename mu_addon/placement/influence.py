@@ -1,4 +1,4 @@
-"""How much every element's stiffness moves the monitored points: the adjoint map of a whole trajectory."""
+"""Adjoint map of a trajectory: how far each element's stiffness moves the monitored points."""
 
 from __future__ import annotations
 

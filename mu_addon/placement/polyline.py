@@ -78,7 +78,7 @@ def polyline_inclusion(
 
 
 def _near(corners: Array, low: Array, high: Array, radius: float) -> Array:
-    """Whether tetrahedra (m, 4, 3) may touch a cylinder, by boxes, (m,)."""
+    """True for tetrahedra (m, 4, 3) whose boxes touch a cylinder's, (m,)."""
     below, above = np.minimum(low, high) - radius, np.maximum(low, high) + radius
     return np.asarray(((corners.max(axis=1) > below) & (corners.min(axis=1) < above)).all(axis=1))
 

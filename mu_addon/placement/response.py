@@ -1,4 +1,4 @@
-"""What a path of stiff steps does to the unit, without solving for it: a reduced, linear response.
+"""Reduced, linear response of a unit to a path of stiff steps, without solving for the path.
 
 An inclusion a hundred times stiffer than the lattice is far outside what a first-order map can tell. But
 its own strain stays small, so that its forces are linear in the displacement of its co-rotated elements,
@@ -186,7 +186,7 @@ def solver_of(model: Model, tangent: Array) -> Callable[[Array], Array]:
 
 
 def _represented(graph: Graph, mirrored: bool) -> tuple[Array, Array, Array]:
-    """Of every step the representative's place and its own side (e,), and the representatives (r,).
+    """For every step the place of its representative and its own side (e,), and the representatives (r,).
 
     In a half mesh, of two mirror images the one at x > 0 represents both.
     """

@@ -15,7 +15,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class SearchSettings:
-    """How many paths are checked at first, at most and at a time, and the risk left when it ends.
+    """Numbers of paths to check at first, at most and at a time, and the risk left at the end.
 
     spread: of the first checks, how many are taken from the whole range of predictions, so that the
     prediction's error is known there too. risk: a probability, see `probability_of_better`.

@@ -209,7 +209,7 @@ class _Scene:
 
 @attrs.frozen(eq=False)
 class _Layer:
-    """What every pixel sees first of some faces; the colour is lit only after `_Shot.shade`."""
+    """First face that every pixel sees; the colour is lit only after `_Shot.shade`."""
 
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]

@@ -132,7 +132,7 @@ def motion(
 
 
 def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
-    """What of some bodies lies at x <= 0, where the cut unit is."""
+    """Part of some bodies at x <= 0, where the cut unit is."""
     found = []
     for rigid in bodies:
         mesh = rigid.body.manifold.trim_by_plane([-1.0, 0.0, 0.0], 0.0).to_mesh64()

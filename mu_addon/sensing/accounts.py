@@ -115,7 +115,7 @@ class Accounts:
         self.unended(piece)
 
     def complaint(self, buffered: bytes) -> tuple[str, str] | None:
-        """What is wrong with input of no known format, and what to do; None where too little is known yet."""
+        """Fault of input in no known format, and what to do; None while too little is known."""
         unread = self.counters.bytes - self.counters.read_bytes
         if unread < _COMPLAINT_BYTES or 20 * self.counters.read_bytes > self.counters.bytes:
             return None

@@ -184,7 +184,7 @@ def _best(sweeps: Sequence[CalibrationSweep], drift: float) -> tuple[float, int,
 
 
 def _determined(sweeps: Sequence[CalibrationSweep], intervals: int) -> bool:
-    """Whether the angles that were visited say each coefficient of a spline of so many intervals.
+    """True if the visited angles determine each coefficient of a spline of so many intervals.
 
     Sweeps that hold a few angles say nothing of those between, and sweeps left out hold the same few: they
     cannot tell that a spline goes there in steps.
@@ -276,7 +276,7 @@ def _without_each(
 
 
 def _left_out(sweeps: Sequence[CalibrationSweep], intervals: int, drift: float) -> list[Array]:
-    """What each sweep is off in V from the fit to the others, at angles that these reach."""
+    """Error in V of each sweep against the fit to the others, at angles that these reach."""
     result = []
     for sweep, (knots, coefficients) in zip(sweeps, _without_each(sweeps, intervals, drift), strict=True):
         asked = _within(sweep, knots)
@@ -303,7 +303,7 @@ def _band(off: Sequence[Array]) -> float:
 
 
 def _independent(off: Array) -> float:
-    """How many independent readings carry as much as these correlated ones, by their lag-one correlation."""
+    """Number of independent readings worth these correlated ones, by their lag-one correlation."""
     if len(off) < 3 or not off.any():
         return float(len(off))
     rho = float(np.clip(off[1:] @ off[:-1] / (off @ off), 0.0, 0.999))

@@ -22,7 +22,7 @@ def channels_of(found: Iterable[object]) -> list[str]:
 
 
 class ChannelNames:
-    """Which names of a line's values are channels, and which may be damaged ones."""
+    """Names of a line's values: those that are channels, and those that may be damaged."""
 
     def __init__(self) -> None:
         self._doubtful: set[str] = set()
@@ -33,7 +33,7 @@ class ChannelNames:
         self._new = {}
 
     def is_unsure(self, lines: Sequence[Pairs]) -> bool:
-        """Whether first lines are too few, and agree too little, to tell a damaged name from a right one."""
+        """True if first lines are too few and too different to tell a damaged name from a right one."""
         names = Counter(name for line in lines for name in channels_of(line))
         return len(lines) < SURE and any(2 * times <= max(names.values()) for times in names.values())
 
@@ -80,7 +80,7 @@ class ChannelNames:
         return strange, layout
 
     def _keeps_coming(self, name: str, number: int, within: int) -> bool:
-        """Whether a new name, on line `number` again, has come ENOUGH times `within` so many lines."""
+        """True if a new name, on line `number` again, has come ENOUGH times `within` so many lines."""
         came = self._new.setdefault(name, deque(maxlen=ENOUGH))
         came.append(number)
         if len(came) < ENOUGH or came[-1] - came[0] > within:

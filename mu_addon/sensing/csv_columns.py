@@ -10,7 +10,7 @@ from .lines import Pairs, header_of, pairs_of_row, row_of
 
 
 class CsvColumns:
-    """What rows mean, as header and rows come; `refused` are headers that turned out to be none."""
+    """Meaning of a CSV stream's columns, learned from header and rows; `refused` headers were none."""
 
     def __init__(self) -> None:
         self.refused: list[bytes] = []
@@ -23,14 +23,14 @@ class CsvColumns:
         self._columns_of: dict[int, list[str]] = {}
 
     def learn(self, rows: Sequence[Sequence[float]]) -> None:
-        """How many columns most rows have, lest a damaged one that comes first should set it."""
+        """Number of columns of most rows, so that a damaged first row does not set it."""
         self._width, self._other_widths = 0, [0, 0]
         if rows:
             self._width = Counter(map(len, rows)).most_common(1)[0][0]
 
     @staticmethod
     def is_unsure(rows: Sequence[Sequence[float]]) -> bool:
-        """Whether first rows are too few, and agree too little, to tell how many columns there are."""
+        """True if first rows are too few and too different to tell the number of columns."""
         commonest = max(Counter(map(len, rows)).values(), default=0)
         return len(rows) < SURE and 4 * commonest < 3 * len(rows)
 

@@ -57,7 +57,7 @@ class Decoder:
 
     @property
     def rejects(self) -> list[Reject]:
-        """What gave no sample, for the caller to keep and to clear."""
+        """Input that gave no sample, for the caller to keep and to clear."""
         return self._accounts.rejects
 
     def interrupted(self) -> None:
@@ -99,7 +99,7 @@ class Decoder:
 
     @property
     def complaint(self) -> tuple[str, str] | None:
-        """What is wrong with input of which almost nothing can be read, and what to do; else None."""
+        """Fault of input of which almost nothing can be read, and what to do; else None."""
         return None if self.format is not None else self._accounts.complaint(bytes(self._buffer))
 
     # The buffer.
@@ -172,13 +172,13 @@ class Decoder:
         self._learn(found)
 
     def _is_unsure(self, found: str) -> bool:
-        """Whether the buffer's lines disagree on their channels and are few: what comes next will tell."""
+        """True if the buffer's lines are few and disagree on their channels: later ones will tell."""
         if found == "csv":
             return self._csv.is_unsure(self._rows())
         return self._names.is_unsure(self._named_lines(found))
 
     def _learn(self, found: str) -> None:
-        """What most of the latest lines agree on."""
+        """Learn the layout that most of the latest lines agree on."""
         self._csv.learn([])
         self._names.trust()
         if found not in TEXT_READERS:
@@ -189,7 +189,7 @@ class Decoder:
             self.layout = self._names.learn(self._named_lines(found), self.layout)
 
     def _read_lines(self, format_: str) -> list[Pairs | list[float]]:
-        """What the buffer's lines hold in a format of text."""
+        """Samples of the buffer's lines in a format of text."""
         lines = whole_lines(bytes(self._buffer), not self._first)
         return [values for line in lines if line and (values := TEXT_READERS[format_](line))]
 

@@ -1,4 +1,4 @@
-"""Which of the formats a serial line speaks, told by what most of the latest whole pieces can be read as."""
+"""Format of a serial line: the one that most of the latest whole pieces can be read as."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ CHANGE_MISFIT = 0.45
 
 
 def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:
-    """Where a diffuse source's light ends in the bent guide, by Monte Carlo ray tracing.
+    """Fate of a diffuse source's light in the bent guide, by Monte Carlo ray tracing.
 
     line: of the bar as if it had no wells, straight or with one leg at rest; see `with_wells`. rays: their
     number. Raises InputError for wells that overlap or leave the bar.

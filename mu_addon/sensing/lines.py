@@ -118,7 +118,7 @@ def row_of(line: str) -> list[float] | None:
 
 
 def _cells(line: str) -> list[str]:
-    """What commas, semicolons or tabs part, or blanks where there is none of these."""
+    """Cells between commas, semicolons or tabs, or between blanks where there is none of these."""
     for separator in ",;\t":
         if separator in line:
             return [cell.strip() for cell in line.split(separator)]

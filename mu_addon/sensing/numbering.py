@@ -174,7 +174,7 @@ class Numbering:
         return numbered._replace(clock_restarted=clock == _RUN)
 
     def _judged(self, ahead: float, after: float | None) -> str:
-        """What a number is that does not go on by one, `after`: how far ahead of the last the next one is."""
+        """Judgement of a number that does not go on by one; `after`: the next one's lead over the last."""
         stubborn = self._odd >= _ODD
         if ahead > 0:
             goes_on = after is None or (after > ahead and (ahead <= _FAR or after - ahead <= _NEAR))

@@ -1,4 +1,4 @@
-"""What a printed resin does to light."""
+"""Optical constants of a printed resin."""
 
 from __future__ import annotations
 

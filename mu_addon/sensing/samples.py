@@ -1,4 +1,4 @@
-"""What comes of a serial line: samples of one layout of channels, numbered and timed."""
+"""Samples of a serial line: one layout of channels, numbered and timed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen
 class Layout:
-    """What a sample holds: names of its channels, the unit of their values (or none), size of a count.
+    """Layout of a sample: names of its channels, the unit of their values (or none), size of a count.
 
     per_count: in `unit`; raw counts of frames are multiplied by it.
     """

@@ -195,7 +195,7 @@ def _take(pieces: queue.SimpleQueue[_Piece], view: _View, clock: _Clock) -> bool
 
 
 class _View:
-    """What a session shows: the recorder first, then ring and status."""
+    """View of a session: the recorder first, then ring and status."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""What a waveguide's light tells of a body's bending: its signal over a motion, and the figures of a sensor.
+"""Light signal of a waveguide over a body's motion, and the figures of it as a sensor.
 
 `signal_of_states` is the one door for a path's signal from states of a finite-element mesh.
 """
@@ -169,7 +169,7 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
 
 
 def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[bool]:
-    """Which of n candidates are Pareto-optimal: no other disturbs less and senses more.
+    """Mask of the Pareto-optimal of n candidates: no other disturbs less and senses more.
 
     disturbance (n,) and sensitivity (n,): each in one unit of the caller's; the sign of a sensitivity does
     not matter.

@@ -1,4 +1,4 @@
-"""Where bytes come from: a serial port, a recording played again, or a simulated sensor."""
+"""Sources of bytes: a serial port, a recording played again, or a simulated sensor."""
 
 from __future__ import annotations
 

@@ -1,12 +1,15 @@
 """What the checkout says about itself is true: versions, commands, pins, and nothing of anyone's machine."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import tomllib
 from pathlib import Path
 
 import pytest
+
+from mu_addon.cli.main import parser
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -61,6 +64,21 @@ def test_links_in_the_papers_lead_somewhere():
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if not target.startswith(("http://", "https://")):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_every_command_of_the_pages_is_one():
+    """Options and their choices as the command line has them; nothing is run."""
+    refused, count = [], 0
+    for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+        text = page.read_text(encoding="utf-8")
+        for words in re.findall(r"headless/run\.py (?:-- )?([a-z-]+ [^\n`#]*)", text):
+            count += 1
+            try:
+                parser().parse_args(shlex.split(words))
+            except SystemExit:
+                refused.append(f"{page.name}: {words}")
+    assert refused == []
+    assert count > 30
 
 
 def _kept_files():

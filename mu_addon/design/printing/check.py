@@ -211,7 +211,7 @@ def _faces(vertices: Vertices, triangles: Triangles) -> tuple[list[Finding], Tri
 
 
 def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array, in_body: bool) -> list[Finding]:
-    """Whether the part has its drawing's size and fits the printer."""
+    """True if the part has its drawing's size and fits the printer."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     found = []
     if unit is not None:
@@ -249,7 +249,7 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array, in
 
 
 def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
-    """Whether the part fits the build volume on its supports, as it stands or turned about the direction."""
+    """True if the part fits the build volume on its supports, as it stands or turned about the direction."""
     extent = np.ptp(vertices @ frame_along(up).T, axis=0)
     room, limit = printer.room, printer.limits["build_x_mm"]
     straight, turned = _flat(extent, room), _flat(extent[[1, 0, 2]], room)
@@ -290,7 +290,7 @@ def _flat(extent: Array, room_mm: tuple[float, float, float]) -> float:
 
 
 def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Finding]:
-    """What the drawing's own figures say, with the printer's offsets that the unit knows."""
+    """Findings from the drawing's own figures, with the print offsets of the unit."""
     d, printed = unit.dimensions, unit.printed
     strut, where, place = d.junction_diameter, "junctions", NOWHERE
     if d.grading is not None:

@@ -85,11 +85,11 @@ class Chambers:
     free: NDArray[np.bool_]
 
     def hold(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each of the points (n, 3) in mm lies in a cell of a chamber, (n,)."""
+        """True for each of the points (n, 3) in mm that lies in a cell of a chamber, (n,)."""
         return np.asarray(self.within[self._cells(points)])
 
     def beside(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each of the points (n, 3) in mm lies in a free cell of no chamber, (n,)."""
+        """True for each of the points (n, 3) in mm that lies in a free cell of no chamber, (n,)."""
         cells = self._cells(points)
         return np.asarray(self.free[cells] & ~self.within[cells])
 
@@ -268,7 +268,7 @@ def _outside(here: Parts, wide: Parts, outside: int, corner: Index) -> Index:
 def _on_face(
     first: Index, last: Index, shape: tuple[int, ...], rims: list[tuple[bool, bool]] | None = None
 ) -> NDArray[np.bool_]:
-    """Which runs, first and last cells (r, 3), reach a face of their box, other than those that are rims."""
+    """Runs, first and last cells (r, 3), that reach a face of their box, other than those that are rims."""
     found = np.zeros(len(first), bool)
     for axis in range(3):
         low, high = (False, False) if rims is None else rims[axis]

@@ -60,7 +60,7 @@ def edges(triangles: Triangles) -> Edges:
 
 
 def doubled(triangles: Triangles) -> NDArray[np.bool_]:
-    """Which triangles (m, 3) have the same three corners as an earlier one, in any order; (m,)."""
+    """Mask of triangles (m, 3) with the same three corners as an earlier one, in any order; (m,)."""
     key = np.sort(triangles, axis=1)
     order = np.lexsort(key.T[::-1])
     same = np.zeros(len(key), bool)
@@ -92,7 +92,7 @@ def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
 
 
 def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
-    """Which triangles (m, 3) face against the larger part, by area in mm2, of their surface; (m,).
+    """Mask of triangles (m, 3) that face against the larger part, by area in mm2, of their surface; (m,).
 
     vertices (n, 3) in mm. Triangles belong together where exactly two share an edge.
     """
@@ -118,7 +118,7 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
 
 
 def _against_the_larger(links: Any, size: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which patches (n,) face against the larger part, by size (n,), of the patches that they are linked to.
+    """Mask of patches (n,) that face against the larger part, by size (n,), of those they are linked to.
 
     links: between patches that face each other's way, as a sparse matrix (n, n).
     """
@@ -228,7 +228,7 @@ def _shells(vertices: Vertices, triangles: Triangles, label: NDArray[np.integer]
 
 
 def members_of(label: NDArray[np.integer]) -> list[NDArray[np.int64]]:
-    """Which (k,) have each label, of labels (m,) from 0 on."""
+    """Members (k,) of each label, of labels (m,) from 0 on."""
     order = np.argsort(label, kind="stable")
     return np.split(order, np.cumsum(np.bincount(label))[:-1])
 

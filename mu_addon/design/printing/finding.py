@@ -39,7 +39,7 @@ class Finding:
 
     @property
     def is_fault(self) -> bool:
-        """Whether something must be done: severity `error` or `warning`."""
+        """True if something must be done: severity `error` or `warning`."""
         return self.severity in ("error", "warning")
 
     def plain(self) -> dict[str, Any]:

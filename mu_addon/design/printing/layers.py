@@ -186,7 +186,7 @@ def cups(grid: VoxelRows, free: Regions) -> Cups:
 
 
 def overhangs(grid: VoxelRows, slope_deg: float, at_once: int = 8_000_000) -> Overhang:
-    """What layers extend beyond the layer below, which supports slopes of `slope_deg` degrees from level.
+    """Overhangs of layers beyond the layer below, which supports slopes of `slope_deg` degrees from level.
 
     Islands are left out. A region supported from opposite sides is a bridge, whose span is twice its reach.
     at_once: largest number of cells that are held in memory at a time.

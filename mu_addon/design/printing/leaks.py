@@ -1,4 +1,4 @@
-"""Whether chambers drain through their inlet and hold pressure otherwise."""
+"""Drains and leaks of chambers: they must drain through their inlet and hold pressure otherwise."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
     x, y, _ = frame_along(way.along)
 
     def radius(at: Points, above: float) -> float:
-        """Of the widest ball about a point, or, where that is no more than `above`, anything up to it."""
+        """Radius of the widest ball about a point; where that is no more than `above`, anything up to it."""
         least, start = 1.0, at.tolist()
         for end in (at + reach * rays).tolist():
             hit = solid.ray_cast(start, end)
@@ -193,5 +193,5 @@ def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
 
 
 def _free(solid: Any, at: Points) -> bool:
-    """Whether a point lies outside the solid: a line from it leaves as often as it enters."""
+    """True if a point lies outside the solid: a line from it leaves as often as it enters."""
     return len(solid.ray_cast(at.tolist(), (at + np.array([311.0, 173.0, 97.0])).tolist())) % 2 == 0

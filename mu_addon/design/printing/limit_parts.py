@@ -48,7 +48,7 @@ class LimitPart:
 
     @property
     def measure(self) -> str:
-        """What to find out, in words, and where to write it."""
+        """Instructions of a measurement, in words, and where to write its result."""
         return f"{MEANING[self.limit]}: write {self.how} into limits.csv"
 
 

@@ -47,7 +47,7 @@ def against_nominal(
 
 
 def _difference(more: int) -> str:
-    """What a genus that differs stands for, in words."""
+    """Meaning of a genus that differs, in words."""
     if not more:
         return ""
     if more < 0:

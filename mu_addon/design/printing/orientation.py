@@ -103,7 +103,7 @@ def build(
 
 
 def fits(extent: Array, room: tuple[float, float, float]) -> bool:
-    """Whether extents (3,) in mm fit a build volume in mm, as they are or turned by 90 degrees about z."""
+    """True if extents (3,) in mm fit a build volume in mm, as they are or turned by 90 degrees about z."""
     x, y, z = extent.tolist()
     flat = (x <= room[0] and y <= room[1]) or (y <= room[0] and x <= room[1])
     return bool(flat and z <= room[2])

@@ -1,4 +1,4 @@
-"""What a printer and its resin can make: limits with their sources, from assets/printers/*.toml."""
+"""Limits of a printer and its resin, with their sources, from assets/printers/*.toml."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Limit:
 
     @property
     def standing(self) -> str:
-        """What the value rests on, in a word."""
+        """Basis of the value, in a word."""
         return "measured" if self.measured else "assumed" if self.assumed else "published"
 
 

@@ -52,7 +52,7 @@ class Repair:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing remains to be repaired."""
+        """True if nothing remains to be repaired."""
         return not self.remains
 
     def plain(self) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Repair:
         }
 
     def lines(self) -> list[str]:
-        """What was done and what remains, a sentence each."""
+        """Repairs done and faults left, a sentence each."""
         lines = [f"{change.count} {change.what}" for change in self.changes] or ["nothing was changed"]
         before, after = self.volume_before_mm3, self.volume_after_mm3
         lines.append(
@@ -263,7 +263,7 @@ def _inside_out(vertices: Vertices, triangles: Triangles) -> list[NDArray[np.int
 
 
 def _remaining(vertices: Vertices, triangles: Triangles) -> list[str]:
-    """What is wrong with a surface that has more than one remedy."""
+    """Faults of a surface that have more than one remedy."""
     e = faces.edges(triangles)
     count = np.bincount(e.of_side)
     agree = np.bincount(e.of_side, np.where(e.forward, 1, -1)) != 0

@@ -1,4 +1,4 @@
-"""What a printer's layers look like: outlines of a part's sections, and what they enclose."""
+"""Pictures of a printer's layers: outlines of a part's sections, and what they enclose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How thick a solid is, and how wide its gaps are, by rays square to its surface."""
+"""Thickness of a solid and width of its gaps, by rays square to its surface."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Samples:
 
 @attrs.frozen(eq=False)
 class RayHits:
-    """What the rays from samples hit first: distances (s,) in mm, inf beyond reach, and places (s, 3) in mm.
+    """First hits of rays from samples: distances (s,) in mm, inf beyond reach, and places (s, 3) in mm.
 
     cosine (s,): between the normals of the sample and of the triangle hit; -1 where these faces are parallel,
     0 where nothing was hit.

@@ -54,7 +54,7 @@ class Vent:
 
     @property
     def length(self) -> float:
-        """Of the hole, in mm."""
+        """Length of the hole in mm."""
         return float(np.linalg.norm(self.outer - self.inner))
 
     def plain(self) -> dict[str, Any]:

@@ -37,7 +37,7 @@ class VoxelRows:
         return self.solid.part(first * self.shape[1], last * self.shape[1])
 
     def slab(self, first: int, last: int) -> NDArray[np.bool_]:
-        """Which cells (last - first, rows, cells) of layers first .. last - 1 are solid."""
+        """Mask of the solid cells (last - first, rows, cells) of layers first .. last - 1."""
         _, rows, cells = self.shape
         here = self.lines(first, last)
         turns = np.zeros(((last - first) * rows, cells + 1), np.int8)
@@ -108,7 +108,7 @@ def _filled(line: Index, cell: Index, sign: NDArray[np.int8], cells: int) -> Run
 def _crossings(
     points: Array, triangles: Triangles, shape: tuple[int, int, int]
 ) -> tuple[Index, Index, NDArray[np.int8]]:
-    """Where rows at whole numbers of the first two coordinates meet triangles, in units of cells.
+    """Crossings of triangles with rows at whole numbers of the first two coordinates, in units of cells.
 
     Of each: number of its line, first cell whose centre lies beyond, and +1 where the solid begins, -1 where
     it ends.
