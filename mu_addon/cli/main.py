@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,9 @@ def main(arguments: list[str]) -> int:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)
         context.short_report = _short_report
-        command.run(options, context)
+        # Blender itself has no threads of ours.
+        with nullcontext() if "bpy" in sys.modules else context.progress.beating():
+            command.run(options, context)
     if context.status == 0 and not json:
         results = [f"results: {context.folder}"] if context.folder is not None else []
         lines = [*results, *context.console_summary(context.summary)]

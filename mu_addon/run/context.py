@@ -133,7 +133,7 @@ class RunContext:
 
     def _keep_found(self, message: Message) -> None:
         """What was found goes to summary.json between stages and every few seconds: a kill takes nothing."""
-        if message.get("type") != "progress":
+        if message.get("type") != "progress" or message.get("beat"):
             return
         now = time.monotonic()
         if message["state"] != "run" or now - self._kept_s > KEEP_EVERY_S:

@@ -2,8 +2,11 @@
 
 A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
 
+- plan: the stages that are expected, as [name, seconds], and the seconds of all
 - progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
-  and detail where there is something to say of what was just done, at its end of what the stage made
+  and detail where there is something to say of what was just done, at its end of what the stage made; where
+  there is a plan also whole (0..1) and whole_seconds_left, of the run, and why the latter grew, if it did;
+  beat where nothing is new but the time
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
 - error: what, where, what_to_do, status; the last message of a run that did not
@@ -13,7 +16,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
+import threading
 import time
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,14 +28,22 @@ from typing import Any, TextIO
 
 from ..errors import MuError
 from ..files import append_lines, output_error, plain
+from .progress_estimate import Plan, ProgressEstimate, own_left
 
 Message = dict[str, Any]
 Sink = Callable[[Message], None]
 Clock = Callable[[], float]
 
 
+BEAT_S = 5.0
+"""Seconds after which a stage that says nothing is told to go on."""
+
+
 class Progress:
-    """The stages of one run, told to `sinks`; `seconds` keeps how long each stage took, in order."""
+    """The stages of one run, told to `sinks`; `seconds` keeps how long each stage took, in order.
+
+    estimate: the whole of the run, as far as a `plan` tells of it.
+    """
 
     def __init__(self, sinks: Sequence[Sink] = (), clock: Clock = time.perf_counter) -> None:
         self.sinks = list(sinks)
@@ -39,7 +52,36 @@ class Progress:
         self._stage = ""
         self._start = 0.0
         self._expected: float | None = None
+        self._fraction: float | None = None
+        self._updated = self._told = clock()
         self._made = ""
+        self._one_at_a_time = threading.RLock()
+        self.estimate = ProgressEstimate((), clock)
+
+    def plan(self, stages: Plan) -> None:
+        """Tell which stages the run is expected to have, with their seconds; nothing without any."""
+        if stages:
+            self.estimate = ProgressEstimate(stages, self._clock)
+            self.emit({"type": "plan", "stages": [*map(list, stages)], "seconds": sum(s for _, s in stages)})
+
+    @contextmanager
+    def beating(self, every_s: float = BEAT_S) -> Iterator[None]:
+        """Meanwhile a thread tells a stage's time where the stage itself has told nothing for `every_s`."""
+        ended = threading.Event()
+
+        def beat() -> None:
+            while not ended.wait(every_s / 5.0):
+                with self._one_at_a_time, suppress(OSError, MuError):
+                    if self._stage and self._clock() - self._told >= every_s:
+                        self._emit_progress("run", self._fraction, beat=True)
+
+        thread = threading.Thread(target=beat, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            thread.join()
 
     @contextmanager
     def stage(self, name: str, expected_s: float | None = None) -> Iterator[None]:
@@ -49,15 +91,18 @@ class Progress:
         """
         if self._stage:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
-        self._stage, self._start, self._expected = name, self._clock(), expected_s
+        with self._one_at_a_time:
+            self._stage, self._start, self._expected = name, self._clock(), expected_s
+            self._fraction, self._updated = (0.0 if expected_s else None), self._start
         try:
-            self._emit_progress("start", 0.0 if expected_s else None)
+            self._emit_progress("start", self._fraction)
             yield
             self._emit_progress("end", 1.0, self._made)
         finally:
-            elapsed = self._clock() - self._start
-            self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
-            self._stage = self._made = ""
+            with self._one_at_a_time:
+                elapsed = self._clock() - self._start
+                self.seconds[name] = self.seconds.get(name, 0.0) + elapsed
+                self._stage = self._made = ""
 
     def made(self, size: str) -> None:
         """Say how large what the present stage makes is, "6210 nodes" say; told with its end."""
@@ -66,10 +111,14 @@ class Progress:
     def update(self, fraction: float, detail: str = "") -> None:
         """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told.
 
-        detail: a few words on what was just done, a load step and its residual, say.
+        One that is less than before counts as before: what was done stays done. detail: a few words on what
+        was just done, a load step and its residual, say.
         """
-        if self._stage:
-            self._emit_progress("run", min(max(float(fraction), 0.0), 1.0), detail)
+        with self._one_at_a_time:
+            if self._stage:
+                self._fraction = max(min(max(float(fraction), 0.0), 1.0), self._fraction or 0.0)
+                self._updated = self._clock()
+                self._emit_progress("run", self._fraction, detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
         """Tell something the user should know that does not end the run."""
@@ -91,35 +140,40 @@ class Progress:
             "what_to_do": error.remedy,
             "status": error.status,
         }
-        for sink in self.sinks:
-            with suppress(OSError, MuError):
-                sink(message)
+        with self._one_at_a_time:
+            for sink in self.sinks:
+                with suppress(OSError, MuError):
+                    sink(message)
 
     def emit(self, message: Message) -> None:
         """Hand `message` to every sink."""
-        for sink in self.sinks:
-            sink(message)
+        with self._one_at_a_time:
+            for sink in self.sinks:
+                sink(message)
 
-    def _emit_progress(self, state: str, fraction: float | None, detail: str = "") -> None:
-        elapsed = self._clock() - self._start
-        self.emit(
-            {
+    def _emit_progress(
+        self, state: str, fraction: float | None, detail: str = "", beat: bool = False
+    ) -> None:
+        with self._one_at_a_time:
+            self._told = now = self._clock()
+            elapsed = now - self._start
+            message: Message = {
                 "type": "progress",
                 "stage": self._stage,
                 "state": state,
                 "fraction": fraction,
                 "seconds": elapsed,
-                "seconds_left": _seconds_left(elapsed, fraction, self._expected),
+                "seconds_left": own_left(elapsed, now - self._updated, fraction, self._expected),
                 **({"detail": detail} if detail else {}),
+                **({"beat": True} if beat else {}),
             }
-        )
-
-
-def _seconds_left(elapsed: float, fraction: float | None, expected: float | None) -> float | None:
-    """By the share done where it is known, else by what was expected."""
-    if fraction:
-        return elapsed * (1.0 - fraction) / fraction
-    return max(expected - elapsed, 0.0) if expected is not None else None
+            self.estimate.tell(message)
+            if self.estimate.count:
+                message["whole"] = self.estimate.fraction
+                message["whole_seconds_left"] = self.estimate.seconds_left
+                if self.estimate.why:
+                    message["why"] = self.estimate.why
+            self.emit(message)
 
 
 def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> Sink:
@@ -164,7 +218,10 @@ class _Lines:
         self.last = 0.0
 
     def __call__(self, message: Message) -> None:
-        if message["type"] == "progress":
+        if message["type"] == "plan":
+            count = len(message["stages"])
+            self.write(f"about {spell(message['seconds'])} on two cores, {count} stages\n")
+        elif message["type"] == "progress":
             self.progress(message)
         elif message["type"] in ("warning", "error"):
             self.write(printable(_formatted(message), self.stream) + "\n")
@@ -194,15 +251,15 @@ class _LiveLine(_Lines):
         if message["state"] == "run" and not self.due(0.1):
             return
         line = f"{message['stage']:<28} "
-        if message["fraction"] is None:
-            line += "..."
+        share = message.get("whole", message["fraction"])
+        if share is None:
+            line += f"... {spell(message['seconds'])}"
         else:
-            full = round(self.bar * message["fraction"])
-            line += "[" + "#" * full + "." * (self.bar - full) + f"] {100 * message['fraction']:3.0f} %"
-        if ended:
-            line += f"  {spell(message['seconds'])}"
-        elif message["seconds_left"] is not None:
-            line += f"  {spell(message['seconds_left'])} left"
+            full = round(self.bar * share)
+            line += "[" + "#" * full + "." * (self.bar - full) + f"] {100 * share:3.0f} %"
+        line += f"  {spell(message['seconds'])}" if ended else _left(message, "  ")
+        # One that wraps could not be redrawn in place.
+        line = line[: shutil.get_terminal_size().columns - 1]
         self.stream.write("\r" + line + "\x1b[K" + ("\n" if ended else ""))
         self.stream.flush()
         self.open = not ended
@@ -216,17 +273,26 @@ class _PlainLines(_Lines):
     """For pipes and logs: no line is ever redrawn."""
 
     def progress(self, message: Message) -> None:
+        stage, share = message["stage"], message["fraction"]
+        whole = f"{100 * message['whole']:3.0f} %  " if "whole" in message else ""
         if message["state"] == "start":
             self.last = self.clock()
-            self.write(f"{message['stage']} ...\n")
+            self.write(f"{whole}{stage} ...\n")
         elif message["state"] == "end":
-            self.write(f"{message['stage']}: done in {spell(message['seconds'])}\n")
+            self.write(f"{whole}{stage}: done in {spell(message['seconds'])}\n")
         elif self.due(5.0):
-            self.write(
-                f"{message['stage']}: {100 * message['fraction']:.0f} %"
-                + (f", {spell(message['seconds_left'])} left" if message["seconds_left"] is not None else "")
-                + "\n"
-            )
+            done = f"for {spell(message['seconds'])}" if whole or share is None else f"{100 * share:.0f} %"
+            self.write(f"{whole}{stage}: {done}{_left(message, ', ')}\n")
+
+
+def _left(message: Message, before: str) -> str:
+    """Time left in words, of the whole run where that was planned, and why it grew; or nothing."""
+    left = message.get("whole_seconds_left", message["seconds_left"])
+    # Less is nothing that one could wait for, and would stand there for longer.
+    if left is None or left < 1.0:
+        return ""
+    why = f" ({message['why']})" if message.get("why") else ""
+    return f"{before}{spell(left)} left{why}"
 
 
 def _formatted(message: Message) -> str:
@@ -275,6 +341,8 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
 
     def sink(message: Message) -> None:
         nonlocal last
+        if message.get("beat"):
+            return
         if message.get("state") == "run":
             if clock() - last < 5.0:
                 return

@@ -13,8 +13,22 @@ LONGER = 1.2
 SLACK_S = 5.0
 MOST_BY_CLOCK = 0.95
 """How much of a stage is taken for done by the clock alone: it has not ended."""
+SURE = 0.1
+"""Share of a stage from which on it alone tells of its rest: first steps may be many times slower."""
 UNPLANNED_S = 20.0
 """Seconds that a stage which no plan has is taken for."""
+
+
+def own_left(elapsed: float, since: float, fraction: float | None, expected: float | None) -> float | None:
+    """Seconds left of a stage, by the share done where it is known, else by what was expected; None without.
+
+    since: seconds since the share was known, from when on it counts down. What is overdue takes a fifth of
+    its time still, since nothing says that it ends now.
+    """
+    if fraction:
+        rest = (1.0 - fraction) / fraction
+        return max((elapsed - since) * rest - since, min(0.2, rest / 2.0) * elapsed)
+    return max(expected - elapsed, 0.2 * elapsed) if expected is not None else None
 
 
 class ProgressEstimate:
@@ -68,10 +82,20 @@ class ProgressEstimate:
             self._add(stage)
         # What was passed over was in the cache, or not asked for.
         self._stage = stage
-        self._share = float(share) if isinstance(share, int | float) else 0.0
         seconds, left = message.get("seconds"), message.get("seconds_left")
         self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0
         self._own_left = float(left) if isinstance(left, int | float) else None
+        self._share = float(share) if isinstance(share, int | float) else 0.0
+        if self._planned and self._share < SURE:
+            expected = self._expected[stage]
+            by_plan = own_left(self._spent, 0.0, None, expected) or 0.0
+            if not self._share:
+                # By the clock, as long as the stage itself says nothing.
+                self._share = min(self._spent / expected, MOST_BY_CLOCK) if expected > 0.0 else 0.0
+                self._own_left = by_plan
+            elif self._own_left is not None:
+                weight = (self._share / SURE) ** 2
+                self._own_left = weight * self._own_left + (1.0 - weight) * by_plan
         if message.get("state") == "end":
             self._taken[stage] = self._spent
             self._share, self._own_left = 1.0, 0.0

@@ -11,6 +11,7 @@ import attrs
 from .context import RunContext
 from .folder import FolderLayout, begin
 from .processes import require_memory
+from .progress_estimate import Plan
 
 Job = TypeVar("Job")
 
@@ -22,7 +23,7 @@ class UseCase(Generic[Job]):
     name: of its command. read: the job that a folder's inputs describe; raises InputError. run: does the job
     in its folder, fills `context.summary` and sets `context.report`; what it returns is what was found.
     console_summary: a run's summary in a few lines of text. begin: makes a folder the run's, where that takes
-    more than `folder.begin`.
+    more than `folder.begin`. plan: stages that a job is expected to have, with their seconds on two cores.
     """
 
     name: str
@@ -31,6 +32,7 @@ class UseCase(Generic[Job]):
     run: Callable[[Job, Path, RunContext], Any]
     console_summary: Callable[[dict[str, Any]], list[str]]
     begin: Callable[[Job, Path, RunContext], None] | None = None
+    plan: Callable[[Job], Plan] = lambda job: ()
 
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
         """Run a job in a folder and leave its report, also where it stops early; returns what was found.
@@ -44,6 +46,7 @@ class UseCase(Generic[Job]):
         else:
             begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
         context.console_summary = self.console_summary
+        context.progress.plan(self.plan(job))
         found = self.run(job, folder, context)
         context.write_report()
         return found

@@ -3,6 +3,7 @@
 import io
 import json
 import sys
+import time
 
 import pytest
 
@@ -189,3 +190,55 @@ def test_half_a_line_of_a_killed_process_does_not_take_the_next_one_with_it(tmp_
     lines = path.read_text().splitlines()
     assert lines[:2] == ['{"type": "result"}', '{"type": "warn']
     assert json.loads(lines[2])["what"] == "next"
+
+
+def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
+    stream, messages = io.StringIO(), []
+    progress = Progress([terminal(stream, clock), messages.append], clock)
+    progress.plan([("mesh", 10.0), ("Model A", 80.0), ("report", 10.0)])
+    with progress.stage("mesh"):
+        clock.now += 10.0
+    with progress.stage("Model A"):
+        # Thirds that are told out of order, as of several workers.
+        for share in (1 / 3, 2 / 3, 1 / 2):
+            clock.now += 20.0
+            progress.update(share)
+        # By the clock it would have ended, but nothing says that it has.
+        clock.now += 40.0
+        progress.update(2 / 3)
+    with progress.stage("report"):
+        clock.now += 10.0
+    told = [m for m in messages if m["type"] == "progress"]
+    whole = [m["whole"] for m in told]
+    assert whole == sorted(whole)
+    assert told[0]["whole_seconds_left"] == 100.0
+    assert stream.getvalue().splitlines() == [
+        "about 1 min 40 s on two cores, 3 stages",
+        "  0 %  mesh ...",
+        " 10 %  mesh: done in 10 s",
+        " 10 %  Model A ...",
+        " 37 %  Model A: for 20 s, 50 s left",
+        " 63 %  Model A: for 40 s, 30 s left",
+        " 63 %  Model A: for 1 min 00 s, 40 s left (Model A takes longer than expected)",
+        " 63 %  Model A: for 1 min 40 s, 1 min 00 s left (Model A takes longer than expected)",
+        " 90 %  Model A: done in 1 min 40 s",
+        " 90 %  report ...",
+        "100 %  report: done in 10 s",
+    ]
+
+
+def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path):
+    """By a thread: its own is in a library meanwhile. Not in the log, which would grow by nothing new."""
+    messages = []
+    progress = Progress([messages.append, log_file(tmp_path / "log.ndjson")])
+    with progress.beating(every_s=0.05), progress.stage("mesh", expected_s=0.1):
+        time.sleep(0.5)
+    beats = [m for m in messages if m.get("beat")]
+    assert len(beats) >= 3
+    assert all(m["stage"] == "mesh" and m["seconds_left"] > 0.0 for m in beats)
+    assert [m["seconds"] for m in beats] == sorted(m["seconds"] for m in beats)
+    assert messages[-1]["state"] == "end"
+    assert len((tmp_path / "log.ndjson").read_text().splitlines()) == 2
+    count = len(messages)
+    time.sleep(0.2)
+    assert len(messages) == count

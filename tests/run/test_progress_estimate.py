@@ -125,3 +125,14 @@ def test_a_stage_that_tells_its_parts_counts_down_by_the_clock():
     assert run.fraction < 1.0
     assert run.seconds_left == 500.0
     assert run.why == "thick takes longer than expected"
+
+
+def test_a_slow_first_step_does_not_frighten():
+    """A hundredth of a compression took 32 s, by which all of it takes an hour: it took five minutes."""
+    run, clock = estimate((("specimen", 110.0), ("report", 10.0)))
+    clock.now = 32.0
+    run.tell(message("specimen", 0.01, 32.0, 3133.0))
+    assert run.seconds_left < 150.0
+    clock.now = 120.0
+    run.tell(message("specimen", 0.25, 120.0, 360.0))
+    assert run.seconds_left == 370.0

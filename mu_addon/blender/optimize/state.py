@@ -14,6 +14,7 @@ from ...design.quantity import describe
 from ...errors import InputError, MuError
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
+from ...usecases.optimize.expected import search_plan
 from ..body import state as bodies
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
 DESIGN, UNIT, MODEL, SUMMARY = "design.toml", "unit.toml", "model.toml", "summary.json"
-A_UNIT_S, A_CHECK_S, MOST_CHECKED = 60.0, 100.0, 6
-"""Seconds that a unit of the search, and one that is proposed, take about on a mesh of 1, and how many are
-proposed at most; a finished run tells better."""
 FRONT = "front.png"
 """What the core draws of two targets, in the run's folder."""
 
@@ -84,17 +82,13 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
     """Stages of an optimisation, with the seconds that each is expected to take."""
     s = root.mu_optimize
     units = s.evaluations
-    # A unit's time grows as the square of what divides its elements: 15 s at 0.5, 7 s at 0.35.
-    mostly = {
-        "search": A_UNIT_S * s.refine**2 * units,
-        "check of what is proposed": A_CHECK_S * s.check_refine**2 * min(MOST_CHECKED, units),
-        "report": 20.0,
-    }
     found = findings(root)
     taken = {} if found is None else found.seconds
     if found is not None and found.simulated and "search" in taken:
         taken = {**taken, "search": taken["search"] * units / found.simulated}
-    return [(name, taken.get(name, seconds)) for name, seconds in mostly.items()]
+    return [
+        (name, taken.get(name, seconds)) for name, seconds in search_plan(units, s.refine, s.check_refine)
+    ]
 
 
 OPTIMIZATION = JobKind(

@@ -17,28 +17,13 @@ from . import study_folder as studies
 if TYPE_CHECKING:
     from ...usecases.simulate_and_place.job import Job
 
-FULL_S = {
-    "solid": 4.0, "mesh": 4.0, "Model A": 100.0, "candidates": 200.0, "mesh check": 100.0, "map": 5.0,
-    "light": 20.0, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
-    "motion of the best path": 60.0, "report": 30.0,
-}  # fmt: skip
-"""Seconds that the stages of a study take about, on two cores; a run of the same folder tells better."""
-PACE = {"full": 1.0, "resolved": 6.0, "quick": 0.1}
-"""How a study's equilibria take longer or shorter by its detail."""
-_SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-
 
 def plan_of(root: Any) -> list[tuple[str, float]]:
     """Stages that a unit's simulation is expected to go through, with the seconds that each takes."""
+    from ...usecases.simulate_and_place.expected import FULL_S, PACE, SOLVED, stage_names
+
     settings = root.mu_unit.study
-    names = ["solid", "mesh", "Model A"]
-    if settings.command == "place":
-        names += ["candidates"]
-        names += ["mesh check"] if settings.detail != "quick" else []
-        names += ["map", "light"]
-        if settings.paths == "graph":
-            names += [name for name in FULL_S if "path" in name]
-    names.append("report")
+    names = stage_names(settings.command == "place", settings.detail != "quick", settings.paths == "graph")
     alike = (run.summary.get("seconds") for run in studies.runs_of(root) if run.detail == settings.detail)
     taken = next((s for s in alike if isinstance(s, dict) and set(names) <= set(s)), {})
 
@@ -46,7 +31,7 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
         value = taken.get(name)
         if isinstance(value, int | float) and value >= 0.0:
             return float(value)
-        return FULL_S[name] * (PACE[settings.detail] if name in _SOLVED else 1.0)
+        return FULL_S[name] * (PACE[settings.detail] if name in SOLVED else 1.0)
 
     return [(name, seconds(name)) for name in names]
 

@@ -10,6 +10,7 @@ from ...fem.unit import materials_of
 from ...meshing.settings import MeshSettings
 from ...meshing.unit import mesh_unit
 from ...run.context import RunContext
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .grasp import Cube
 from .gripping import Gripping
@@ -60,4 +61,10 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of a grasp with the seconds that each is expected to take on two cores."""
+    grasps = [(f"grasp of {cube.side_mm:g} mm", 280.0) for cube in job.cubes]
+    return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]
+
+
+USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of)

@@ -21,8 +21,10 @@ from ...optimization.search import Found, Observed, Values, search_units
 from ...optimization.uncertainty import SURE
 from ...run.cache import Cache, key
 from ...run.context import RunContext
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from . import charts
+from .expected import MOST_CHECKED, search_plan
 from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .results import Optimised, Proposal
@@ -35,9 +37,6 @@ FIRST_PART = 0.6
 """Share of a robust search's units that are judged by the change of the start by the finer mesh."""
 LARGEST_CHANGE = 0.5
 """Share of a value that a finer mesh is taken to change it by at most."""
-
-MOST_CHECKED = 6
-"""Units of a front that are simulated again on a finer mesh, its ends and some evenly between."""
 
 
 def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
@@ -367,4 +366,10 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of an optimisation with the seconds that each is expected to take on two cores."""
+    design = job.design
+    return search_plan(design.search.evaluations, design.settings.refine, design.check_refine)
+
+
+USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary, plan=plan_of)

@@ -8,6 +8,7 @@ from typing import Any
 from ...design.anchors import window
 from ...run.context import RunContext
 from ...run.usecase import UseCase
+from .expected import plan_of
 from .graph_search import chains_within, search_graph, sensitivity_map
 from .job import Job, read_job
 from .light import signals
@@ -82,4 +83,4 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("place", LAYOUT, read_job, simulate_and_place, console_summary, begin_study)
+USE_CASE = UseCase("place", LAYOUT, read_job, simulate_and_place, console_summary, begin_study, plan=plan_of)

@@ -1,0 +1,51 @@
+"""How long the stages of a study take about, before any of them has begun."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ...run.progress_estimate import Plan
+    from .job import Job
+
+FULL_S = {
+    "solid": 4.0, "mesh": 4.0, "Model A": 100.0, "candidates": 200.0, "mesh check": 100.0, "map": 5.0,
+    "light": 20.0, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
+    "motion of the best path": 60.0, "report": 30.0,
+}  # fmt: skip
+"""Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
+PACE = {"full": 1.0, "resolved": 6.0, "quick": 0.1}
+"""How a study's equilibria take longer or shorter by its detail."""
+SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
+# Pressures other than 0 of the shipped protocol at the default number of times.
+_PRESSURES = 6
+# Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
+_BY_REFINEMENT = 3.5
+
+
+def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
+    """Names of the stages that a study goes through."""
+    names = ["solid", *(["mesh", "Model A"] if simulate else [])]
+    if place:
+        names += ["candidates", *(["mesh check"] if mesh_check else []), "map", "light"]
+        names += [name for name in FULL_S if "path" in name] if graph else []
+    return [*names, "report"]
+
+
+def plan_of(job: Job) -> Plan:
+    """The stages of a study with the seconds that each is expected to take on two cores."""
+    place, simulates = "place" in job.stages, "simulate" in job.stages
+    names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
+    if not simulates:
+        return _scaled(names, 1.0)
+    _, pressure = job.samples
+    states = np.count_nonzero(np.unique(pressure)) if not job.in_time else len(pressure)
+    pace = PACE["resolved" if job.mesh.resolved else "full" if job.mesh.order == 2 else "quick"]
+    return _scaled(names, pace * job.mesh.refine**_BY_REFINEMENT * max(states, 1) / _PRESSURES)
+
+
+def _scaled(names: Iterable[str], factor: float) -> Plan:
+    return [(name, FULL_S[name] * (factor if name in SOLVED else 1.0)) for name in names]
