@@ -8,8 +8,7 @@ from ...design.gripper import SECTIONS
 from ...design.quantity import describe
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import RootPanel, alert, wrapped
-from ..shared.scene_units import in_millimetres
-from ..unit.fields import FINE, field, true_end
+from ..unit.fields import field
 from . import motion
 from . import object as gripper_object
 from . import state as grasps
@@ -60,10 +59,9 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
         layout.prop(props, "detail")
         if props.detail != "part":
             column = layout.column(align=True)
-            end = true_end(context.scene)
-            column.prop(props, "cube_mm" if in_millimetres(context.scene) else f"cube_mm{end}")
+            column.prop(props, "cube_mm")
             if gripper_object.part(root, "cube") is not None:
-                column.prop(props, "cube_height_fine" if end == FINE else "cube_height")
+                column.prop(props, "cube_height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
             layout.prop(props, "printed_struts")

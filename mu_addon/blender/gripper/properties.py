@@ -9,10 +9,10 @@ from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
 from ...design.rigid_body import FRICTION
-from ..shared import displays, scene_units
+from ..shared import displays
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.fields import FINE, TRUE, distance, exact, generated_fields, true_lengths
+from ..unit.fields import MILLIMETRES, exact, generated_fields, millimetres
 from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()
@@ -40,15 +40,14 @@ def _cube_of(root):
 
 
 def _cube_height(props):
-    # The cube's own place is in mm; a field of lengths is in Blender units.
     cube = _cube_of(props.id_data)
-    return 0.0 if cube is None else cube.location.z * scene_units.mm(bpy.context.scene)
+    return 0.0 if cube is None else cube.location.z
 
 
 def _put_cube(props, value):
     cube = _cube_of(props.id_data)
     if cube is not None:
-        cube.location.z = value / scene_units.mm(bpy.context.scene)
+        cube.location.z = value
 
 
 class MU_PG_gripper(bpy.types.PropertyGroup):
@@ -77,25 +76,20 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         "cube_mm": FloatProperty(
             name="Cube",
             description="Side of the cube that is grasped; it stands in the middle between the tips",
-            subtype="DISTANCE",
+            subtype=MILLIMETRES,
             default=25.0,
             min=1.0,
             max=199.0,
             update=_changed,
         ),
-        **true_lengths("cube_mm", "Cube", "Side of the cube that is grasped", scales=False, step=10),
-        **{
-            name: distance(
-                10,
-                end,
-                name="Its Height",
-                description="Of the middle of the cube above the plate",
-                get=_cube_height,
-                set=_put_cube,
-                options={"SKIP_SAVE"},
-            )
-            for name, end in (("cube_height", TRUE), ("cube_height_fine", FINE))
-        },
+        "cube_height": millimetres(
+            10,
+            name="Its Height",
+            description="Of the middle of the cube above the plate",
+            get=_cube_height,
+            set=_put_cube,
+            options={"SKIP_SAVE"},
+        ),
         "density_g_per_ml": FloatProperty(
             name="Density (g/ml)",
             description="Of the cube, which decides its weight. The default is solid PLA, assumed",

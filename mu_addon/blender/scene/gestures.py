@@ -38,7 +38,7 @@ def look() -> None:
         return
     _looking = True
     try:
-        roots, shown, touched = [], [], []
+        roots, shown, touched, overrides = [], [], [], []
         # In a scene of thousands of objects most are neither: what tells them is asked for first.
         for obj in bpy.data.objects:
             if obj.get(displays.OWNER):
@@ -51,9 +51,11 @@ def look() -> None:
                 continue
             if displays.editable(obj):
                 found.append(obj)
+            elif found is roots and obj.override_library is not None:
+                overrides.append(obj)
         copies = _separate(roots)
         _follow(shown)
-        _true_sizes(roots, touched)
+        _true_sizes([*roots, *overrides], touched)
         for root in roots:
             if root in copies or _damaged(root):
                 _rebuild(root)
@@ -125,16 +127,17 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
     """Keep true sizes and places when the scene's unit of length changes, of roots and of obstacles.
 
     A root's scale says which unit its size is right for, an obstacle's own property does; both are undone
-    with the object. An unlocked root is the user's.
+    with the object. A scaled parent's is taken out of it. An unlocked root is the user's.
     """
     wanted = scene_units.mm(bpy.context.scene)
     moved = set()
     for root in roots:
-        if not all(root.lock_scale) or all(abs(s - wanted) <= 1e-6 * wanted for s in root.scale):
+        own = scene_units.true_scale(root, bpy.context.scene)
+        if own is None or not all(root.lock_scale) or all(abs(s - own) <= 1e-5 * own for s in root.scale):
             continue
         if root.parent is None:
-            root.location *= wanted / root.scale.x
-        root.scale = (wanted,) * 3
+            root.location *= own / root.scale.x
+        root.scale = (own,) * 3
         moved.add(root)
     for obj in touched:
         own = obj.mu_obstacle.mm
@@ -204,6 +207,7 @@ def _after_load(*_: Any) -> None:
 @persistent
 def _after_import(imported: Any) -> None:
     """What is appended is another unit than the one in the file that it comes from."""
+    _size_instances({item.id for item in imported.import_items if isinstance(item.id, bpy.types.Collection)})
     objects = [item.id for item in imported.import_items if isinstance(item.id, bpy.types.Object)]
     if not any(displays.editable(obj) and displays.uuid_of(obj) for obj in objects):
         return
@@ -213,12 +217,20 @@ def _after_import(imported: Any) -> None:
             if obj.mu_unit.uuid and obj.type == "MESH":
                 # Blender may reuse a mesh that it brought in before.
                 unit_object.separate(obj)
-            if all(obj.lock_scale):
-                # Its place is for who brings it in to choose: only its size is that of the other file.
-                obj.scale = (scene_units.mm(bpy.context.scene),) * 3
     older_files.renew()
     look()
     live_update.catch_up()
+
+
+def _size_instances(collections: set[Any]) -> None:
+    """Give the instances of linked collections that hold units the size that is theirs in this scene."""
+    wanted = scene_units.mm(bpy.context.scene)
+    for obj in bpy.context.scene.objects:
+        if obj.instance_type != "COLLECTION" or obj.instance_collection not in collections:
+            continue
+        roots = [o for o in obj.instance_collection.all_objects if o.type == "MESH" and displays.uuid_of(o)]
+        if roots and all(roots[0].lock_scale):
+            obj.scale = (wanted / roots[0].scale.x,) * 3
 
 
 _HANDLERS = {

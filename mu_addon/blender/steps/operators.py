@@ -14,18 +14,7 @@ from ..shared import updates
 from ..shared.operators import UnitOperator, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.fields import (
-    FINE,
-    TRUE,
-    blender_property,
-    distance,
-    exact,
-    in_scene,
-    label,
-    step_of,
-    tooltip,
-    true_end,
-)
+from ..unit.fields import TRUE, blender_property, exact, label, millimetres, step_of, tooltip, true_scale
 from ..unit.properties import from_unit, to_unit
 from . import state as stack
 
@@ -42,9 +31,9 @@ def _annotations(step: Step) -> dict:
                 continue
             found[d.name] = blender_property(d, options={"SKIP_SAVE"})
             if d.unit == "mm":
-                # Scripts set it in mm at scale 1; the redo panel has it as it is, in the scene's unit.
+                # Scripts set it in mm at scale 1; the redo panel has it as it is.
                 shared = {"name": label(d), "description": tooltip(d), "options": {"SKIP_SAVE"}}
-                found |= {d.name + end: distance(step_of(d.high), end, **shared) for end in (TRUE, FINE)}
+                found[d.name + TRUE] = millimetres(step_of(d.high), **shared)
     if step.muting:
         found["muted"] = BoolProperty(
             name="Mute", description=f"Leave this step out: {step.muting}", options={"SKIP_SAVE"}
@@ -72,13 +61,13 @@ class _OfStep(UnitOperator):
         unit = to_unit(props)
         given: dict[str, dict] = {}
         for section, name in stack.own_parameters(self.step):
-            true = self._true_given(name)
+            true = hasattr(self, name + TRUE) and self.properties.is_property_set(name + TRUE)
             if true or self.properties.is_property_set(name):
                 value = getattr(self, name)
                 if true:
                     # What is dragged past a bound ends there.
                     d = stack.description(section, name)
-                    value = getattr(self, true) / self._in_scene(props, section, name)
+                    value = getattr(self, name + TRUE) / true_scale(props, d)
                     value = min(max(value, d.low), d.high)
                 value = exact(value) if isinstance(value, float) else value
                 if value != getattr(getattr(unit, section), name):
@@ -105,28 +94,18 @@ class _OfStep(UnitOperator):
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         for _, name in stack.own_parameters(self.step):
-            shown = name + true_end(context.scene)
-            layout.prop(self, shown if hasattr(self, shown) else name)
+            layout.prop(self, name + TRUE if hasattr(self, name + TRUE) else name)
         if self.step.muting:
             layout.prop(self, "muted")
-
-    def _true_given(self, name: str) -> str:
-        """The field of a true length that is given: that of the redo panel before a script's."""
-        end = true_end(bpy.context.scene)
-        fields = [name + end, name + TRUE, name + FINE]
-        return next((f for f in fields if hasattr(self, f) and self.properties.is_property_set(f)), "")
-
-    def _in_scene(self, props, section: str, name: str) -> float:
-        return in_scene(props, not stack.description(section, name).fixed)
 
     def _take(self, props) -> None:
         """Take over what the unit has, for the redo panel."""
         for section, name in stack.own_parameters(self.step):
             value = getattr(getattr(props, section), name)
             setattr(self, name, value)
-            for end in (TRUE, FINE):
-                if hasattr(self, name + end):
-                    setattr(self, name + end, exact(value) * self._in_scene(props, section, name))
+            if hasattr(self, name + TRUE):
+                scale = true_scale(props, stack.description(section, name))
+                setattr(self, name + TRUE, exact(value) * scale)
 
 
 def _generated(step: Step) -> type:

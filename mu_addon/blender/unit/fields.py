@@ -1,20 +1,26 @@
-"""Blender properties of the core's parameters, and what a panel shows of a length: its true one."""
+"""Blender properties of the core's parameters, and what a panel shows of a length: its true one, in mm.
+
+Blender shows and drags a field of the subtype DISTANCE in the unit of the scene, in steps of a hundredth of
+that: 0.0009 m in its start-up scene. Lengths of lenses it has in millimetres in every scene, and reads other
+metric units where they are typed; fields of lengths here are of that subtype.
+"""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import textwrap
 from typing import Any
 
-import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...design.nearest import tied
 from ...design.quantity import Description, describe
-from ..shared import scene_units, updates
+from ..shared import updates
 from ..shared.texts import sentence
 
 UNITS = ("mm", "kPa", "s")
+MILLIMETRES = "DISTANCE_CAMERA"
+"""Subtype of a property that is in millimetres in any scene."""
 
 
 def exact(value: float) -> float:
@@ -73,7 +79,7 @@ def blender_property(d: Description, update=None, options=frozenset()):
         return BoolProperty(default=d.default, **shared)
     if d.type is int:
         return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **shared)
-    length = {"subtype": "DISTANCE"} if d.unit == "mm" else {}
+    length = {"subtype": MILLIMETRES} if d.unit == "mm" else {}
     return FloatProperty(
         default=d.default,
         min=d.low,
@@ -90,61 +96,47 @@ def step_of(high_mm: float) -> int:
     return 10 if high_mm > 20 else 1
 
 
-def true_lengths(name: str, title: str, text: str, scales: bool, step: float) -> dict[str, Any]:
-    """Two fields for the length `name`, in mm at scale 1 where it `scales`: as it is, in the scene's unit.
+def true_length(name: str, title: str, text: str, step: float) -> dict[str, Any]:
+    """A field for the length `name`, in mm at scale 1, as it is at the unit's scale.
 
-    Typed or dragged, each sets that length, within its bounds. Blender shows fields of lengths in the unit of
-    the scene, and of numbers in Blender units; so these are in those. A drag goes by steps that a field has
-    for good, hundredths of a Blender unit: `step` in one field, a thousandth of it in the other, which
-    Blender rounds to 1 mm in a scene of metres.
+    Typed or dragged it sets that length, within its bounds.
     """
 
     def read(group) -> float:
-        return exact(getattr(group, name)) * in_scene(group.id_data.mu_unit, scales)
+        return exact(getattr(group, name)) * exact(group.id_data.mu_unit.scale)
 
     def write(group, value: float) -> None:
-        setattr(group, name, exact(value / in_scene(group.id_data.mu_unit, scales)))
+        setattr(group, name, exact(value / exact(group.id_data.mu_unit.scale)))
 
     shared = {"name": title, "description": text, "get": read, "set": write, "options": {"SKIP_SAVE"}}
-    return {name + end: distance(step, end, **shared) for end in (TRUE, FINE)}
+    return {name + TRUE: millimetres(step, **shared)}
 
 
-def distance(step: float, end: str, **shared):
-    """A property in Blender units, for names that end so."""
-    return FloatProperty(
-        subtype="DISTANCE", precision=6, step=step * (1e-3 if end == FINE else 1.0), **shared
-    )
+def millimetres(step: float, **shared):
+    """A property in true millimetres; step: hundredths of one by which a drag of a pixel changes it."""
+    return FloatProperty(subtype=MILLIMETRES, precision=3, step=step, **shared)
 
 
-def in_scene(unit, scales: bool) -> float:
-    """Blender units of the scene in a millimetre of a parameter of a unit."""
-    return scene_units.mm(bpy.context.scene) * (exact(unit.scale) if scales else 1.0)
+def true_scale(unit, d: Description) -> float:
+    """True millimetres in a millimetre of a parameter of a unit."""
+    return 1.0 if d.fixed else exact(unit.scale)
 
 
 def shown_value(group, d: Description, value: float) -> str:
     """A value of a parameter in words: a length as it is at the unit's scale."""
     if d.unit != "mm":
         return f"{value:.6g}"
-    scale = 1.0 if d.fixed else exact(group.id_data.mu_unit.scale)
-    return scene_units.length(bpy.context.scene, value * scale, digits=6)
+    return f"{value * true_scale(group.id_data.mu_unit, d):.6g} mm"
 
 
-TRUE, FINE = "_true", "_true_fine"
-"""What the names of the two fields of `true_lengths` end with."""
-
-
-def true_end(scene) -> str:
-    """Which of the two is dragged by small steps in a scene: the fine one where a Blender unit is a metre."""
-    return FINE if scene_units.mm(scene) < 0.05 else TRUE
+TRUE = "_true"
+"""What the name of the field of `true_length` ends with."""
 
 
 def field(group, d: Description) -> str:
     """Name of the property that a panel shows of a parameter: itself, or its true length where it differs."""
-    if d.unit != "mm":
-        return d.name
-    scaled = not d.fixed and group.id_data.mu_unit.scale != 1.0
-    scene = bpy.context.scene
-    return d.name + true_end(scene) if scaled or not scene_units.in_millimetres(scene) else d.name
+    scaled = d.unit == "mm" and true_scale(group.id_data.mu_unit, d) != 1.0
+    return d.name + TRUE if scaled else d.name
 
 
 def _tied_update(name: str, changed):
@@ -167,6 +159,6 @@ def generated_fields(section: type, changed) -> dict[str, Any]:
     for d in describe(section):
         update = _tied_update(d.name, changed) if len(tied({d.name: 0.0})) > 1 else changed
         annotations[d.name] = blender_property(d, update)
-        if d.unit == "mm":
-            annotations |= true_lengths(d.name, label(d), tooltip(d), not d.fixed, step_of(d.high))
+        if d.unit == "mm" and not d.fixed:
+            annotations |= true_length(d.name, label(d), tooltip(d), step_of(d.high))
     return annotations

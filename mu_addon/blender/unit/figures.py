@@ -5,15 +5,12 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-import bpy
-
 from ...design import figures as core
 from ...design.printing.printer import Printer
 from ...errors import MuError
 from ...reading import parse_json
 from ...run.progress import spell
 from ..printing import state as printing
-from ..shared import scene_units
 from ..shared.file_cache import UNREADABLE
 from ..steps import state as stack
 from . import object as unit_object
@@ -38,9 +35,9 @@ def lines(root: Any, width: int) -> tuple[list[str], bool]:
 
 
 def _figures(root: Any) -> list[str]:
-    props, units = root.mu_unit, bpy.context.scene.unit_settings
+    props = root.mu_unit
     current = unit_object.solid_is_current(root)
-    key = props.built, current, root.mu_print.printer, units.system, units.scale_length, units.length_unit
+    key = props.built, current, root.mu_print.printer
     kept = _kept.get(props.uuid)
     if kept is None or kept[0] != key:
         try:
@@ -58,7 +55,7 @@ def _made(root: Any, current: bool) -> list[str]:
     found = core.figures(unit, printer, struts, _volume(root) if current else None)
     about = "about " if found.approximate else ""
     return [
-        f"Size {scene_units.size(bpy.context.scene, found.size_mm)}",
+        f"Size {' x '.join(f'{side:.3g}' for side in found.size_mm)} mm",
         f"Resin {about}{found.mass_g:.3g} g, {found.volume_mm3 / 1000.0:.3g} ml",
         f"Prints upright in about {spell(found.print_s)}",
         _assumed(printer),

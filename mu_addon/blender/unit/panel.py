@@ -7,8 +7,9 @@ import bpy
 from ..body import panel as body_panel
 from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
+from ..shared import scene_units
 from ..shared.operators import NO_UNIT, linked
-from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, folded_section, parameters, wrapped
+from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, alert, folded_section, parameters, wrapped
 from . import figures
 from . import object as unit_object
 
@@ -36,6 +37,8 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
             return
         if linked(root):
             wrapped(layout, linked(root), "LINKED")
+        if untrue := _untrue_size(root, context.scene):
+            alert(layout, untrue)
         row = layout.row(align=True)
         row.prop(root, "name", text="")
         row.operator("mu.select", text="", icon="RESTRICT_SELECT_OFF")
@@ -50,6 +53,21 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
         _head(layout, root)
+
+
+def _untrue_size(root, scene) -> str:
+    """That a unit is seen in another than its true size, and what helps; else nothing."""
+    factor = scene_units.shown_factor(root, scene)
+    if abs(factor - 1.0) < 1e-3:
+        return ""
+    times = f"{factor:.3g}" if factor < 1e4 else f"{factor:.0f}"
+    if root.library is not None:
+        help_ = "Object > Library Override > Make gives it its true size"
+    elif all(root.lock_scale):
+        help_ = "A parent is scaled by other factors along other axes: apply its scale"
+    else:
+        help_ = "Its scale is unlocked: lock it, and it gets its true size"
+    return f"Seen {times} times its true size. {help_}"
 
 
 def _head(layout, root) -> None:

@@ -7,7 +7,8 @@ import pytest
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.obstacles import state as obstacles
-from mu_addon.blender.shared import displays
+from mu_addon.blender.scene import gestures
+from mu_addon.blender.shared import displays, scene_units
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
@@ -323,6 +324,52 @@ def test_appended_it_is_a_unit_of_its_own(tmp_path):
     assert len({root.mu_unit.uuid for root in unit_object.roots()}) == 2
 
 
+def test_from_a_scene_of_millimetres_it_comes_into_one_of_metres_true_in_size_and_place(tmp_path):
+    file, tall, _ = library(tmp_path / "there")
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    bpy.data.objects["stored"].location = (1049.0, 0.0, 0.0)
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    root = fetched(file, "stored", link=False)
+    assert np.isclose(size(root)[2], tall / 1000.0)
+    assert np.isclose(root.location.x, 1.049)
+    linked = fetched(file, "stored", link=True)
+    linked = next(o for o in bpy.data.objects if o.library is not None)
+    select(linked)
+    assert "Seen 1e+03 times its true size. Object > Library Override" in drawn(unit_panel.CLASSES)
+    override = linked.override_create(remap_local_usages=True)
+    bpy.context.view_layer.update()
+    gestures.look()
+    bpy.context.view_layer.update()
+    assert np.isclose(size(override)[2], tall / 1000.0)
+
+
+def test_a_linked_collection_has_its_true_size(tmp_path):
+    file, _, _ = library(tmp_path / "there")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.link(directory=f"{file}/Collection/", filename="shelf", instance_collections=True)
+    (instance,) = (o for o in bpy.context.scene.objects if o.instance_type == "COLLECTION")
+    assert np.allclose(instance.scale, 0.001)
+
+
+def test_below_a_scaled_parent_a_unit_keeps_its_true_size():
+    root = add()
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.collection.objects.link(parent)
+    root.parent = parent
+    for scale in ((2.0,) * 3, (0.5,) * 3):
+        parent.scale = scale
+        for _ in range(2):
+            bpy.context.view_layer.update()
+            gestures.look()
+        assert np.isclose(scene_units.shown_factor(root, bpy.context.scene), 1.0, rtol=1e-5)
+    parent.scale = (1.0, 1.0, 2.0)
+    bpy.context.view_layer.update()
+    gestures.look()
+    select(root)
+    assert "times its true size. A parent is scaled" in drawn(unit_panel.CLASSES)
+
+
 def test_an_asset_that_is_dropped_again_has_a_mesh_of_its_own(tmp_path):
     """Blender reuses what it brought in before; a mesh that ten units share is slower to bring in, too."""
     file, tall, _ = library(tmp_path / "there")
@@ -384,11 +431,10 @@ def test_a_unit_has_its_true_size_in_any_scene(system, scale_length):
     # Without a unit system lengths are numbers: there they are mm.
     metres = size(root)[2] * (0.001 if system == "NONE" else units.scale_length)
     assert np.isclose(metres, TALL / 1000.0, rtol=1e-4), metres
-    # Its fields are in the scene's unit: what they show times that is the true length in metres.
-    chambers, to_m = root.mu_unit.chambers, 0.001 if system == "NONE" else units.scale_length
+    chambers = root.mu_unit.chambers
     wall = next(d for d in describe(Chambers) if d.name == "wall_mm")
-    assert np.isclose(getattr(chambers, field(chambers, wall)) * to_m, 0.0009, rtol=1e-5)
-    chambers.wall_mm_true = 0.001 / to_m
+    assert np.isclose(getattr(chambers, field(chambers, wall)), 0.9, rtol=1e-5), "in mm, in any scene"
+    chambers.wall_mm_true = 1.0
     assert np.isclose(to_unit(root.mu_unit).chambers.wall_mm, 1.0, rtol=1e-6)
     units.system, units.scale_length = "METRIC", 0.01
     bpy.context.view_layer.update()

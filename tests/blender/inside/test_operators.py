@@ -4,7 +4,6 @@ import json
 
 import bpy
 import numpy as np
-import pytest
 
 from mu_addon.blender.unit import figures
 from mu_addon.blender.unit import object as unit_object
@@ -125,25 +124,15 @@ def test_fields_show_true_lengths_and_tied_ones_change_as_one():
     assert to_unit(root.mu_unit).chambers.cell_mm == 13.0
 
 
-@pytest.mark.parametrize(
-    ("system", "shown", "text"),
-    [
-        ("METRIC", "METERS", "0.001874 m"),
-        ("METRIC", "CENTIMETERS", "0.1874 cm"),
-        ("METRIC", "MICROMETERS", "1874 µm"),
-        ("METRIC", "ADAPTIVE", "1.874 mm"),
-        ("IMPERIAL", "INCHES", '0.0737795"'),
-        ("IMPERIAL", "FEET", "0.00614829'"),
-        ("NONE", None, "1.874"),
-    ],
-)
-def test_the_value_that_fits_is_in_the_unit_of_the_fields(system, shown, text):
-    root, units = add(millimetres=False), bpy.context.scene.unit_settings
-    units.system = system
-    if shown is not None:
-        units.length_unit = shown
-    wall = next(d for d in describe(Chambers) if d.name == "wall_mm")
-    assert shown_value(root.mu_unit.chambers, wall, 1.874) == text
+def test_the_value_that_fits_is_in_millimetres_as_the_fields_are():
+    root = add()
+    root.mu_unit.scale = 2.0
+    wall, pitch = (
+        next(d for d in describe(of) if d.name == name)
+        for of, name in ((Chambers, "wall_mm"), (Waveguide, "well_pitch_mm"))
+    )
+    assert shown_value(root.mu_unit.chambers, wall, 1.874) == "3.748 mm"
+    assert shown_value(root.mu_unit.waveguide, pitch, 4.0) == "4 mm", "the same at every scale"
 
 
 def test_a_broken_rule_stands_in_its_field_with_a_value_that_fits():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from mu_addon.blender.preview import nodes
-from mu_addon.blender.shared import scene_units
 from mu_addon.blender.steps import operators as steps_operators
 from mu_addon.blender.steps import state as stack
 from mu_addon.blender.unit import object as unit_object
@@ -58,7 +57,7 @@ def test_each_step_runs_alone_with_its_own_parameters():
         operator = getattr(bpy.ops.mu, step.name)
         own = {name for _, name in stack.own_parameters(step)}
         fields = {p.identifier for p in operator.get_rna_type().properties} - {"rna_type"}
-        shown = {name.removesuffix("_fine").removesuffix("_true") for name in fields}
+        shown = {name.removesuffix("_true") for name in fields}
         assert shown == own | ({"muted"} if step.muting else set()), (step.name, shown)
         assert made(operator) == {step.name}
         assert props.step == list(STEPS).index(step.name)
@@ -88,30 +87,22 @@ def redo_fields(operator):
 
 
 def test_the_step_that_is_asked_for_is_of_hundredths_of_a_millimetre_in_any_scene():
-    """Blender rounds it to a unit of length: in a scene of metres a drag goes by 1 mm a pixel, not by 10."""
+    """Fields are in millimetres, whatever the scene's unit is: a drag of ten pixels is a tenth of one."""
     root = add(preset="mu-0.75x")
     units = bpy.context.scene.unit_settings
     for system, scale_length in (("METRIC", 1.0), ("METRIC", 0.001), ("IMPERIAL", 1.0), ("NONE", 1.0)):
         units.system, units.scale_length = system, scale_length
-        mm = scene_units.mm(bpy.context.scene)
         for section, name, step_mm in (("chambers", "wall_mm", 0.01), ("chambers", "cell_mm", 0.1)):
             group = getattr(root.mu_unit, section)
             shown = group.bl_rna.properties[field(group, stack.description(section, name))]
-            assert shown.step / 100.0 / mm == pytest.approx(step_mm, rel=1e-5), (system, scale_length, name)
+            assert shown.step / 100.0 == pytest.approx(step_mm, rel=1e-5), (system, scale_length, name)
+            assert shown.unit == "CAMERA", "a length that Blender shows in mm in any scene"
 
 
 def test_a_steps_redo_panel_shows_true_lengths():
     props = add(preset="mu-0.75x").mu_unit
-    bpy.context.scene.unit_settings.scale_length = 1.0
-    assert redo_fields(CHAMBERS) == [
-        "wall_mm_true_fine",
-        "base_cap_mm_true_fine",
-        "tip_cap_mm_true_fine",
-    ]
-    bpy.context.scene.unit_settings.scale_length = 0.001
-    assert redo_fields(CHAMBERS)[0] == "wall_mm_true"
-    bpy.context.scene.unit_settings.scale_length = 1.0
-    assert bpy.ops.mu.chambers(wall_mm_true=0.00075) == {"FINISHED"}
+    assert redo_fields(CHAMBERS) == ["wall_mm_true", "base_cap_mm_true", "tip_cap_mm_true"]
+    assert bpy.ops.mu.chambers(wall_mm_true=0.75) == {"FINISHED"}
     assert round(props.chambers.wall_mm, 4) == 1.0
     assert bpy.ops.mu.chambers(wall_mm=0.9) == {"FINISHED"}
     assert round(props.chambers.wall_mm, 4) == 0.9
@@ -119,13 +110,12 @@ def test_a_steps_redo_panel_shows_true_lengths():
 
 def test_a_length_dragged_beyond_its_bound_ends_there():
     root = add()
-    bpy.context.scene.unit_settings.scale_length = 1.0
-    assert bpy.ops.mu.chambers(wall_mm_true=-0.0091) == {"FINISHED"}
+    assert bpy.ops.mu.chambers(wall_mm_true=-9.1) == {"FINISHED"}
     assert root.mu_unit.chambers.wall_mm == pytest.approx(stack.description("chambers", "wall_mm").low)
     # What breaks a rule of units is refused in words that name it, and the unit stays.
     assert "neck" in refused(bpy.ops.mu.profile, neck_diameter_mm_true=1.0).lower()
     assert root.mu_unit.chambers.neck_diameter_mm == pytest.approx(12.5)
-    assert bpy.ops.mu.chambers(wall_mm_true=0.0009) == {"FINISHED"}
+    assert bpy.ops.mu.chambers(wall_mm_true=0.9) == {"FINISHED"}
     assert root.mu_unit.trouble == ""
 
 
