@@ -53,7 +53,8 @@ class MU_OT_skin(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.object is None or context.object.type not in ("MESH", "CURVE", "CURVES"):
+        obj = getattr(context, "object", None)
+        if obj is None or obj.type not in ("MESH", "CURVE", "CURVES"):
             cls.poll_message_set("Select a curve or a mesh")
             return False
         return True

@@ -41,7 +41,7 @@ def roots() -> list[Any]:
 
 def active(context: Any) -> Any | None:
     """The gripper to work on: that of the active object, or the only one there is if no unit is worked on."""
-    obj = context.object
+    obj = unit_object.active_object(context)
     while obj is not None:
         if obj.mu_gripper.uuid:
             return obj

@@ -55,7 +55,7 @@ class MU_OT_gripper_add(bpy.types.Operator):
                 found,
                 unit=to_unit(unit.mu_unit),
                 path=unit.mu_unit.path or found.path,
-                name=unit.mu_unit.title,
+                name=f"{unit.mu_unit.title[:72]} gripper",
             )
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")

@@ -101,7 +101,7 @@ def _found(layout, scene, root, found):
     row.operator("screen.animation_play", text="Play", icon="PLAY")
     if on:
         phase, force = grasps.phase_at(found, scene)
-        box.label(text=f"{phase}, {PHASES.get(phase, '')}: {force:.2f} N", icon="TIME")
+        box.label(text=f"{PHASES.get(phase, phase).capitalize()}: {force:.2f} N", icon="TIME")
 
 
 CLASSES = (MU_PT_gripper, MU_PT_grasp)

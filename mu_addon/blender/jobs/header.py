@@ -45,8 +45,8 @@ class MU_OT_job_cancel(bpy.types.Operator):
         child = start_child.child_of(properties.key)
         if child is None:
             return cls.__doc__
-        fraction, text = whole(child)
-        return f"{start_child.title_of(properties.key)}: {fraction:.0%}, {text}.\n{cls.__doc__}"
+        _, text = whole(child)
+        return f"{start_child.title_of(properties.key)}: {text}.\n{cls.__doc__}"
 
     @reports_errors
     def execute(self, context):
@@ -150,7 +150,7 @@ def _running(layout, keys: list[str], short: bool) -> None:
     bar = row.row(align=True)
     bar.ui_units_x = SHORT if short else WIDTH
     # The job's name and all of its words are in the tooltip of Cancel and in the menu.
-    bar.progress(factor=fraction, text=f"{fraction:.0%}, {text}")
+    bar.progress(factor=fraction, text=text)
 
 
 def _words(key: str) -> str:

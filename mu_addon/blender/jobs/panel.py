@@ -33,8 +33,9 @@ def job_state(layout, child, where: str, prefix: str = "") -> None:
 
 
 def whole(child, width: int = 0) -> tuple[float, str]:
-    """How much of a job's whole is done, 0..1, and its stage, number of stages and time left in words.
+    """How much of a job's whole is done, 0..1, and that, its stage, their number and time left in words.
 
+    Of a stage that cannot tell how far it is no share is said.
     width: letters that the stage's name has at most, 0 for all of it: a longer one is only numbered.
     """
     if child.state == WAITING:
@@ -51,8 +52,9 @@ def whole(child, width: int = 0) -> tuple[float, str]:
         stage = shortened(stage, width)
     left = estimate.seconds_left
     # Without a plan the bar is the stage's own, and so is the time.
-    fraction = estimate.fraction if estimate.count else child.progress.get("fraction") or 0.0
-    return fraction, stage if left is None else f"{stage}, {spell(left)} left"
+    fraction = estimate.fraction if estimate.count else child.progress.get("fraction")
+    share = "" if fraction is None else f"{fraction:.0%}, "
+    return fraction or 0.0, f"{share}{stage}" + ("" if left is None else f", {spell(left)} left")
 
 
 def shortened(text: str, width: int) -> str:

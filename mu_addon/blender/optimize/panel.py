@@ -129,15 +129,17 @@ def _freedoms(layout, root, props) -> None:
             continue
         column.prop(freedom, "how", text="")
         d = FREE[freedom.parameter]
-        for name in {"range": ("low", "high"), "values": ("values",), "fixed": ("value",)}[freedom.how]:
+        scale = scale_of(freedom)
+        shown = {"range": ("true_low", "true_high"), "values": ("values",), "fixed": ("true_value",)}
+        for name in shown[freedom.how]:
             title = freedom.bl_rna.properties[name].name
-            column.prop(freedom, name, text=f"{title} ({d.unit})" if d.unit else title)
-        words = f"now {present(root, freedom.parameter):.4g} {d.unit}".rstrip()
-        scaled = d.unit == "mm" and root.mu_unit.scale != 1.0 and not d.fixed
+            unit = f"{d.unit} at scale 1" if name == "values" and scale != 1.0 else d.unit
+            column.prop(freedom, name, text=f"{title} ({unit})" if unit else title)
+        words = f"now {scale * present(root, freedom.parameter):.4g} {d.unit}".rstrip()
         # Below the fields, as their own words are beside them.
         below = column.split(factor=LABELS)
         below.label(text="")
-        below.label(text=f"{words} at scale 1" if scaled else words)
+        below.label(text=words)
 
 
 def asked_title(target, name: str) -> str:

@@ -190,6 +190,24 @@ def title(name: str, d: Description) -> str:
     return f"{sentence(section)}: {label(d)}" if section else label(d)
 
 
+def scale_of(freedom) -> float:
+    """True millimetres in one of the parameter's; 1 for what is no length, and the same at every scale."""
+    d = FREE.get(freedom.parameter)
+    return 1.0 if d is None or d.unit != "mm" else true_scale(freedom.id_data.mu_unit, d)
+
+
+def _true(name: str, title: str):
+    """The value `name` of a freedom as it is at the unit's scale."""
+
+    def read(freedom) -> float:
+        return getattr(freedom, name) * scale_of(freedom)
+
+    def write(freedom, value: float) -> None:
+        setattr(freedom, name, value / scale_of(freedom))
+
+    return FloatProperty(name=title, get=read, set=write, precision=3, options={"SKIP_SAVE"})
+
+
 class MU_PG_freedom(bpy.types.PropertyGroup):
     """One parameter that may change, and its range."""
 
@@ -218,6 +236,9 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
     value: FloatProperty(
         name="Value", description="In the parameter's unit at scale 1", default=0.9, precision=3
     )
+    true_value: _true("value", "Value")
+    true_low: _true("low", "From")
+    true_high: _true("high", "To")
     low: FloatProperty(
         name="From", description="Lowest value, in the parameter's unit at scale 1", default=0.7, precision=3
     )

@@ -37,7 +37,8 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
 
 def selected_candidate(context) -> str:
     """Name of the candidate path that is the active object, or nothing."""
-    part = context.object.get(PART, "") if context.object else ""
+    obj = unit_object.active_object(context)
+    part = obj.get(PART, "") if obj else ""
     return part.removeprefix(CANDIDATE) if part.startswith(CANDIDATE) else ""
 
 

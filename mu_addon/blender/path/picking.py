@@ -24,7 +24,7 @@ _restoring = False
 
 
 def _active() -> int:
-    found = bpy.context.object
+    found = unit_object.active_object(bpy.context)
     return 0 if found is None else int(found.session_uid)
 
 
@@ -59,7 +59,7 @@ def _choose() -> None:
 def choose_active() -> None:
     """Choose the candidate path that is the active object, with one undo step."""
     context = bpy.context
-    if context.object is None or context.mode != "OBJECT":
+    if unit_object.active_object(context) is None or context.mode != "OBJECT":
         return
     name, root = selected_candidate(context), unit_object.root_of(context.object)
     if name and root is not None and root.mu_unit.path != name and bpy.ops.mu.path.poll():

@@ -160,24 +160,42 @@ def _measure(finding) -> str:
 
 
 def _directions(layout, settings, found) -> None:
-    """The best build directions of the check, with what each costs and a button that takes it."""
+    """The best build directions of the check and the chosen one, with what each costs and a button."""
     builds = found.found["orientation"]
     if not builds:
         return
     header, body = layout.panel("MU_directions", default_closed=False)
-    header.label(text="Best Build Directions")
+    header.label(text="Build Directions")
     if not body:
         return
+    chosen = [build for build in builds if _is_up(build, settings)]
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
-    for build in choice:
+    wrapped(body, "None of these is better than another one in every figure", "INFO")
+    for build in choice + [build for build in chosen if build not in choice]:
         box = body.box()
         row = box.split(factor=0.66)
-        row.label(text=", ".join(f"{x:.2f}" for x in build["direction"]), icon="SORT_DESC")
-        same = sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
+        row.label(text=direction_words(build["direction"]).capitalize(), icon="SORT_DESC")
+        same = build in chosen
         button = row.operator("mu.print_up", text="Chosen" if same else "Use", depress=same)
         button.direction = build["direction"]
         box.label(text=f"{build['islands']} islands, cups of {build['cup_ml']:.2g} ml")
         box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
+
+
+def direction_words(direction) -> str:
+    """A build direction in words, of a unit vector (3,) in the unit's frame: "tilted 35° toward +y"."""
+    x, y, z = direction
+    angle = math.degrees(math.acos(max(-1.0, min(1.0, z))))
+    if angle < 1.0 or angle > 179.0:
+        return "upright" if z > 0.0 else "upside down"
+    aside = math.hypot(x, y)
+    signs = [f"{'+' if s > 0 else '-'}{axis}" for axis, s in (("x", x), ("y", y)) if abs(s) > 0.38 * aside]
+    toward = " ".join(signs)
+    return f"lying, {toward} up" if abs(angle - 90.0) < 1.0 else f"tilted {angle:.0f}° toward {toward}"
+
+
+def _is_up(build, settings) -> bool:
+    return sum(a * b for a, b in zip(build["direction"], settings.up, strict=True)) > 0.9999
 
 
 class MU_PT_print_file(_OfPrint, bpy.types.Panel):

@@ -48,10 +48,16 @@ def root_of(obj: Any) -> Any | None:
     return None
 
 
+def active_object(context: Any) -> Any | None:
+    """The active object, or None, also where there is no window to ask: while a file loads."""
+    return getattr(context, "object", None)
+
+
 def active_root(context: Any) -> Any | None:
     """The unit to work on: that of the active object, or the only one there is if no gripper is active."""
-    found = root_of(context.object)
-    if found is None and not _of_gripper(context.object):
+    obj = active_object(context)
+    found = root_of(obj)
+    if found is None and not _of_gripper(obj):
         every = [o for o in context.scene.objects if o.mu_unit.uuid]
         found = every[0] if len(every) == 1 else None
     return found
