@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,9 +13,11 @@ import numpy as np
 from ..errors import InputError
 from .parameters import SECTIONS, Unit
 from .quantity import describe
+from .rules import RuleError
 
 STEPS = 240
 """Places between a parameter's bounds at which a value that fits is looked for."""
+MOST_REPAIRS = 12
 DIGITS = 3
 """Decimals of the value that is found: whole micrometres."""
 
@@ -30,11 +34,91 @@ def tied(given: dict[str, Any]) -> dict[str, Any]:
     return given
 
 
-def nearest_fit(sections: Mapping[str, Any], scale: float, section: str, name: str) -> float | int | None:
+@attrs.frozen
+class Repair:
+    """A broken rule, and the value of a parameter that mends it; None where that is for a person to find."""
+
+    error: InputError
+    section: str = ""
+    name: str = ""
+    value: float | int | None = None
+
+
+def repairs(sections: Mapping[str, Any], scale: float) -> list[Repair]:
+    """Every rule that a unit's sections break together, in order, each with a value that mends it.
+
+    Each value is the nearest one in round numbers with those before it set; the list ends at the first rule
+    for which there is none.
+    """
+    found: list[Repair] = []
+    now = dict(sections)
+    while len(found) < MOST_REPAIRS:
+        error = _broken(now, scale)
+        if error is None:
+            break
+        repair = _repair(now, scale, error)
+        found.append(repair)
+        if repair.value is None:
+            break
+        now[repair.section] = attrs.evolve(now[repair.section], **tied({repair.name: repair.value}))
+    return found
+
+
+def _broken(sections: Mapping[str, Any], scale: float) -> InputError | None:
+    try:
+        Unit(scale=scale, **sections)
+    except InputError as error:
+        return error
+    return None
+
+
+def _repair(sections: Mapping[str, Any], scale: float, error: InputError) -> Repair:
+    place = re.match(r"\[(\w+)\] (\w+)", error.where)
+    if not isinstance(error, RuleError) or place is None:
+        return Repair(error)
+    section, name = place.groups()
+
+    def mends(changed: Mapping[str, Any]) -> bool:
+        left = _broken(changed, scale)
+        return left is None or (isinstance(left, RuleError) and _later(left, error))
+
+    value = nearest_fit(sections, scale, section, name, mends)
+    if isinstance(value, float):
+        present = getattr(sections[section], name)
+        value = _rounded(value, present, lambda v: mends(_with(sections, section, name, v)))
+    return Repair(error, section, name, value)
+
+
+def _later(left: RuleError, error: RuleError) -> bool:
+    return left.order > error.order or (left.order == error.order and left.rule != error.rule)
+
+
+def _rounded(value: float, present: float, fits: Callable[[float], bool]) -> float:
+    """A value that fits, up to a twentieth further from the present one, in as few decimals as can be."""
+    for digits in range(DIGITS):
+        step = 10.0**-digits
+        away = math.ceil(value / step - 1e-9) if value > present else math.floor(value / step + 1e-9)
+        found = round(away * step, digits)
+        if abs(found - value) <= 0.05 * abs(value) and fits(found):
+            return found
+    return value
+
+
+def _with(sections: Mapping[str, Any], section: str, name: str, value: Any) -> dict[str, Any]:
+    return {**sections, section: attrs.evolve(sections[section], **tied({name: value}))}
+
+
+def nearest_fit(
+    sections: Mapping[str, Any],
+    scale: float,
+    section: str,
+    name: str,
+    enough: Callable[[Mapping[str, Any]], bool] | None = None,
+) -> float | int | None:
     """The value of `section.name` nearest to its present one that makes a unit; None where none does.
 
     sections: the unit's sections by name, which break a rule together; scale: the unit's. All other
-    parameters stay as they are.
+    parameters stay as they are. enough: whether sections are good enough, in place of making a unit.
     """
     present = getattr(sections[section], name)
     every: tuple[Any, ...] = SECTIONS
@@ -43,11 +127,10 @@ def nearest_fit(sections: Mapping[str, Any], scale: float, section: str, name: s
 
     def fits(value: float | int) -> bool:
         try:
-            changed = attrs.evolve(sections[section], **tied({name: value}))
-            Unit(scale=scale, **{**sections, section: changed})
+            changed = _with(sections, section, name, value)
         except InputError:
             return False
-        return True
+        return _broken(changed, scale) is None if enough is None else enough(changed)
 
     if d.type is int:
         whole = sorted(range(int(d.low), int(d.high) + 1), key=lambda value: abs(value - present))

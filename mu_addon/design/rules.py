@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NoReturn
 
 import attrs
@@ -17,9 +18,14 @@ LEAST_STRUT_MM = 0.2
 
 
 class RuleError(InputError):
-    """A broken co-design rule; true_size: the same with lengths as they are at the unit's scale, or None."""
+    """A broken co-design rule; true_size: the same with lengths as they are at the unit's scale, or None.
+
+    order: number of its group of rules; those of lower number hold. rule: its name.
+    """
 
     true_size: RuleError | None = None
+    order = 0
+    rule = ""
 
 
 def check(d: Dimensions, allow_symmetric: bool = False) -> None:
@@ -41,14 +47,22 @@ def check(d: Dimensions, allow_symmetric: bool = False) -> None:
 
 
 def _check(d: Dimensions, allow_symmetric: bool) -> None:
-    _node_apex_alignment(d)
-    _profile(d)
-    _sagittal_symmetry(d)
-    _asymmetry(d, allow_symmetric)
-    _wall(d)
-    _ends(d)
-    _struts(d)
-    _waveguide(d)
+    groups: list[Callable[[Dimensions], None]] = [
+        _node_apex_alignment,
+        _profile,
+        _symmetry,
+        lambda d: _asymmetry(d, allow_symmetric),
+        _wall,
+        _ends,
+        _struts,
+        _waveguide,
+    ]
+    for order, group in enumerate(groups):
+        try:
+            group(d)
+        except RuleError as error:
+            error.order = order
+            raise
 
 
 def check_printed(d: Dimensions, offset_xy: float, offset_z: float) -> None:
@@ -111,7 +125,11 @@ def _printed_breach(d: Dimensions, offset_xy: float, offset_z: float) -> tuple[s
 
 
 def _refuse(rule: str, what: str, where: str, remedy: str) -> NoReturn:
-    raise RuleError(f"{what} (rule: {rule})", where, remedy)
+    error = RuleError(f"{what} (rule: {rule})", where, remedy)
+    error.rule = rule
+    # Those of the printer's offsets come last.
+    error.order = 99
+    raise error
 
 
 def _node_apex_alignment(d: Dimensions) -> None:
@@ -136,12 +154,12 @@ def _profile(d: Dimensions) -> None:
         )
 
 
-def _sagittal_symmetry(d: Dimensions) -> None:
+def _symmetry(d: Dimensions) -> None:
     if d.cells_x % 2 == 0:
         _refuse(
-            "sagittal plane through cell centres",
-            f"{d.cells_x} cells across x put the bending plane x = 0 between the cells, "
-            "so no column of nodes lies on it and none meets the apices",
+            "bending plane through cell centres",
+            f"with {d.cells_x} cells across x the bending plane lies between two columns of nodes, "
+            "and none of them meets the chambers",
             "[lattice] cells_x",
             f"choose an odd count: {d.cells_x - 1} or {d.cells_x + 1}",
         )
@@ -174,9 +192,9 @@ def _asymmetry(d: Dimensions, allow_symmetric: bool) -> None:
 def _wall(d: Dimensions) -> None:
     s = d.scale
     limits = {
-        "wall within the apex's radius of curvature": (
+        "a cavity within every wall": (
             d.apex_curvature_radius,
-            "the inner offset folds there",
+            "the cavity closes at its widest places",
         ),
         "a bore through every neck": (d.r, "no bore is left through the necks"),
     }

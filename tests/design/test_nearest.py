@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.nearest import nearest_fit, tied
+from mu_addon.design.nearest import nearest_fit, repairs, tied
 from mu_addon.design.parameters import SECTIONS, Unit
 from mu_addon.design.quantity import describe
 from mu_addon.errors import InputError
@@ -71,3 +71,27 @@ def test_the_cell_drives_the_bladder_and_the_bladder_the_cell():
     assert tied({"cell_mm": 13.0}) == {"cell_mm": 13.0, "bladder_diameter_mm": 26.0}
     assert tied({"bladder_diameter_mm": 26.0}) == {"cell_mm": 13.0, "bladder_diameter_mm": 26.0}
     assert tied({"wall_mm": 1.0}) == {"wall_mm": 1.0}
+
+
+def test_every_fault_has_a_repair_in_round_numbers_and_together_they_make_a_unit():
+    sections = changed("chambers", "neck_diameter_mm", 30.0)
+    sections["lattice"] = attrs.evolve(sections["lattice"], cells_x=4)
+    sections["waveguide"] = attrs.evolve(sections["waveguide"], well_width_mm=4.0)
+    found = repairs(sections, 1.0)
+    assert [(r.section, r.name, r.value) for r in found] == [
+        ("chambers", "neck_diameter_mm", 24.0),
+        ("lattice", "cells_x", 3),
+        ("waveguide", "well_width_mm", 3.0),
+    ]
+    assert "odd count: 3 or 5" in found[1].error.remedy
+    for repair in found:
+        own = attrs.evolve(sections[repair.section], **tied({repair.name: repair.value}))
+        sections[repair.section] = own
+    Unit(**sections)
+    assert repairs(sections, 1.0) == []
+
+
+def test_a_rule_that_no_value_of_its_parameter_mends_ends_the_list():
+    (last,) = repairs(changed("grading", "cells", "0 3 1: 0.9"), 1.0)
+    assert last.value is None
+    assert "lie outside" in last.error.what

@@ -12,12 +12,12 @@ from mu_addon.errors import InputError
 
 from .units import units
 
-APEX = "wall within the apex's radius of curvature"
+APEX = "a cavity within every wall"
 BROKEN = [
     ("node-apex alignment", "bladder_diameter_mm", {"chambers": Chambers(bladder_diameter_mm=24.0)}),
     ("node-apex alignment", "bladder_diameter_mm", {"chambers": Chambers(cell_mm=10.0)}),
     ("bladder and neck", "neck_diameter_mm", {"chambers": Chambers(neck_diameter_mm=25.0)}),
-    ("sagittal plane through cell centres", "cells_x", {"lattice": Envelope(cells_x=4)}),
+    ("bending plane through cell centres", "cells_x", {"lattice": Envelope(cells_x=4)}),
     ("lattice wider toward +y", "cells_y_plus", {"lattice": Envelope(cells_y_minus=2, cells_y_plus=1)}),
     ("lattice wider toward +y", "cells_y_plus", {"lattice": Envelope(cells_y_minus=1, cells_y_plus=1)}),
     (APEX, "wall_mm", {"chambers": Chambers(wall_mm=1.9)}),

@@ -13,7 +13,7 @@ from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
 from ..unit.fields import label
 from . import state as optimization
-from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present
+from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present, scale_of
 
 JOB = "optimize_"
 _KNOWN = parameters()

@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...optimization.freedoms import PATH, RESIN, parameters
 from ..shared.registration import property_group_factory
 from ..shared.texts import sentence
-from ..unit.fields import exact, label
+from ..unit.fields import exact, label, true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")

@@ -28,6 +28,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_print"
     bl_label = "Print"
+    place = "print"
 
     def show(self, layout, context, root):
         large_button(layout, "mu.solid", "MESH_DATA")

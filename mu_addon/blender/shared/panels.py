@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
 from ...design.wall import Wall, offered
-from ..unit.broken import broken
-from ..unit.fields import field, shown_value
+from ..unit.broken import broken, description
+from ..unit.fields import field, label, shown_value
 from ..unit.object import active_root
 
 # Where a section's parameters are shown. A section that the core gains appears under Design by itself.
@@ -67,6 +67,17 @@ class UnitPanel(RootPanel):
     bl_parent_id = "MU_PT_unit"
     bl_options = {"DEFAULT_CLOSED"}
     find_root = staticmethod(active_root)
+    place: str | tuple[str, ...] = ""
+    """Places of `PLACES` whose parameters the panel shows."""
+
+    def draw_header(self, context):
+        """A mark where one of the panel's parameters breaks a rule, also while it is closed."""
+        root = active_root(context)
+        found = broken(root) if self.place and root is not None else None
+        if found is not None:
+            own = [s.section for s in SECTIONS if PLACES.get(s.section, "design") in self.place]
+            if found.blames(own):
+                self.layout.label(text="", icon="ERROR")
 
 
 def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
@@ -111,8 +122,15 @@ def parameter(column, root, section: str, d: Description) -> None:
     if value is not None:
         right = row.row(align=True)
         right.alert = False
-        fit = right.operator("mu.fit", text=shown_value(group, d, value))
-        fit.section, fit.name, fit.why = section, d.name, found.text
+        fix_button(right, root, section, d.name, value, found.text, text="Set ")
+
+
+def fix_button(layout, root, section: str, name: str, value, why: str, text: str | None = None) -> None:
+    """A button that sets a parameter to a value that keeps the rules, and says so: "Neck Ø 24 mm"."""
+    d = description(section, name)
+    shown = shown_value(getattr(root.mu_unit, section), d, value)
+    button = layout.operator("mu.fit", text=f"{label(d)} {shown}" if text is None else text + shown)
+    button.section, button.name, button.why = section, name, why
 
 
 def parameters(layout, root, place: str) -> None:

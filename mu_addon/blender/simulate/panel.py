@@ -17,6 +17,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_simulate"
     bl_label = "Simulate"
+    place = "simulate"
 
     def show(self, layout, context, root):
         missing = start_child.missing()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Any
 
 import attrs
 
-from ...design.nearest import nearest_fit
+from ...design.nearest import Repair, nearest_fit, repairs
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...errors import InputError, MuError
@@ -24,10 +25,19 @@ for _section in SECTIONS:
 
 @attrs.frozen
 class Broken:
-    """What rule is broken, in a sentence; fits: what fits in each field, by section and name, or None."""
+    """What rule is broken, and what to do, a line each; fits: what fits in each field, or None, by place.
+
+    repairs: every rule that is broken, in order, with the value that mends it.
+    """
 
     text: str
     fits: dict[Place, float | int | None]
+    repairs: list[Repair] = attrs.field(factory=list)
+
+    def blames(self, sections: Collection[str]) -> bool:
+        """Whether a parameter of one of these sections breaks a rule."""
+        places = (*self.fits, *((repair.section, "") for repair in self.repairs))
+        return any(section in sections for section, _ in places)
 
 
 _good: dict[str, Unit] = {}
@@ -87,8 +97,16 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
             return Broken(words(error), places)
         scale = exact(props.scale)
         fits = {place: nearest_fit(sections, scale, *place) for place in places}
-        return Broken(words(error), fits)
+        mending = repairs(sections, scale)
+        # A field's own button sets what the one in the panel's head does.
+        fits |= {(r.section, r.name): r.value for r in mending if (r.section, r.name) in fits}
+        return Broken(words(error), fits, mending)
     return Broken(props.trouble, {})
+
+
+def description(section: str, name: str) -> Description:
+    """Description of a parameter."""
+    return next(d for s, d in _KNOWN[name] if s == section)
 
 
 def forget() -> None:

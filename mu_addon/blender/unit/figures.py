@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from typing import Any
 
@@ -17,7 +18,7 @@ from . import object as unit_object
 from .broken import broken
 from .properties import to_unit
 
-LINES = 4
+LINES = 5
 """Lines of the box at the head of the panel, whatever it says: what is below does not move."""
 
 _kept: dict[str, tuple[Any, list[str]]] = {}
@@ -27,11 +28,21 @@ def lines(root: Any, width: int) -> tuple[list[str], bool]:
     """What the box says, LINES lines of at most `width` letters, and whether it is a broken rule."""
     found = broken(root)
     if found is not None:
-        text = textwrap.wrap(found.text.split("\n")[0], width)
-        if len(text) > LINES:
-            text = [*text[: LINES - 1], text[LINES - 1][: width - 2] + " ..."]
-        return text + [""] * (LINES - len(text)), True
+        return _rule(found.text.split("\n"), width), True
     return _figures(root), False
+
+
+def _rule(paragraphs: list[str], width: int) -> list[str]:
+    """A broken rule and, whole, its remedy: where both are too long, it is the rule that is cut."""
+    # The rule's name helps nobody here; the tooltip has it.
+    what = textwrap.wrap(re.sub(r" \(rule: [^)]*\)", "", paragraphs[0]), width)
+    remedy = textwrap.wrap(paragraphs[-1], width) if len(paragraphs) > 1 else []
+    remedy = [line[:1].upper() + line[1:] if not k else line for k, line in enumerate(remedy)][: LINES - 1]
+    if len(what) + len(remedy) > LINES:
+        what = what[: LINES - len(remedy)]
+        what[-1] = textwrap.shorten(f"{what[-1]} {'x' * width}", width, placeholder=" ...")
+    text = what + remedy
+    return text + [""] * (LINES - len(text))
 
 
 def _figures(root: Any) -> list[str]:
@@ -43,9 +54,9 @@ def _figures(root: Any) -> list[str]:
         try:
             kept = key, _made(root, current)
         except (MuError, *UNREADABLE) as error:
-            kept = key, [str(error).split("\n")[0], "", "", ""]
+            kept = key, [str(error).split("\n")[0]]
         _kept[props.uuid] = kept
-    return kept[1]
+    return kept[1] + [""] * (LINES - len(kept[1]))
 
 
 def _made(root: Any, current: bool) -> list[str]:

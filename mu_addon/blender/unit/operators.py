@@ -6,16 +6,17 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
+from ...design.nearest import tied
 from ...design.parameters import Unit
 from ...design.quantity import describe
 from ...errors import InputError
 from ..scene import gestures, landing
-from ..shared import scene_units, viewports
+from ..shared import scene_units, updates, viewports
 from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
-from .broken import broken
-from .fields import exact, tooltip
+from .broken import broken, description
+from .fields import exact, label, shown_value, tooltip
 
 _SCALE = next(d for d in describe(Unit) if d.name == "scale")
 
@@ -129,8 +130,10 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
-        found = broken(root)
-        value = None if found is None else found.fits.get((self.section, self.name))
+        found, value = broken(root), None
+        if found is not None:
+            mending = {(r.section, r.name): r.value for r in found.repairs}
+            value = mending.get((self.section, self.name), found.fits.get((self.section, self.name)))
         if value is None:
             raise InputError(
                 f"{self.section}.{self.name} breaks no rule that another value of it would keep",
@@ -138,10 +141,52 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
                 "change another field",
             )
         setattr(getattr(root.mu_unit, self.section), self.name, value)
+        # Another rule may still be broken, and has its own button.
+        unit_object.rebuild(root)
+        return {"FINISHED"}
+
+
+class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
+    """Set every parameter that breaks a rule to the nearest round value that keeps all of them"""
+
+    bl_idname = "mu.fit_all"
+    bl_label = "Fix All"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def description(cls, context, properties):
+        """Which parameters become what."""
+        root = unit_object.active_root(context)
+        found = None if root is None else broken(root)
+        return "\n".join([cls.__doc__, *_repairs_in_words(root, found)]) if found else cls.__doc__
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        found = broken(root)
+        if found is None or not found.repairs:
+            raise InputError("no rule is broken", "design", "nothing is to be done")
+        said = _repairs_in_words(root, found)
+        with updates.paused():
+            for repair in found.repairs:
+                if repair.value is not None:
+                    group = getattr(root.mu_unit, repair.section)
+                    for name, value in tied({repair.name: repair.value}).items():
+                        setattr(group, name, value)
         if not unit_object.rebuild(root):
             self.report({"ERROR"}, root.mu_unit.trouble)
-            return {"CANCELLED"}
+        else:
+            self.report({"INFO"}, f"Set {', '.join(said)}")
         return {"FINISHED"}
+
+
+def _repairs_in_words(root, found) -> list[str]:
+    words = []
+    for repair in found.repairs:
+        if repair.value is not None:
+            d = description(repair.section, repair.name)
+            words.append(f"{label(d)} {shown_value(getattr(root.mu_unit, repair.section), d, repair.value)}")
+    return words
 
 
 class MU_OT_delete(UnitOperator, bpy.types.Operator):
@@ -187,7 +232,7 @@ class MU_OT_select(UnitOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
+CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_fit_all, MU_OT_delete, MU_OT_millimetres, MU_OT_select)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

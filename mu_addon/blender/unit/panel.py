@@ -9,11 +9,25 @@ from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
 from ..shared import scene_units
 from ..shared.operators import NO_UNIT, linked
-from ..shared.panels import CHARACTERS, TabPanel, UnitPanel, alert, folded_section, parameters, wrapped
+from ..shared.panels import (
+    CHARACTERS,
+    TabPanel,
+    UnitPanel,
+    alert,
+    fix_button,
+    folded_section,
+    parameters,
+    wrapped,
+)
 from . import figures
 from . import object as unit_object
+from .broken import broken
 
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
+
+
+FIXES = 2
+"""Broken rules that have a button of their own: more have no room beside each other."""
 
 
 class MU_PT_unit(TabPanel, bpy.types.Panel):
@@ -71,8 +85,12 @@ def _untrue_size(root, scene) -> str:
 
 
 def _head(layout, root) -> None:
-    """What the unit comes to or, in red, the rule that it breaks: as many lines either way."""
+    """What the unit comes to or, in red, the rule that it breaks and buttons that mend it.
+
+    It is as high either way.
+    """
     lines, wrong = figures.lines(root, CHARACTERS + 2)
+    found = broken(root) if wrong else None
     box = layout.box()
     box.alert = wrong
     column = box.column(align=True)
@@ -80,6 +98,16 @@ def _head(layout, root) -> None:
     for number, line in enumerate(lines):
         icon = ("ERROR" if wrong else "DRIVER_DISTANCE") if number == 0 else "BLANK1"
         column.label(text=line, icon=icon)
+    row = box.row(align=True)
+    row.alert = False
+    mending = [] if found is None else [r for r in found.repairs if r.value is not None]
+    for repair in mending[:FIXES]:
+        fix_button(row, root, repair.section, repair.name, repair.value, found.text)
+    if len(mending) > 1:
+        row.operator("mu.fit_all", text=f"Fix All {len(mending)}")
+    if not mending:
+        # So much room in any case: what is below does not move.
+        row.label(text="")
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -88,6 +116,7 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
     bl_idname = "MU_PT_design"
     bl_label = "Design"
     bl_options = set()
+    place = "design"
 
     def show(self, layout, context, root):
         layout.prop(root.mu_unit, "scale")
@@ -99,6 +128,7 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_lattice"
     bl_label = "Lattice"
+    place = "lattice", "grading"
 
     def show(self, layout, context, root):
         envelope = root.mu_unit.envelope
