@@ -32,6 +32,8 @@ EventHandler = Callable[[str, dict[str, Any]], None]
 Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
 
 STATUS = "status.json"
+SWEEP = "sweep"
+"""Mark with which a guided sweep begins: what was marked before it in a recording no longer counts."""
 LOSSES = {
     "lost": "lost",
     "crc_errors": "wrong CRC",

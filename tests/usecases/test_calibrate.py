@@ -11,6 +11,7 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.sensing.recording import Recorder, read_recording
 from mu_addon.sensing.samples import Layout, Samples
+from mu_addon.usecases.sensor.calibrate import _marked
 
 
 def volts_of(angle: np.ndarray) -> np.ndarray:
@@ -38,6 +39,22 @@ def record(folder: Path, marked: bool = False, sweeps: int = 4) -> np.ndarray:
 
 def run(*arguments: object) -> int:
     return main([str(argument) for argument in arguments])
+
+
+def test_a_sweep_that_failed_does_not_poison_the_next_one_of_the_recording(tmp_path: Path) -> None:
+    """The cable was loose, or the angles were others: marks before the last "sweep" no longer count."""
+    time_s = np.arange(0.0, 10.0, 0.1)
+
+    class Kept:
+        messages = (
+            {"event": "mark", "time_s": 0.0, "text": "angle 30"},
+            {"event": "mark", "time_s": 4.0, "text": "sweep"},
+            {"event": "mark", "time_s": 5.0, "text": "angle 0"},
+        )
+
+    angle = _marked(Kept, time_s)
+    assert np.isnan(angle[time_s < 4.9]).all()
+    assert 0.0 in angle
 
 
 @pytest.mark.parametrize("marked", [False, True])

@@ -1,7 +1,7 @@
-"""Jobs in the header of every 3D view: the one that runs, how many wait, and a notice when one has ended.
+"""Jobs at the right end of the status bar: the one that runs, how many wait, and a notice when one has ended.
 
-They stand at its end. Where the view is too narrow for Blender's own buttons and the bar, the bar is shorter
-and stands before them: what stands at the end would be out of sight.
+Nothing of Blender's own stands there that they would push aside. Where the user hides the status bar they are
+at the end of the 3D view's header.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -17,13 +17,10 @@ from ..shared.operators import reports_errors
 from . import start_child
 from .panel import shortened, whole
 
-WIDTH, SHORT = 14, 6
-"""Width of the bar in the interface's units, and in a narrow view: its words change, its place does not."""
-STAGE_LETTERS, NOTICE_LETTERS, SHORT_LETTERS = 14, 48, 26
-"""What fits: the name of a stage beside its number and the time left; a notice in the bar and a bit more, and
-in a narrow view."""
-WIDE = 1400
-"""Pixels, at an interface of scale 1, from which on a view is wide enough for the whole bar."""
+WIDTH = 16
+"""Width of the bar in the interface's units: its words change, its place does not."""
+STAGE_LETTERS, NOTICE_LETTERS = 14, 64
+"""What fits: the name of a stage beside its number and the time left; a notice."""
 
 
 def listed() -> list[str]:
@@ -59,20 +56,22 @@ class MU_OT_job_cancel(bpy.types.Operator):
 
 
 class MU_OT_job_dismiss(bpy.types.Operator):
-    """Remove the notices of ended jobs from the header; their results stay"""
+    """Dismiss what is said of ended jobs, here and in their panels; their results stay"""
 
     bl_idname = "mu.job_dismiss"
-    bl_label = "Dismiss Notices"
+    bl_label = "Dismiss"
     bl_options = {"REGISTER"}
 
     @classmethod
     def description(cls, context, properties):
-        words = [_words(key) for key in _notices()]
+        words = [_words(key) for key in start_child.ended()]
         return "\n".join([*words, cls.__doc__])
 
     def execute(self, context):
-        _seen.update(start_child.ended())
+        for key in start_child.ended():
+            start_child.forget(key)
         viewports.redraw()
+        viewports.redraw_status()
         return {"FINISHED"}
 
 
@@ -98,57 +97,37 @@ class MU_MT_jobs(bpy.types.Menu):
             self.layout.prop(kept.preferences, "jobs_go_on")
 
 
-_seen: set[str] = set()
-"""Keys of ended jobs whose notice was dismissed."""
-
-
 def draw(self, context) -> None:
-    """At the header's end: Cancel, queue and bar; or the notice of the job that ended last."""
-    if not _narrow(context):
-        _jobs(self.layout, short=False)
+    """In the status bar: Cancel, queue and bar; or the notice of the job that ended last."""
+    _jobs(self.layout)
 
 
-def draw_first(self, context) -> None:
-    """The same before the header's first button, in a view too narrow for both."""
-    if _narrow(context):
-        _jobs(self.layout, short=True)
+def draw_in_view(self, context) -> None:
+    """The same in the 3D view's header, where the status bar is hidden."""
+    if not context.screen.show_statusbar:
+        _jobs(self.layout)
 
 
-def _narrow(context) -> bool:
-    return bool(context.region.width < WIDE * context.preferences.system.ui_scale)
-
-
-def _jobs(layout, short: bool) -> None:
-    keys = listed()
-    _seen.difference_update(keys)
+def _jobs(layout) -> None:
+    keys, ended = listed(), start_child.ended()
     if keys:
-        _running(layout, keys, short)
-        return
-    ended = _notices()
-    if ended:
-        _notice(layout, ended[-1], short)
+        _running(layout, keys)
+    elif ended:
+        _notice(layout, ended[-1])
 
 
-def _notices() -> list[str]:
-    """Keys of the jobs that have ended since notices were dismissed, the latest last."""
-    return [key for key in start_child.ended() if key not in _seen]
-
-
-def _running(layout, keys: list[str], short: bool) -> None:
+def _running(layout, keys: list[str]) -> None:
     row = layout.row(align=True)
     # First in a row of fixed width: it stays under the mouse whatever the bar says.
     row.operator("mu.job_cancel", text="", icon="CANCEL").key = keys[0]
     more = row.row(align=True)
-    more.ui_units_x = 2 if short else 3
+    more.ui_units_x = 3
     waiting = sum(start_child.child_of(key).state == WAITING for key in keys)
     more.menu("MU_MT_jobs", text=f"+{waiting}" if waiting else "Jobs")
     child = start_child.child_of(keys[0])
     fraction, text = whole(child, STAGE_LETTERS)
-    left = child.estimate.seconds_left
-    if short:
-        text = "..." if child.stopping or left is None else spell(left)
     bar = row.row(align=True)
-    bar.ui_units_x = SHORT if short else WIDTH
+    bar.ui_units_x = WIDTH
     # The job's name and all of its words are in the tooltip of Cancel and in the menu.
     bar.progress(factor=fraction, text=text)
 
@@ -163,14 +142,13 @@ def _words(key: str) -> str:
     return f"Failed: {title}, {(child.error or {}).get('what', 'without a message')}"
 
 
-def _notice(layout, key: str, short: bool) -> None:
+def _notice(layout, key: str) -> None:
     row = layout.row(align=True)
     row.operator("mu.job_dismiss", text="", icon="X")
     words = row.row(align=True)
-    words.ui_units_x = 2 * SHORT if short else WIDTH + 4
     icon = {DONE: "CHECKMARK", CANCELLED: "CANCEL"}.get(start_child.child_of(key).state, "ERROR")
     words.alert = icon == "ERROR"
-    words.label(text=shortened(_words(key), SHORT_LETTERS if short else NOTICE_LETTERS), icon=icon)
+    words.label(text=shortened(_words(key), NOTICE_LETTERS), icon=icon)
 
 
 CLASSES = (MU_OT_job_cancel, MU_OT_job_dismiss, MU_MT_jobs)
@@ -179,15 +157,14 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 
 
 def register() -> None:
-    """Operators, the menu, and the bar in the header of the 3D view."""
+    """Operators, the menu, and the bar."""
     _register_classes()
-    bpy.types.VIEW3D_HT_header.append(draw)
-    bpy.types.VIEW3D_HT_header.prepend(draw_first)
+    bpy.types.STATUSBAR_HT_header.append(draw)
+    bpy.types.VIEW3D_HT_header.append(draw_in_view)
 
 
 def unregister() -> None:
     """Take them out again."""
-    bpy.types.VIEW3D_HT_header.remove(draw_first)
-    bpy.types.VIEW3D_HT_header.remove(draw)
+    bpy.types.VIEW3D_HT_header.remove(draw_in_view)
+    bpy.types.STATUSBAR_HT_header.remove(draw)
     _unregister_classes()
-    _seen.clear()

@@ -221,8 +221,10 @@ def _poll() -> float | None:
     before = running()
     news = poll()
     if news or before:
-        # Headers each time: the time left counts down between messages.
-        viewports.redraw() if news else viewports.redraw_headers()
+        # The bar each time: the time left counts down between messages.
+        viewports.redraw_status()
+        if news:
+            viewports.redraw()
     for key in set(before) - set(running()):
         sessions.drop(key)
         JOB_ENDED.send(key)

@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...errors import InputError
+from ...sensing.session import SWEEP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..results.operators import MotionOperator
 from ..shared import viewports
@@ -201,6 +202,8 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
             raise InputError(
                 f"a sweep over {len(set(angles))} angle(s)", remedy="take a smaller step or a wider range"
             )
+        # What an earlier sweep marked in this recording no longer counts.
+        session.child.send(f"mark {SWEEP}")
         session.guide = Guide(angles)
         return {"FINISHED"}
 
@@ -235,7 +238,7 @@ class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
-    """Calibrate from a recording with marked angles or from measured data, in a child process"""
+    """Calibrate from the last sweep of a recording or from measured data, in a child process"""
 
     bl_idname = "mu.sensor_calibrate"
     bl_label = "Calibrate"
@@ -248,10 +251,21 @@ class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
+    channel: StringProperty(
+        name="Light",
+        description="Channel of the light to calibrate from now on. Empty: the one that the panel names",
+        options={"SKIP_SAVE"},
+    )
+
     @reports_errors
     def execute(self, context):
         root = unit_object.active_root(context)
+        session = sensor.of(root)
         data = self.data or root.mu_sensor.data
+        if not data and session is not None:
+            data = str(session.watched.folder)
+        if self.channel:
+            root.mu_sensor.channel = self.channel
         if not data:
             raise InputError(
                 "no folder is chosen", "Sweeps", "choose a recording with marks, or measured data"

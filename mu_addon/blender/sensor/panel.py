@@ -170,7 +170,13 @@ def _calibration(layout, root, session):
     body.prop(settings, "channel", placeholder=light)
     body.prop(settings, "dark", placeholder=str(dark))
     body.prop(settings, "calibration")
-    job_state(body, sensor.CALIBRATION.child(root), "now in use", "sensor_")
+    child = sensor.CALIBRATION.child(root)
+    job_state(body, child, "now in use", "sensor_")
+    if child is not None and child.state == FAILED and session is not None:
+        others = [name for name in session.channels if name not in (light, dark)]
+        for name in others[:3]:
+            again = body.operator("mu.sensor_calibrate", text=f"Calibrate with {name}", icon="FILE_REFRESH")
+            again.channel = name
     guide = session.guide if session is not None and session.running else None
     if guide is None:
         column = body.column(align=True)

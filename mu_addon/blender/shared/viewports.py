@@ -74,8 +74,16 @@ def redraw_views(panels: bool) -> None:
                 region.tag_redraw()
 
 
-def redraw_headers() -> None:
-    """Have the header of every 3D view drawn again."""
+def redraw_status() -> None:
+    """Have the status bar of every window drawn again, and the headers that stand in for a hidden one.
+
+    The status bar is no area that Python can reach: Blender draws it again where its text is set, which is
+    the running tool's own while there is one.
+    """
+    for window in bpy.context.window_manager.windows:
+        if window.screen.show_statusbar and not len(window.modal_operators):
+            with bpy.context.temp_override(window=window):
+                window.workspace.status_text_set(None)
     for area in areas():
         for region in area.regions:
             if region.type == "HEADER":

@@ -25,6 +25,7 @@ from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured
 from ...run.usecase import UseCase
 from ...sensing.calibration import Calibration, CalibrationSweep, calibrate, sweeps_of, write_calibration
 from ...sensing.recording import INDEX, Recording, read_recording
+from ...sensing.session import SWEEP
 from ...toml_writer import toml_text
 
 Array = np.ndarray[Any, Any]
@@ -261,9 +262,15 @@ def _of_recording(
 
 
 def _marked(recording: Recording, time_s: Array) -> Array:
-    """Angles (n,) in degrees held after marks that say them, nan elsewhere."""
+    """Angles (n,) in degrees held after marks that say them, nan elsewhere.
+
+    Only those after the last mark "sweep", with which a guided sweep begins: one that failed before it, with
+    the cable loose or at wrong angles, is left out.
+    """
     angle = np.full(len(time_s), math.nan)
     marks = [m for m in recording.messages if m.get("event") == "mark"]
+    begun = [k for k, mark in enumerate(marks) if mark.get("text") == SWEEP]
+    marks = marks[begun[-1] if begun else 0 :]
     for k, mark in enumerate(marks):
         word, _, value = str(mark.get("text", "")).partition(" ")
         try:

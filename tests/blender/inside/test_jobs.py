@@ -25,21 +25,21 @@ def started(root, how, monkeypatch):
     return SIMULATION.start(root, SIMULATION.folder_of(root), lambda folder: None)
 
 
-def said(width=1600):
-    """Words of the header of a view so many pixels wide: one half of it says something, the other nothing."""
-    shown = [_said(draw, width) for draw in (header.draw, header.draw_first)]
-    assert "" in shown
-    return "".join(shown)
+def said():
+    """Words of the status bar; the header of a view says nothing beside it."""
+    shown = _said(header.draw, status_bar=True)
+    assert _said(header.draw_in_view, status_bar=True) == ""
+    assert _said(header.draw_in_view, status_bar=False) == shown
+    return shown
 
 
-def _said(draw, width):
+def _said(draw, status_bar):
     texts, layout = [], MagicMock()
     layout.row.return_value = layout
     layout.label.side_effect = lambda text="", **_: texts.append(text)
     layout.progress.side_effect = lambda factor, text: texts.append(text)
     layout.menu.side_effect = lambda name, text="", **_: texts.append(text)
-    system = SimpleNamespace(ui_scale=1.0)
-    context = SimpleNamespace(region=SimpleNamespace(width=width), preferences=SimpleNamespace(system=system))
+    context = SimpleNamespace(screen=SimpleNamespace(show_statusbar=status_bar))
     draw(MagicMock(layout=layout), context)
     return " ".join(texts)
 
@@ -60,9 +60,6 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert "Model A (3 of 8)" in said()
     assert "mu-1.0x: simulation: " in told("job_cancel", key=SIMULATION.key(first))
     assert "+1" in said()
-    assert "Model A" not in said(1100)
-    assert "%" in said(1100)
-    assert "+1" in said(1100)
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
     assert "stopping" in said()
     ended(one)
@@ -73,6 +70,7 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert "mu-1.0x.001: simulation" in said()
     assert bpy.ops.mu.job_dismiss() == {"FINISHED"}
     assert said() == ""
+    assert SIMULATION.child(second) is None, "and its panel says no more of it"
     assert "no such job" in refused(bpy.ops.mu.job_cancel)
 
 
@@ -94,7 +92,6 @@ def test_a_failed_one_says_what_in_the_header(monkeypatch):
     ended(child)
     assert "Failed: mu-1.0x: simulation" in said()
     assert len(said()) <= header.NOTICE_LETTERS
-    assert len(said(1100)) <= header.SHORT_LETTERS
     assert child.error["what"] in told("job_dismiss")
 
 

@@ -6,7 +6,7 @@ from ...shared.compat import link_radius
 from .wiring import Wiring
 
 NAME = "MU Tubes"
-VERSION = 2
+VERSION = 3
 TEXT = "Tubes along curves and edges; the point attribute `radius`, or a curve's own, gives their radius"
 
 
@@ -30,6 +30,9 @@ def build(tree) -> None:
     circle = w.node("GeometryNodeCurvePrimitiveCircle", Resolution=w.given("Sides"), Radius=1.0)
     sweep = w.node("GeometryNodeCurveToMesh", Profile_Curve=circle.outputs["Curve"], Fill_Caps=True)
     link_radius(tree, sweep, curve, scaled)
-    smooth = w.smooth(sweep.outputs["Mesh"])
+    # Ends are flat, as a print's are: smooth ones look like dark holes. A tube's sides have four corners.
+    corners = w.node("GeometryNodeInputMeshFaceNeighbors").outputs["Vertex Count"]
+    sides = w.node("FunctionNodeCompare", {"data_type": "INT", "operation": "EQUAL"}, A=corners, B=4)
+    smooth = w.smooth(sweep.outputs["Mesh"], sides.outputs["Result"])
     painted = w.node("GeometryNodeSetMaterial", Geometry=smooth, Material=w.given("Material"))
     w.output(painted.outputs["Geometry"])

@@ -67,10 +67,15 @@ class Wiring:
                 socket.default_value = value
         return node.outputs[0]
 
-    def smooth(self, mesh: Any):
-        """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since."""
+    def smooth(self, mesh: Any, selection: Any = None):
+        """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since.
+
+        selection: a socket that says of which faces; the others are flat, with sharp edges around them.
+        """
         node = self.node("GeometryNodeSetShadeSmooth")
         self.tree.links.new(mesh, node.inputs[0])
+        if selection is not None:
+            self.tree.links.new(selection, node.inputs["Shade Smooth"])
         return node.outputs[0]
 
     def output(self, geometry: Any) -> None:
