@@ -166,7 +166,7 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
         found = broken(root)
         if found is None or not found.repairs:
             raise InputError("no rule is broken", "design", "nothing is to be done")
-        said = _repairs_in_words(root, found)
+        changes = _repairs_in_words(root, found)
         with updates.paused():
             for repair in found.repairs:
                 if repair.value is not None:
@@ -176,7 +176,7 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
         if not unit_object.rebuild(root):
             self.report({"ERROR"}, root.mu_unit.trouble)
         else:
-            self.report({"INFO"}, f"Set {', '.join(said)}")
+            self.report({"INFO"}, f"Set {', '.join(changes)}")
         return {"FINISHED"}
 
 
