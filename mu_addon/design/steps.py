@@ -5,9 +5,9 @@
               \\-> anchors -> path -> wells
                                         \\-> solid, of all of them
 
-A step owns parameters of the unit, and may read those of others; its value is kept under a key of all that it
-is made from, so that a slider, an undo or another unit of the same shape costs only what is new. A muted step
-passes on what it would have changed.
+A step owns parameters of the unit and may read those of others. Its value is kept under a key of all its
+inputs, so a slider, an undo or another unit of the same shape costs only what is new. A muted step passes on
+what it would have changed.
 """
 
 from __future__ import annotations

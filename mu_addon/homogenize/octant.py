@@ -146,9 +146,9 @@ class Octant:
     def buckling(self, u: Array) -> str:
         """A way the body may leave the equilibrium u (n, 3) in mm, in words, or "" if it is stable.
 
-        Seen are all motions that repeat after one or two cells along each axis, for they are made of those
-        that every mirror keeps or turns into their negative, each side by itself; and homogeneous shears.
-        Homogeneous stretches, and waves longer than two cells, are not.
+        Covers motions that repeat after one or two cells along each axis, and homogeneous shears. Such
+        motions are sums of those that each mirror keeps or negates, each side by itself. Does not cover
+        homogeneous stretches and waves longer than two cells.
         """
         values, K = self.tangent(u)
         for turned in itertools.product((False, True), repeat=6):

@@ -4,13 +4,13 @@ With r(u, p) = 0 the equilibrium at freedoms p, a quantity q(u, p) changes by
 
     dq/dp = dq/dp |u - lambda . dr/dp |u,    K lambda = dq/du,
 
-K the tangent at the state, whose factor serves every quantity. lambda . dr at fixed u is linear in what the
-body is made of, so that one pass over the elements (`fem.sensitivity`) gives it for all freedoms: each takes
-the difference of the nodes' places, shares and ties between two bodies with the freedom moved a little either
-way and the same elements (a mesh morphed, not made anew, so that no mesher's noise is in it), and no assembly
-of its own. Source: the discrete semi-analytic adjoint, e.g. Haftka and Guerdal, Elements of Structural
-Optimization, ch. 7; its known trouble, the error of forward differences under large rotations, is one of
-first order in the step that central differences do not have.
+K the tangent at the state, whose factor serves every quantity. lambda . dr at fixed u is linear in the places
+of the nodes, shares and ties, so one pass over the elements (`fem.sensitivity`) gives it for all freedoms. A
+freedom then costs no assembly: it takes the difference of these between two bodies with the freedom moved a
+little either way. Both have the same elements: the mesh is morphed, not made anew, so there is no mesher's
+noise in it. Source: the discrete semi-analytic adjoint, e.g. Haftka and Guerdal, Elements of Structural
+Optimization, ch. 7. Its known error under large rotations is of first order in the step; central differences
+do not have it.
 """
 
 from __future__ import annotations

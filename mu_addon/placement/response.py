@@ -1,10 +1,9 @@
 """Reduced, linear response of a unit to a path of stiff steps, without solving for the path.
 
-An inclusion a hundred times stiffer than the lattice is far outside what a first-order map can tell. But
-its own strain stays small, so that its forces are linear in the displacement of its co-rotated elements,
-and the rest of the unit answers them nearly linearly about Model A. Each step of the graph is given a
-few patterns of strain; the forces of these patterns are applied to Model A's tangent once, for all
-steps, and any chain of steps is then a small dense system.
+An inclusion a hundred times stiffer than the lattice is far beyond a first-order map. But its own strain
+stays small. So its forces are linear in the displacement of its co-rotated elements, and the rest of the unit
+answers them nearly linearly about Model A. Each step of the graph gets a few patterns of strain. Their forces
+are applied to Model A's tangent once; any chain of steps is then a small dense system.
 """
 
 from __future__ import annotations

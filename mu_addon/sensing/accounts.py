@@ -1,8 +1,8 @@
 """Every byte of a serial line counted once, by what became of it; those that gave no sample are kept.
 
-What arrives is in a line or frame that was read, in one that could not be, in one cut by the beginning, a
-pulled cable or the end, in a stretch that nothing ended, or still in the decoder's buffer:
-bytes = read_bytes + rejected_bytes + cut_bytes + overlong + buffered.
+bytes = read_bytes + rejected_bytes + cut_bytes + overlong + buffered. Read: lines and frames with a sample.
+Rejected: those that could not be read. Cut: by the start, a pulled cable or the end. Overlong: stretches that
+nothing ended. Buffered: still with the decoder.
 """
 
 from __future__ import annotations

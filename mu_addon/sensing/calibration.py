@@ -1,9 +1,9 @@
 """From voltage to bending angle: a monotone map fitted to sweeps, with a band that new sweeps keep to.
 
-The signal, after its dark level is taken off, is modelled as (1 + drift t) f(angle) with f a cubic spline
-whose coefficients rise or fall only, so that f does: to every voltage belongs one angle, or one interval
-where the sensor says nothing. The band comes from sweeps that were left out of the fit: how far they lie off
-as a whole (mounting, drift, rate) and within (noise, hysteresis).
+Model of the signal less its dark level: (1 + drift t) f(angle), f a cubic spline whose coefficients rise only
+or fall only, and so does f. Each voltage has one angle, or one interval where the sensor is blind. The band
+comes from sweeps left out of the fit: their error as a whole (mounting, drift, rate) and within (noise,
+hysteresis).
 
 Source: Ramsay, Statistical Science 3 (1988) 425, for monotone splines by increments of one sign.
 """

@@ -1,9 +1,12 @@
 """The light that a bent waveguide lets through: traced rays, and a law fitted to them that costs nothing.
 
-The law: the logarithm of the light's loss is linear in how long the guide is, the logarithm of its number of
-wells (each finds less of the light that it can take), its junctions, by how much it is stretched, how sharply
-its wells kink it, either way, its wells' curvature (signed: light runs along the outer side of a bend, and
-meets the wells where they are there), and the curvature squared along it (bend loss).
+The logarithm of the light's loss is linear in
+
+- the guide's length, its junctions, and its elongation;
+- the logarithm of its number of wells: each finds less of the light that it can take;
+- the kinks at its wells, either way;
+- the signed curvature at its wells: light runs along the outer side of a bend and meets the wells there;
+- the curvature squared along it: bend loss.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Running numbers and device clocks made endless: gaps, repeats, wraps, resets and glitches told apart.
 
-A number that goes on by one is taken at once. One that does not is judged with the next sample's, since a
-gap, a counter that wrapped and a device that started anew go on from there, and a glitch does not. No sample
-is left out but one that is equal, number, clock and values, to one shortly before.
+A number that goes on by one is taken at once. Any other is judged with the next sample's: after a gap, a wrap
+or a restart the count goes on from there, after a glitch it does not. The only sample left out is one equal
+in number, clock and values to one shortly before.
 """
 
 from __future__ import annotations

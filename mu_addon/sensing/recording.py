@@ -1,11 +1,16 @@
 """Recordings of a sensor: CSV that any program reads, written so that a crash loses next to nothing.
 
-A recording is a folder: recording-000.csv with the columns time_s, device_s, sequence and one a channel
-(another file begins when the device's channels change), and index.ndjson, which says what the files hold,
-with a line for every event (connected, lost, format, mark) and one a second with row, byte and counters. What
-came and gave no sample is in rejects.ndjson, a line each: time_s, why, and raw, its bytes as characters
-U+0000 to U+00FF (Latin-1). Rows reach the operating system with every batch, and the disk once a second: a
-killed process loses none of those, a power cut a second.
+A recording is a folder:
+
+- recording-000.csv: time_s, device_s, sequence and one column a channel. Another file begins when the
+  device's channels change.
+- index.ndjson: the layout of the files, a line for every event (connected, lost, format, mark), and one a
+  second with row, byte and counters.
+- rejects.ndjson: input that gave no sample, a line each: time_s, why, and raw, its bytes as characters U+0000
+  to U+00FF (Latin-1).
+
+Rows reach the operating system with every batch and the disk once a second. A killed process loses none of
+these, a power cut one second.
 """
 
 from __future__ import annotations

@@ -193,10 +193,10 @@ def chambers(space: DistanceField, smallest_radius: float = 1.0) -> Chambers:
 
 
 def _rungs(smallest_radius: float, step: float) -> list[float]:
-    """RUNGS that tell pockets of a radius from the outside on a grid, the greatest first; 0 is none.
+    """RUNGS that separate pockets of a radius from the outside on a grid, the greatest first; 0 is none.
 
-    A pocket that has parted from the outside at a small distance from the surface has at all greater ones, so
-    that of the rungs at which any pocket is deep enough only the greatest is needed.
+    A pocket that is separate at a small distance from the surface is so at all greater ones. So of the rungs
+    at which any pocket is deep enough only the greatest is needed.
     """
     rungs = [t for t in RUNGS if t > 0.9 * step] + [0.0]
     last = next(k for k, t in enumerate(rungs) if t <= NARROWING * smallest_radius)
@@ -287,8 +287,10 @@ def _narrowest(
     seed: Index,
     t: float,
 ) -> tuple[Index, float, bool]:
-    """Cells (n, 3) where the widest way from the seed to `out` is narrowest, its radius there, and whether
-    no way over the box's faces, those that are no rims of the grid, can be wider."""
+    """Narrowest cells (n, 3) of the widest way from the seed to `out`, its radius there, and a bool.
+
+    The bool is True if no way over the box's faces, other than rims of the grid, can be wider.
+    """
 
     def reached(radius: float) -> tuple[bool, bool]:
         parts = parts_of(squared > space.wider(radius))

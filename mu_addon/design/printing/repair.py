@@ -79,9 +79,9 @@ class Repair:
 def repaired(vertices: Vertices, triangles: Triangles, gap_mm: float = GAP_MM) -> Repair:
     """Repair of a surface of vertices (n, 3) in mm and triangles (m, 3), where there is only one way to.
 
-    gap_mm: how far apart vertices of open edges may be to become one. In this order: triangles without area
-    in their corners go, gaps close, doubled triangles go, holes of one triangle are filled, patches that face
-    against their neighbours turn, and shells that are inside out do.
+    gap_mm: largest distance of vertices of open edges that become one. In this order: remove triangles
+    without three corners, close gaps, remove doubled triangles, fill holes of one triangle, turn patches that
+    face against their neighbours, turn shells that are inside out.
     """
     before = volume(vertices, triangles)
     changes: list[Change] = []

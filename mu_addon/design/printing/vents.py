@@ -93,10 +93,10 @@ class Vented:
 def vented(vertices: Vertices, triangles: Triangles, direction: Sequence[float], printer: Printer) -> Vented:
     """A part, vertices (n, 3) in mm and triangles (m, 3), with a vent for every cup along a build direction.
 
-    A cup is one of more than the printer's limit. The vents list is empty, and the part as it was, where
-    there is none. Raises GateError where the part is not closed, where no wall beside a cup can take a vent
-    (between THINNEST_MM and THICKEST_MM, square to the hole, the outside behind it), and where the part that
-    results is not one body, or still has a cup above the limit.
+    Cups up to the printer's limit are left. Without a cup the list of vents is empty and the part is
+    unchanged. A wall can take a vent if it is between THINNEST_MM and THICKEST_MM, square to the hole, with
+    the outside behind it. Raises GateError where the part is not closed, where no wall beside a cup can take
+    a vent, and where the result is not one body or still has a cup above the limit.
     """
     from manifold3d import Error, Manifold, Mesh64, OpType
 

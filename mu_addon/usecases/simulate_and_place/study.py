@@ -74,7 +74,7 @@ _BYTES_A_NODE = {"simulate": 300, "place": 1000}
 HOMOGENISED = (
     "The lattice is simulated as a homogenised continuum. With its struts as printed, which buckle, mu-1.0x "
     "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
-    "motion matters, choose the fidelity resolved with self-contact."
+    "motion matters, choose the fidelity resolved."
 )
 # A coarser twin of the mesh, to tell how far the mesh moves a ranking.
 COARSER = 0.7
