@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..reading import require_readable
+from ..reading import file_bytes
 from . import shapes
 from .dimensions import Dimensions
 from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
 from .surface import Triangles, Vertices, volume, weld
+from .surface_file import SUFFIXES, read_surface
 
 if TYPE_CHECKING:
     from .anchors import Window
@@ -35,10 +36,6 @@ AROUND = 96
 """Flat pieces around the actuator where it is asked whether a body holds it."""
 SLACK_MM = 1e-3
 """A body may miss an end plane by so much."""
-# Bytes within which a PLY file's header ends.
-_HEAD = 100_000
-# What meshio raises over files that are not what their names say.
-_DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
 _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
 
 
@@ -128,46 +125,25 @@ def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Bo
 
 
 def read_body(path: str | Path) -> Body:
-    """Body in an STL, OBJ or PLY file in mm; quadrilaterals are split into triangles.
+    """Body in an STL, OBJ or PLY file in mm; polygons are split into triangles.
 
     Raises InputError for another file type, a file that cannot be read, and as `Body` does.
     """
-    from meshio import ReadError, obj, ply, stl
-
     path = Path(path)
-    readers = {".stl": stl.read, ".obj": obj.read, ".ply": ply.read}
     remedy = "give a closed surface as STL, OBJ or PLY, in mm"
-    if path.suffix.lower() not in readers:
+    if path.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"the file type {path.suffix or '(none)'} is not supported for a body", str(path), remedy
         )
     try:
-        require_readable(path, MOST_BYTES)
-        with path.open("rb") as stream:
-            if path.suffix.lower() == ".ply" and b"end_header" not in stream.read(_HEAD):
-                # meshio waits for the header's end for ever.
-                raise ValueError("the header does not end")
-        points, triangles = _surface(readers[path.suffix.lower()](path))
-    except (*_DAMAGED, ReadError) as error:
-        why = getattr(error, "strerror", None) or "the file is damaged or of another type"
+        content = file_bytes(path, MOST_BYTES)
+    except OSError as error:
+        why = error.strerror or error
         raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
-    known = ((triangles >= 0) & (triangles < len(points))).all()
-    if points.ndim != 2 or points.shape[1] != 3 or not known:
-        raise InputError("no body can be read from it: its faces and points do not fit", str(path), remedy)
-    return body_of(points, triangles, path.name)
-
-
-def _surface(mesh: Any) -> tuple[Vertices, Triangles]:
-    """Points (n, 3) and triangles (m, 3) of a mesh of meshio's; what is damaged raises one of `_DAMAGED`."""
-    found = [np.empty((0, 3), np.int64)]
-    for block in mesh.cells:
-        if block.type == "triangle":
-            found.append(np.asarray(block.data))
-        elif block.type == "quad":
-            found += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-    if any(len(faces) and not np.issubdtype(faces.dtype, np.integer) for faces in found):
-        raise ValueError("a corner of a face is no whole number")
-    return np.asarray(mesh.points, float), np.concatenate(found)
+    try:
+        return body_of(*read_surface(content, path.name), path.name)
+    except InputError as error:
+        raise InputError(f"no body can be read from it: {error.what}", str(path), error.remedy) from error
 
 
 def flaws(body: Body) -> list[Flaw]:
@@ -224,12 +200,16 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     """
     low, high = body.bounds
     size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
-    for factor, unit in _UNITS.items():
-        if 0.6 < size * factor / own < 1.6 and not 0.3 < size / own < 3.0:
+    if not 0.3 < size / own < 3.0:
+        # Only what would pass the checks below is worth a guess, what fits best first.
+        by_size = sorted(_UNITS.items(), key=lambda item: abs(np.log(size * item[0] / own)))
+        fits = {f: unit for f, unit in by_size if size * f / own < 3.0 and _spans(f * body.bounds, d)}
+        if fits:
             return [
                 Flaw(
-                    f"it is {size:.4g} mm long, the unit {own:.4g} mm: it seems to be in {unit}",
-                    f"scale it by {factor:g}",
+                    f"it is {size:.4g} mm long, the unit {own:.4g} mm: it seems to be in "
+                    + " or ".join(fits.values()),
+                    "scale it by " + " or ".join(f"{factor:g}" for factor in fits),
                     np.stack([low, high]),
                 )
             ]
@@ -256,6 +236,13 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
             )
         )
     return found
+
+
+def _spans(bounds: NDArray[np.float64], d: Dimensions) -> bool:
+    """Whether a box (2, 3) in mm reaches past both end planes of a unit and around its chambers."""
+    low, high = bounds
+    aside = (low[:2] <= -d.R).all() and (high[:2] >= d.R).all()
+    return bool(aside and low[2] <= SLACK_MM and high[2] >= d.height - SLACK_MM)
 
 
 def overlaps(body: Body, d: Dimensions, own: Body | None = None) -> list[Flaw]:

@@ -53,7 +53,7 @@ class Progress:
         self._start = 0.0
         self._expected: float | None = None
         self._fraction: float | None = None
-        self._updated = self._told = clock()
+        self._updated_s = self._emitted_s = clock()
         self._made = ""
         self._one_at_a_time = threading.RLock()
         self.estimate = ProgressEstimate((), clock)
@@ -72,7 +72,7 @@ class Progress:
         def beat() -> None:
             while not ended.wait(every_s / 5.0):
                 with self._one_at_a_time, suppress(OSError, MuError):
-                    if self._stage and self._clock() - self._told >= every_s:
+                    if self._stage and self._clock() - self._emitted_s >= every_s:
                         self._emit_progress("run", self._fraction, beat=True)
 
         thread = threading.Thread(target=beat, daemon=True)
@@ -93,7 +93,7 @@ class Progress:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
         with self._one_at_a_time:
             self._stage, self._start, self._expected = name, self._clock(), expected_s
-            self._fraction, self._updated = (0.0 if expected_s else None), self._start
+            self._fraction, self._updated_s = (0.0 if expected_s else None), self._start
         try:
             self._emit_progress("start", self._fraction)
             yield
@@ -117,7 +117,7 @@ class Progress:
         with self._one_at_a_time:
             if self._stage:
                 self._fraction = max(min(max(float(fraction), 0.0), 1.0), self._fraction or 0.0)
-                self._updated = self._clock()
+                self._updated_s = self._clock()
                 self._emit_progress("run", self._fraction, detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
@@ -155,7 +155,7 @@ class Progress:
         self, state: str, fraction: float | None, detail: str = "", beat: bool = False
     ) -> None:
         with self._one_at_a_time:
-            self._told = now = self._clock()
+            self._emitted_s = now = self._clock()
             elapsed = now - self._start
             message: Message = {
                 "type": "progress",
@@ -163,7 +163,7 @@ class Progress:
                 "state": state,
                 "fraction": fraction,
                 "seconds": elapsed,
-                "seconds_left": own_left(elapsed, now - self._updated, fraction, self._expected),
+                "seconds_left": own_left(elapsed, now - self._updated_s, fraction, self._expected),
                 **({"detail": detail} if detail else {}),
                 **({"beat": True} if beat else {}),
             }

@@ -302,3 +302,17 @@ def test_coordinates_that_no_grid_holds_are_refused_and_not_changed(tmp_path):
     path.write_text(PLY.format(corner="int", far="1e30"))
     with pytest.raises(InputError, match=r"1e\+30 mm lies beyond 1e\+06 mm"):
         read_body(path)
+
+
+@pytest.mark.parametrize(("per_mm", "unit", "factor"), [(25.4, "inches", "25.4"), (1000.0, "metres", "1000")])
+def test_a_guessed_unit_of_length_passes_the_check_that_failed(per_mm, unit, factor):
+    """By its size alone a body in inches could be in centimetres, in which it would not reach."""
+    body = box([-30.0, -30.0, -15.0], [30.0, 30.0, D.height + 5.0])
+    vertices, triangles = body.vertices, body.triangles
+    (flaw,) = misfits(body_of(vertices / per_mm, triangles), D)
+    assert unit in flaw.what
+    assert flaw.remedy == f"scale it by {factor}"
+    assert misfits(body_of(vertices / per_mm * float(factor), triangles), D) == []
+    # What no unit of length would make fit is told of by its ends.
+    (flaw,) = misfits(body_of(vertices / per_mm + [0.0, 0.0, 3.0], triangles), D)
+    assert "it reaches from" in flaw.what

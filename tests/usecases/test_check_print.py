@@ -16,7 +16,7 @@ from mu_addon.design.surface import bad_edges, genus, stl_bytes, stl_surface, vo
 from mu_addon.errors import InputError
 from mu_addon.usecases.check_print.job import Job
 from mu_addon.usecases.check_print.report import direction_name
-from mu_addon.usecases.check_print.run import console_summary, nominal_of, read_surface
+from mu_addon.usecases.check_print.run import console_summary, nominal_of, part_in
 
 
 def bottle(bore):
@@ -126,8 +126,8 @@ def test_text_stl_is_read_like_binary():
         + "endloop\nendfacet\n"
         for t in triangles
     )
-    text = read_surface(f"solid part\n{facets}endsolid part\n".encode(), "part.stl")
-    binary = read_surface(stl_bytes(corners, triangles), "part.stl")
+    text = part_in(f"solid part\n{facets}endsolid part\n".encode(), "part.stl")
+    binary = part_in(stl_bytes(corners, triangles), "part.stl")
     assert (text[0] == binary[0]).all()
     assert (text[1] == binary[1]).all()
 
@@ -143,7 +143,7 @@ def test_text_stl_is_read_like_binary():
 )
 def test_what_is_no_stl_is_refused(content):
     with pytest.raises(InputError):
-        read_surface(content, "part.stl")
+        part_in(content, "part.stl")
 
 
 @pytest.mark.parametrize("text", [False, True])
@@ -154,19 +154,19 @@ def test_more_triangles_than_can_be_checked_are_refused_before_they_are_read(tex
     if text:
         content = b"solid part\n" + 4 * (b"facet\n" + 3 * b"vertex 0 0 x\n" + b"endfacet\n")
     with pytest.raises(InputError, match="holds 4 triangles"):
-        read_surface(content, "part.stl")
+        part_in(content, "part.stl")
 
 
 def test_a_corner_cut_short_is_no_stl():
     facet = b"facet normal 0 0 0\n" + 3 * b"vertex 0 1 2\n" + b"endfacet\n"
     with pytest.raises(InputError, match="truncated"):
-        read_surface(b"solid part\n" + facet + b"vertex 1 2", "part.stl")
+        part_in(b"solid part\n" + facet + b"vertex 1 2", "part.stl")
 
 
 def test_a_coordinate_beyond_a_kilometre_is_refused():
     far = stl_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 2e30, 0]]), np.array([[0, 1, 2]]))
     with pytest.raises(InputError, match="beyond 1e\\+06 mm"):
-        read_surface(far, "part.stl")
+        part_in(far, "part.stl")
 
 
 def test_the_shipped_printer_names_a_source_for_every_limit(tmp_path):

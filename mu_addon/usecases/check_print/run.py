@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,8 @@ from ...design.printing.check import PrintCheck, check
 from ...design.printing.printer import MEANING, Printer
 from ...design.printing.repair import Repair, repaired
 from ...design.solid import build_solid
-from ...design.surface import Triangles, Vertices, stl_bytes, stl_surface
+from ...design.surface import Triangles, Vertices, stl_bytes
+from ...design.surface_file import read_surface
 from ...errors import InputError
 from ...files import write_bytes, write_json
 from ...run.context import RunContext
@@ -25,10 +25,6 @@ from .report import write_report
 
 MOST_TRIANGLES = 1_000_000
 """Of an STL file: nine units in one piece have 620 000. Each takes some 4 kB to check."""
-# The first word of a text STL lies within so many bytes.
-_HEAD = 1000
-_VERTEX = re.compile(rb"(?<!\S)vertex(?!\S)")
-_CORNER = re.compile(_VERTEX.pattern + rb"\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
@@ -88,7 +84,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
 def surface_of(job: Job) -> tuple[Vertices, Triangles]:
     """The surface (n, 3), (m, 3) that is checked; raises InputError and GateError."""
     if job.stl is not None:
-        return read_surface(job.stl, job.stl_name)
+        return part_in(job.stl, job.stl_name)
     assert job.unit is not None
     solid = build_solid(job.unit, job.window, job.quality)
     return solid.vertices, solid.triangles
@@ -104,44 +100,21 @@ def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
     return solid.vertices, solid.triangles
 
 
-def read_surface(content: bytes, name: str) -> tuple[Vertices, Triangles]:
-    """Surface of a binary or text STL, equal corners merged; raises InputError."""
+def part_in(content: bytes, name: str) -> tuple[Vertices, Triangles]:
+    """Surface of a part's STL, OBJ or PLY file, equal corners merged; raises InputError."""
     again = "export the part again"
-    if len(content) == 84:
-        raise InputError("the STL file holds no triangles", name, again)
-    binary = len(content) == 84 + 50 * (count := int.from_bytes(content[80:84], "little"))
-    if not binary:
-        count = content.count(b"vertex") // 3
-    if count > MOST_TRIANGLES:
-        raise InputError(
-            f"the STL file holds {count} triangles",
-            name,
-            f"simplify it to {MOST_TRIANGLES} at most, or check its parts one by one",
-        )
-    vertices, triangles = stl_surface(content) if binary else _text_stl(content, name)
+    vertices, triangles = read_surface(content, name, MOST_TRIANGLES)
     if not len(triangles):
-        raise InputError("the STL file holds no triangles", name, again)
+        raise InputError("the file holds no triangles", name, again)
+    if len(triangles) > MOST_TRIANGLES:
+        raise InputError(
+            f"the file holds {len(triangles)} triangles", name, f"simplify it to {MOST_TRIANGLES} at most"
+        )
     if not np.isfinite(vertices).all():
-        raise InputError("the STL file holds numbers that are not finite", name, again)
+        raise InputError("the file holds numbers that are not finite", name, again)
     if (farthest := float(np.abs(vertices).max())) > MOST_MM:
         raise InputError(f"a coordinate of {farthest:.3g} mm lies beyond {MOST_MM:g} mm", name, again)
     return vertices, triangles
-
-
-def _text_stl(content: bytes, name: str) -> tuple[Vertices, Triangles]:
-    try:
-        if content[:_HEAD].split()[:1] != [b"solid"]:
-            raise ValueError("no STL")
-        words = (float(word) for corner in _CORNER.finditer(content) for word in corner.groups())
-        corners = np.fromiter(words, float).reshape(-1, 3)
-        if len(corners) != sum(1 for _ in _VERTEX.finditer(content)):
-            raise ValueError("a corner without its three numbers")
-        vertices, index = np.unique(corners, axis=0, return_inverse=True)
-        return vertices, np.ravel(index).reshape(-1, 3).astype(np.int64)
-    except ValueError as error:
-        raise InputError(
-            "the STL file is truncated or malformed", name, "export the part again as binary STL"
-        ) from error
 
 
 def require_whole(mended: Repair, name: str) -> None:

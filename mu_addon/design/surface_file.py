@@ -1,0 +1,155 @@
+"""Surfaces in files of other programs: STL, OBJ and PLY, read as points and triangles."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import re
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .surface import Triangles, Vertices, stl_surface
+
+SUFFIXES = (".stl", ".obj", ".ply")
+_VERTEX = re.compile(r"(?<!\S)vertex(?!\S)")
+_CORNER = re.compile(_VERTEX.pattern + r"\s+(\S+)\s+(\S+)\s+(\S+)")
+# What meshio raises over a PLY file that is not what it says.
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
+
+
+def read_surface(content: bytes, name: str, most_triangles: int | None = None) -> tuple[Vertices, Triangles]:
+    """Points (n, 3) and triangles (m, 3) of a file's content; polygons are triangulated in their plane.
+
+    name: of the file, whose suffix tells OBJ and PLY; all else is STL, binary or text. most_triangles: refuse
+    an STL file with more before it is parsed. Raises InputError with the line or number at fault.
+    """
+    suffix = PurePath(name).suffix.lower()
+    if suffix == ".obj":
+        points, triangles = _obj(_text(content), name)
+    elif suffix == ".ply" or content[:3] == b"ply":
+        points, triangles = _ply(content, name)
+    else:
+        return _stl(content, name, most_triangles)
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(points):
+        raise _malformed(name, "a face names a point that the file does not have")
+    return points, triangles
+
+
+def _text(content: bytes) -> str:
+    """Text of any line ends, with what is no ASCII, in names, left as it is."""
+    return content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _malformed(name: str, why: str) -> InputError:
+    return InputError(f"the file is truncated or malformed: {why}", name, "export it again, whole")
+
+
+def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangles]:
+    count = int.from_bytes(content[80:84], "little")
+    binary = len(content) >= 84 and len(content) == 84 + 50 * count
+    if not binary:
+        text = _text(content).lower()
+        count = sum(1 for _ in _VERTEX.finditer(text)) // 3
+    if most is not None and count > most:
+        raise InputError(
+            f"the STL file holds {count} triangles",
+            name,
+            f"simplify it to {most} at most, or check its parts one by one",
+        )
+    return stl_surface(content) if binary else _text_stl(text, name)
+
+
+def _text_stl(text: str, name: str) -> tuple[Vertices, Triangles]:
+    if not text.lstrip().startswith("solid"):
+        raise _malformed(name, "no STL begins so, or has that length")
+    try:
+        words = (float(word) for corner in _CORNER.finditer(text) for word in corner.groups())
+        corners = np.fromiter(words, float).reshape(-1, 3)
+        if len(corners) != sum(1 for _ in _VERTEX.finditer(text)) or len(corners) % 3:
+            raise ValueError("a corner without its three numbers")
+    except ValueError as error:
+        raise _malformed(name, str(error)) from error
+    if not len(corners):
+        raise InputError("the STL file holds no triangles", name, "export the part again")
+    points, index = np.unique(corners, axis=0, return_inverse=True)
+    return points, np.ravel(index).reshape(-1, 3).astype(np.int64)
+
+
+def _obj(text: str, name: str) -> tuple[Vertices, Triangles]:
+    """A Wavefront OBJ's points and faces: corners may have texture and normal, and count from the end."""
+    points: list[list[float]] = []
+    faces: list[list[int]] = []
+    begun = ""
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.endswith("\\"):
+            begun += line[:-1] + " "
+            continue
+        words, begun = (begun + line).split("#")[0].split(), ""
+        try:
+            if words[:1] == ["v"]:
+                x, y, z = map(float, words[1:4])
+                points.append([x, y, z])
+            elif words[:1] == ["f"]:
+                corners = [int(word.split("/")[0]) for word in words[1:]]
+                if len(corners) < 3 or 0 in corners:
+                    raise ValueError("a face needs three corners or more, counted from 1")
+                faces.append([c - 1 if c > 0 else len(points) + c for c in corners])
+        except ValueError as error:
+            raise _malformed(name, f"line {number}: {error}") from error
+    at = np.array(points, float).reshape(-1, 3)
+    if any(not 0 <= c < len(at) for face in faces for c in face):
+        raise _malformed(name, "a face names a point that the file does not have")
+    return at, _triangles(at, faces)
+
+
+def _triangles(points: Vertices, faces: list[list[int]]) -> Triangles:
+    """Triangles (m, 3) of flat polygons, each given by its corners; they need not be convex."""
+    from manifold3d import triangulate
+
+    found: list[Any] = [np.empty((0, 3), np.int64)]
+    for face in faces:
+        if len(face) == 3:
+            found.append([face])
+            continue
+        corners = points[face]
+        # Newell's normal, whose length is twice the area.
+        normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+        if not (np.isfinite(normal).all() and normal.any()):
+            found.append([[face[0], *pair] for pair in itertools.pairwise(face[1:])])
+            continue
+        u = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
+        v = np.cross(normal, u)
+        flat = corners @ np.column_stack([u / np.linalg.norm(u), v / np.linalg.norm(v)])
+        found.append(np.array(face)[np.asarray(triangulate([flat]), np.int64)])
+    return np.concatenate([np.asarray(part, np.int64).reshape(-1, 3) for part in found])
+
+
+def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
+    from meshio import ReadError
+    from meshio.ply._ply import read_buffer
+
+    head = content[: 1 << 16]
+    # meshio waits for the header's end for ever.
+    if b"end_header" not in head:
+        raise _malformed(name, "the header of the PLY file does not end")
+    if b"format ascii" in head:
+        content = _text(content).encode()
+    # Both names are in use.
+    content = content.replace(b" vertex_index\n", b" vertex_indices\n", 1)
+    try:
+        mesh = read_buffer(io.BytesIO(content))
+        corners = [np.asarray(face) for block in mesh.cells for face in block.data if len(face) > 2]
+        if any(not np.issubdtype(face.dtype, np.integer) for face in corners):
+            raise ValueError("a corner of a face is no whole number")
+        faces = [face.tolist() for face in corners]
+        points = np.asarray(mesh.points, float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError("a point without its three numbers")
+        if any(not 0 <= c < len(points) for face in faces for c in face):
+            raise ValueError("a face names a point that the file does not have")
+        return points, _triangles(points, faces)
+    except (*_DAMAGED, ReadError) as error:
+        raise _malformed(name, str(error) or "the PLY file is damaged") from error
