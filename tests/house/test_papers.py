@@ -66,6 +66,13 @@ def test_links_in_the_papers_lead_somewhere():
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
+def test_every_picture_is_on_a_page():
+    pages = "".join(
+        p.read_text(encoding="utf-8") for p in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    )
+    assert [p.name for p in (ROOT / "docs" / "pictures").iterdir() if f"pictures/{p.name}" not in pages] == []
+
+
 def test_every_command_of_the_pages_is_one():
     """Options and their choices as the command line has them; nothing is run."""
     refused, count = [], 0
