@@ -161,6 +161,24 @@ def test_the_messages_that_the_page_explains_are_those_of_the_code():
     assert [words for words in quoted if not _is_a_message(words)] == []
 
 
+def _labels(text):
+    """Names of buttons and fields, in italics in a page of the guide, each part of "A > B" by itself."""
+    text = re.sub(
+        r"```.*?```|\*\*[^*]+\*\*|\]\([^)]*\)",
+        "",
+        text.split("## When something is wrong")[0],
+        flags=re.DOTALL,
+    )
+    for found in re.findall(r"(?<![*\w])\*([A-Z][^*]+)\*(?!\*)", text):
+        yield from re.split(r" > |: ", " ".join(found.split()))
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "guide").glob("*.md")), ids=lambda page: page.stem)
+def test_the_labels_of_the_guide_are_those_of_the_code(page):
+    missing = [label for label in _labels(page.read_text(encoding="utf-8")) if not _is_a_message(label)]
+    assert missing == []
+
+
 @pytest.mark.parametrize(
     ("quoted", "expected"),
     [
