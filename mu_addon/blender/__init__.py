@@ -57,6 +57,7 @@ _MODULES = (
     "node_tree.groups",
     "node_tree.operators",
     "scene.dropping",
+    "simulate.timings",
     # What draws; panels stand in the sidebar in this order, that of the work.
     "unit.panel",
     "steps.panel",

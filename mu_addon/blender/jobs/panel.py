@@ -13,10 +13,10 @@ STAGE_LETTERS = 20
 """What fits into a panel's bar beside number and time left: a longer stage is numbered alone."""
 
 
-def start_button(layout, child, operator: str, icon: str) -> None:
+def start_button(layout, child, operator: str, icon: str, **settings) -> None:
     """The button that starts a job, unless its child runs or waits."""
     if child is None or child.state not in (RUNNING, WAITING):
-        large_button(layout, operator, icon)
+        large_button(layout, operator, icon, **settings)
 
 
 def job_state(layout, child, where: str, prefix: str = "") -> None:

@@ -11,7 +11,7 @@ from ..body import state as bodies
 from ..jobs.start_child import JobKind
 from ..obstacles import state as obstacles
 from ..unit.properties import to_unit
-from . import effects
+from . import effects, timings
 from . import study_folder as studies
 
 if TYPE_CHECKING:
@@ -20,12 +20,24 @@ if TYPE_CHECKING:
 
 def plan_of(root: Any) -> list[tuple[str, float]]:
     """Stages that a unit's simulation is expected to go through, with the seconds that each takes."""
+    return _expected(root)[0]
+
+
+def announced(root: Any) -> tuple[float, bool]:
+    """Seconds that a unit's simulation is expected to take, and whether by what was measured here."""
+    plan, known = _expected(root)
+    return sum(seconds for _, seconds in plan), known
+
+
+def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
+    """The plan, and whether all that takes long in it was measured: of this unit, else of another one."""
     from ...usecases.simulate_and_place.expected import FULL_S, PACE, SOLVED, stage_names
 
     settings = root.mu_unit.study
     names = stage_names(settings.command == "place", settings.detail != "quick", settings.paths == "graph")
     alike = (run.summary.get("seconds") for run in studies.runs_of(root) if run.detail == settings.detail)
-    taken = next((s for s in alike if isinstance(s, dict) and set(names) <= set(s)), {})
+    own = next((s for s in alike if isinstance(s, dict) and set(names) <= set(s)), {})
+    taken = {**timings.measured(settings.detail), **own}
 
     def seconds(name: str) -> float:
         value = taken.get(name)
@@ -33,7 +45,7 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
             return float(value)
         return FULL_S[name] * (PACE[settings.detail] if name in SOLVED else 1.0)
 
-    return [(name, seconds(name)) for name in names]
+    return [(name, seconds(name)) for name in names], all(name in taken for name in names if name in SOLVED)
 
 
 SIMULATION = JobKind(

@@ -9,7 +9,7 @@ from ..jobs import start_child
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, parameters, wrapped
 from . import effects
-from .job import SIMULATION
+from .job import SIMULATION, announced
 
 
 class MU_PT_simulate(UnitPanel, bpy.types.Panel):
@@ -46,7 +46,9 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         layout.prop(study, "protocol")
         _effects(layout, root)
         child = SIMULATION.child(root)
-        start_button(layout, child, "mu.simulate", "PLAY")
+        start_button(layout, child, "mu.simulate", "PLAY", text=start_words(root))
+        if child is None and not announced(root)[1]:
+            wrapped(layout, "Perhaps: no such run was timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
         others = [key for key in start_child.running() if key != SIMULATION.key(root)]
         if others:
@@ -61,6 +63,23 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             body.prop(study, "solver")
             body.prop(study, "device")
             body.prop(study, "folder")
+
+
+def start_words(root) -> str:
+    """What the button says: the job, and what it takes by what was measured on this machine."""
+    seconds, measured = announced(root)
+    return f"Simulate, {'about' if measured else 'perhaps'} {rounded(seconds)}"
+
+
+def rounded(seconds: float) -> str:
+    """A duration to about a tenth: "40 s", "9 min", "3 h 30 min"."""
+    if seconds < 90.0:
+        return f"{max(10 * round(seconds / 10.0), 10)} s"
+    minutes = round(seconds / 60.0)
+    if minutes >= 20:
+        minutes = 5 * round(minutes / 5.0)
+    hours = f"{minutes // 60} h " if minutes >= 60 else ""
+    return f"{hours}{minutes % 60} min".removesuffix(" 0 min")
 
 
 def _effects(layout, root) -> None:

@@ -19,7 +19,7 @@ from ..shared.panels import (
     parameters,
     wrapped,
 )
-from . import figures
+from . import figures, next_step
 from . import object as unit_object
 from .broken import broken
 
@@ -106,8 +106,7 @@ def _head(layout, root) -> None:
     if len(mending) > 1:
         row.operator("mu.fit_all", text=f"Fix All {len(mending)}")
     if not mending:
-        # So much room in any case: what is below does not move.
-        row.label(text="")
+        next_step.draw(row, root)
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):

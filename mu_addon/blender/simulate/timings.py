@@ -1,0 +1,68 @@
+"""How long the stages of simulations took on this machine: what a new one is announced with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ...errors import MuError
+from ...files import write_text
+from ...reading import file_bytes, parse_json
+from ...run.child import DONE
+from ...usecases.simulate_and_place import history
+from ..jobs import start_child
+from ..shared.compat import user_folder
+from ..shared.file_cache import UNREADABLE, FileCache
+
+LEAST_SHARE = 0.05
+"""A stage that took less than this share of what it took before was found in the cache, and tells nothing."""
+
+_kept: FileCache[dict[str, dict[str, float]]] = FileCache()
+
+
+def _file() -> Path:
+    return user_folder() / "timings.json"
+
+
+def measured(detail: str) -> dict[str, float]:
+    """Seconds that each stage of a simulation of that detail took here last; empty before the first one."""
+    path = _file()
+    found: Any = (_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}).get(detail)
+    if not isinstance(found, dict):
+        return {}
+    return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
+
+
+def note(detail: str, seconds: dict[str, float]) -> None:
+    """Keep how long the stages of a simulation took that has ended well. Raises OutputError."""
+    before = measured(detail)
+    real = {name: s for name, s in seconds.items() if s >= LEAST_SHARE * before.get(name, 0.0)}
+    path = _file()
+    every: dict[str, Any] = dict(_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {})
+    write_text(path, json.dumps({**every, detail: {**before, **real}}, indent=1) + "\n")
+
+
+def _ended(key: str) -> None:
+    child = start_child.child_of(key)
+    if child is None or child.state != DONE or not key.endswith(":simulate"):
+        return
+    try:
+        run = history.read_run(child.folder.parent)
+        seconds = run.summary.get("seconds")
+        if isinstance(seconds, dict):
+            note(run.detail, {str(name): float(s) for name, s in seconds.items()})
+    except (MuError, *UNREADABLE):
+        # What cannot be kept is not announced; the results are there.
+        return
+
+
+def register() -> None:
+    """Listen for simulations that end."""
+    start_child.JOB_ENDED.connect(_ended)
+
+
+def unregister() -> None:
+    """Listen no more."""
+    start_child.JOB_ENDED.disconnect(_ended)
+    _kept.clear()

@@ -1,0 +1,32 @@
+"""The one thing to do next with a unit, for the head of its panel."""
+
+from __future__ import annotations
+
+from ..jobs.panel import whole
+from ..shared.texts import path_symbol
+from ..simulate import study_folder as studies
+from ..simulate.job import SIMULATION
+from ..simulate.panel import start_words
+from . import object as unit_object
+
+LETTERS = 14
+"""Of the name of a stage that runs; a longer one is numbered."""
+
+
+def draw(row, root) -> None:
+    """One button, or how the simulation stands that runs; as high either way."""
+    if SIMULATION.is_running(root):
+        fraction, text = whole(SIMULATION.child(root), LETTERS)
+        row.progress(factor=fraction, text=text)
+        return
+    found = studies.findings(root)
+    if found is None or found.stale or not found.run.complete:
+        row.operator("mu.simulate", text=start_words(root), icon="PLAY")
+        return
+    best = found.ranking[0][0] if found.ranking else ""
+    if best and root.mu_unit.path != best:
+        row.operator("mu.path", text=f"Use Path {path_symbol(best)}", icon="CON_FOLLOWPATH").name = best
+    elif not unit_object.solid_is_current(root):
+        row.operator("mu.solid", text="Build Solid", icon="MESH_DATA")
+    else:
+        row.operator("mu.print_check", text="Check the Print", icon="VIEWZOOM")
