@@ -25,8 +25,8 @@ BESIDE = 190
 def lines(known: ranking.Known) -> list[str]:
     """Lines above the ramp: what it shows, and where the ranking is stale, that it is."""
     if known.stale:
-        return ["J of the paths", "stale: ranked with other parameters, hence grey"]
-    return ["J of the paths [mm], dark is best"]
+        return ["Mean deviation", "stale: ranked with other parameters, hence grey"]
+    return ["Mean deviation [mm], smaller is better"]
 
 
 def marks(known: ranking.Known) -> list[tuple[float, str]]:

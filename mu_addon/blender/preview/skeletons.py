@@ -141,11 +141,11 @@ def bar(found: Bar | None) -> Skeleton | None:
     return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots, smooth=False)
 
 
-def candidates(unit: Unit, order: Sequence[str], cut: bool) -> dict[str, Skeleton]:
+def candidates(unit: Unit, cut: bool) -> dict[str, Skeleton]:
     """Every candidate path by name on the lattice's face toward +x or, with `cut`, on its section.
 
     All of them run along one column of anchors, where they would cover each other: seen from +x each has its
-    true length and height, and a lane of its own, side by side. order: names, the first beside the anchors.
+    true length and height, and a lane of its own, side by side. A ranking moves none of them.
     """
     d = unit.dimensions
     at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0
@@ -156,7 +156,7 @@ def candidates(unit: Unit, order: Sequence[str], cut: bool) -> dict[str, Skeleto
     lane = min(WIDEST_LANE * d.cell, (high - low) / len(known))
     front = (0.0 if cut else d.bounds[0][1]) + 1.5 * radius
     found = {}
-    for number, name in enumerate(sorted(known, key=lambda n: order.index(n) if n in order else len(order))):
+    for number, name in enumerate(known):
         points = at[list(known[name].indices)].copy()
         points[:, 0] = front
         points[:, 1] = edge - side * lane * (number + 0.5)

@@ -109,11 +109,11 @@ def own_mesh(root: Any, mesh: Any | None, others: list[Any]) -> Any:
 
 
 def put_candidates(root: Any, unit: Unit, shown: bool) -> None:
-    """Draw every candidate path on the lattice, in the order and colour of its J if it is known, or none."""
+    """Draw every candidate path on the lattice, in the colour of its J if it is known, or none."""
     drawn: dict[str, Skeleton] = {}
     if shown:
-        order, cut = list(ranking.known(root).j), root.mu_unit.cut
-        drawn = {CANDIDATE + name: path for name, path in skeletons.candidates(unit, order, cut).items()}
+        lanes = skeletons.candidates(unit, root.mu_unit.cut)
+        drawn = {CANDIDATE + name: path for name, path in lanes.items()}
         found = ranking.free(root)
         if found is not None:
             name, _, points = found

@@ -309,10 +309,10 @@ def test_candidates_say_their_rank(study):
     colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
     assert len(colours) == 9
     assert not unit_object.behind(root)
-    # They lie on the lattice, the best beside the anchors; each at its own height.
+    # They lie on the lattice in the order of their names, whatever the ranking; each at its own height.
     order = [name for name, _ in sorted(known.items(), key=lambda item: item[1][1])]
     ends = {name: motion_parts.vertices_of(tube.data) for name, tube in tubes.items()}
-    places = [ends[name][0, 1] for name in order]
+    places = [ends[f"alpha{number}"][0, 1] for number in range(1, 11)]
     assert places == sorted(places, reverse=True)
     low, high = to_unit(root.mu_unit).dimensions.bounds[1]
     assert low < places[-1] < places[0] < high
