@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import attrs
 
-from .formats import without_colour
+from .formats import text_of, without_colour
+from .lines import why_unread
 
 # So many bytes without a format are enough to say what is wrong with them; the latest are looked at.
 _COMPLAINT_BYTES, _LATEST_BYTES = 400, 4096
@@ -65,6 +66,7 @@ class Accounts:
         self.counters = Counters()
         self.rejects: list[Reject] = []
         self._unrecognised = b""
+        self._first_line = ""
 
     def read(self, piece: bytes) -> None:
         """Count a line or frame that was read."""
@@ -94,6 +96,7 @@ class Accounts:
         for line in lines:
             self._unrecognised = (self._unrecognised + line + b"\n")[-_LATEST_BYTES:]
             if without_colour(line).strip():
+                self._first_line = self._first_line or text_of(line) or ""
                 self.reject(line + b"\n", "malformed")
             else:
                 self.read(line + b"\n")
@@ -114,10 +117,10 @@ class Accounts:
         self._unrecognised = (self._unrecognised + piece)[-_LATEST_BYTES:]
         self.unended(piece)
 
-    def complaint(self, buffered: bytes) -> tuple[str, str] | None:
-        """Fault of input in no known format, and what to do; None while too little is known."""
+    def complaint(self, buffered: bytes, least: int = _COMPLAINT_BYTES) -> tuple[str, str] | None:
+        """Fault of input in no known format, and what to do; None while less than `least` bytes came."""
         unread = self.counters.bytes - self.counters.read_bytes
-        if unread < _COMPLAINT_BYTES or 20 * self.counters.read_bytes > self.counters.bytes:
+        if unread < least or 20 * self.counters.read_bytes > self.counters.bytes:
             return None
         seen = without_colour(self._unrecognised + buffered[-_LATEST_BYTES:])
         shown = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in seen)
@@ -127,7 +130,11 @@ class Accounts:
                 "give the rate of the device's Serial.begin(...) by --baud (9600, 57600, 115200, ...), "
                 "and check the wiring and the port",
             )
+        # The first piece may be the rest of a line.
+        _, *whole = seen.split(b"\n") if seen.count(b"\n") > 1 else [b"", seen]
+        first = self._first_line or next((text for line in whole if (text := text_of(line))), "")
+        quoted = f": the first line is {first[:80]!r}, in which {why_unread(first)}" if first else ""
         return (
-            "what comes is text in no format that is known",
+            f"what comes is text in no format that is known{quoted}",
             "send `label:value` pairs, CSV, JSON lines or frames (docs/guide/bench.md), or try another port",
         )

@@ -102,6 +102,11 @@ class Decoder:
         """Fault of input of which almost nothing can be read, and what to do; else None."""
         return None if self.format is not None else self._accounts.complaint(bytes(self._buffer))
 
+    @property
+    def why_no_sample(self) -> tuple[str, str] | None:
+        """As `complaint`, however little came, where nothing could be read by the end; else None."""
+        return None if self.counters.samples else self._accounts.complaint(bytes(self._buffer), 1)
+
     # The buffer.
 
     def _flush_buffer(self) -> None:

@@ -1,7 +1,8 @@
 """Text on a serial line: `label:value` pairs, CSV, or JSON, a line at a time.
 
-A value's name may say that it is the device's clock or its running number (see CLOCKS and NUMBERS);
-everything else is a channel.
+A value may have its unit behind it, and volts with a prefix are converted; a label's value that is a word is
+left out. A value's name may say that it is the device's clock or its running number (see CLOCKS and
+NUMBERS); everything else is a channel.
 """
 
 from __future__ import annotations
@@ -31,9 +32,23 @@ _MOST_COUNT, _MOST_S = 2.0**53, 1e10
 _LABEL = r"[A-Za-z_][A-Za-z0-9_.%/()\- ]*"
 # Possessive (++, *+): a line of noise costs time in proportion to its length.
 _NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?|nan|NaN"
-_PAIR = re.compile(rf"\s*+({_LABEL}+)\s*+[:=]\s*+({_NUMBER})(?:\s*+[,;]|\s++|$)")
+_TO_VOLT = {"mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "kV": 1e3}
+_UNITS = (
+    *_TO_VOLT, "V", "mA", "uA", "µA", "A", "mW", "W", "kOhm", "kohm", "Ohm", "ohm", "kΩ", "Ω", "%RH", "%",
+    "°C", "°F", "degC", "degF", "deg", "°", "rad", "kPa", "MPa", "hPa", "Pa", "mbar", "bar", "psi", "mmHg",
+    "mm", "cm", "m", "kN", "mN", "N", "kg", "g", "lux", "lx", "kHz", "Hz", "us", "µs", "ms", "s",
+    "K", "C", "F",
+)  # fmt: skip
+# Of Greek letters and signs both that Unicode has; before a unit blanks, behind it no word and no other pair.
+_UNIT = rf"(?:\s*+({'|'.join(_UNITS)})(?![\w%°/]|\s*+[:=]))?"
+_END = r"(?:\s*+[,;]|\s++|$)"
+_PAIR = re.compile(rf"\s*+({_LABEL}+)\s*+[:=]\s*+({_NUMBER}){_UNIT}{_END}")
+# Letters alone: with a digit it may be a number that was damaged, as infinities are.
+_WORD_PAIR = re.compile(rf"\s*+{_LABEL}+\s*+[:=]\s*+(?!(?i:inf|infinity|nan)\b)[A-Za-z][A-Za-z_-]++{_END}")
 _NAME = re.compile(rf"{_LABEL}\Z")
-_VALUE = re.compile(rf"(?:{_NUMBER})\Z")
+_VALUE = re.compile(rf"({_NUMBER}){_UNIT}\Z")
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+_SAME_SIGNS = str.maketrans({"\u03bc": "\u00b5", "\u2126": "\u03a9", "\u00ba": "\u00b0"})
 
 Pairs = dict[str, float]
 
@@ -41,18 +56,53 @@ Pairs = dict[str, float]
 def pairs_of(line: str) -> Pairs | None:
     """Values by label of a text line `light:512,ref:300`, or None where the line is not such pairs.
 
+    A `>` before them, as Teleplot has it, is passed over. With semicolons between pairs a comma is decimal.
+
     >>> pairs_of("light:512,ref:300")
     {'light': 512.0, 'ref': 300.0}
+    >>> pairs_of("light=1.23 V dark=20 mV state=OPEN")
+    {'light': 1.23, 'dark': 0.02}
     """
+    found, _ = _pairs_until(line)
+    return None if found is None else _readable(found)
+
+
+def _pairs_until(line: str) -> tuple[Pairs | None, str]:
+    """The pairs of a line and nothing, or None and the rest that is no pair or names one again."""
+    line = line.translate(_SAME_SIGNS).removeprefix(">")
+    if ";" in line:
+        line = _DECIMAL_COMMA.sub(".", line)
     found: Pairs = {}
     place = 0
     while place < len(line):
         match = _PAIR.match(line, place)
+        if match is None and (word := _WORD_PAIR.match(line, place)):
+            place = word.end()
+            continue
         if match is None or match[1].strip() in found:
-            return None
-        found[match[1].strip()] = float(match[2])
+            return None, line[place:].strip()
+        found[match[1].strip()] = _value(match[2], match[3])
         place = match.end()
-    return _readable(found)
+    return found, ""
+
+
+def _value(number: str, unit: str | None) -> float:
+    return float(number) * _TO_VOLT.get(unit or "", 1.0)
+
+
+def why_unread(line: str) -> str:
+    """What of a line is neither pairs, CSV nor JSON, in words."""
+    if not any(character.isdigit() for character in line):
+        return "it holds no number"
+    if line.startswith("{"):
+        return "it is no whole JSON object of numbers"
+    if ":" in line or "=" in line:
+        found, rest = _pairs_until(line)
+        if found:
+            return "a number in it is too large"
+        return f"{rest[:40]!r} is no `label:value`" if found is None else "no value in it is a number"
+    cell = next((cell for cell in _cells(line) if not _VALUE.match(cell)), "")
+    return f"{cell[:40]!r} is no number, and has no label before it" if cell else "a number is too large"
 
 
 def json_of(line: str) -> Pairs | None:
@@ -110,16 +160,19 @@ def row_of(line: str) -> list[float] | None:
     >>> row_of("1.5,2"), row_of("time,light")
     ([1.5, 2.0], None)
     """
-    cells = _cells(line)
-    if not cells or not all(_VALUE.match(cell) for cell in cells):
-        return None
-    row = [float(cell) for cell in cells]
-    return None if any(map(math.isinf, row)) else row
+    matches = [_VALUE.match(cell) for cell in _cells(line.translate(_SAME_SIGNS))]
+    row = [_value(match[1], match[2]) for match in matches if match is not None]
+    return None if not row or len(row) < len(matches) or any(map(math.isinf, row)) else row
 
 
 def _cells(line: str) -> list[str]:
-    """Cells between commas, semicolons or tabs, or between blanks where there is none of these."""
-    for separator in ",;\t":
+    """Cells between semicolons, commas or tabs, or between blanks where there is none of these.
+
+    Between semicolons a comma is decimal.
+    """
+    if ";" in line:
+        return [_DECIMAL_COMMA.sub(".", cell.strip()) for cell in line.split(";")]
+    for separator in ",\t":
         if separator in line:
             return [cell.strip() for cell in line.split(separator)]
     return line.split()

@@ -303,7 +303,7 @@ class _View:
         """The last status, with everything on disk."""
         self.state = "ended"
         self.recorder.tick(np.inf, attrs.asdict(self.decoder.counters))
-        status = {**self.status(now), "live": ""}
+        status = {**self.status(now), "live": "", "complaint": list(self.decoder.why_no_sample or ())}
         self._write_status(status)
         return status
 

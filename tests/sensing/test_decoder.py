@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.errors import MuError
 from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.samples import Samples
+from mu_addon.usecases.sensor.stream import require_samples
 
 INFO = info_frame({"channels": ["light", "dark"], "unit": "V", "unit_per_count": 0.001})
 
@@ -244,3 +246,62 @@ def test_json_values_of_all_kinds() -> None:
     lines = [json.dumps({"a": k, "on": True, "list": [1], "t_ms": 10 * k}) for k in range(30)]
     groups = fed(Decoder(), ("\n".join(lines) + "\n").encode())
     assert groups[0].layout.channels == ("a", "on")
+
+
+LINES_AS_SENT = {
+    "Voltage: 1.23 V": {"Voltage": 1.23},
+    "light:1.23V,dark:0.020V": {"light": 1.23, "dark": 0.02},
+    "light=1.23 V dark=20 mV": {"light": 1.23, "dark": 0.02},
+    "Humidity: 40.00%  Temperature: 24.00°C": {"Humidity": 40.0, "Temperature": 24.0},
+    "R: 4.7 kΩ; force: 1.5 N": {"R": 4.7, "force": 1.5},
+    "light:512\tstate:OPEN": {"light": 512.0},
+    "state=OPEN light=512": {"light": 512.0},
+    ">light:1.23": {"light": 1.23},
+    "light: 1,23; dark: 0,02": {"light": 1.23, "dark": 0.02},
+    "a:1 g=2": {"a": 1.0, "g": 2.0},
+    "1.23V,0.020V": {"channel1": 1.23, "channel2": 0.02},
+    "1,230;0,020": {"channel1": 1.23, "channel2": 0.02},
+    "850 mV\t1.5 V": {"channel1": 0.85, "channel2": 1.5},
+}
+
+
+@pytest.mark.parametrize("line", LINES_AS_SENT)
+def test_values_with_units_words_and_decimal_commas_are_read(line):
+    wanted, decoder = LINES_AS_SENT[line], Decoder()
+    groups = decoder.feed(f"{line}\r\n".encode() * 60, 0.0) + decoder.finish(1.0)
+    assert sum(len(group.values) for group in groups) == 59, "all but the first, which may be cut"
+    assert dict(zip(groups[0].layout.channels, groups[0].values[-1].tolist(), strict=True)) == pytest.approx(
+        wanted
+    )
+    assert decoder.why_no_sample is None
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("Sensor ready", "it holds no number"),
+        ("light:5a2,dark:1", "'light:5a2,dark:1' is no `label:value`"),
+        ("light 512 of 1023", "'light' is no number"),
+        ('{"light": 512', "no whole JSON object"),
+    ],
+)
+def test_the_first_line_that_is_not_understood_is_shown(line, why):
+    decoder = Decoder()
+    decoder.feed(f"{line}\r\n".encode() * 5, 0.0)
+    decoder.finish(1.0)
+    what, remedy = decoder.why_no_sample
+    assert repr(line) in what
+    assert why in what
+    assert "label:value" in remedy
+
+
+def test_a_session_without_a_sample_fails_with_what_to_do(tmp_path):
+    silent = {"rows": 0, "bytes": 0, "complaint": [], "duration_s": 4.0, "port": "COM3"}
+    with pytest.raises(MuError, match=r"nothing came in 4\.0 s") as caught:
+        require_samples(silent, tmp_path)
+    assert caught.value.status == 1
+    assert all(word in caught.value.remedy for word in ("--baud", "reset", "DTR", "another port", "waits"))
+    unread = silent | {"bytes": 50, "complaint": ["text in no format", "send CSV"]}
+    with pytest.raises(MuError, match="text in no format"):
+        require_samples(unread, tmp_path)
+    require_samples(silent | {"rows": 1}, tmp_path)

@@ -14,7 +14,7 @@ from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.usecase import UseCase
 from ...sensing.session import Control, run_session
 from ...toml_writer import toml_text
-from .stream import console_summary, ctrl_c_stops, serial_source, simulated_source
+from .stream import console_summary, ctrl_c_stops, require_samples, serial_source, simulated_source
 
 LAYOUT = FolderLayout(
     "record.toml",
@@ -87,10 +87,7 @@ def record(job: Job, folder: Path, context: RunContext) -> Path:
             str(place),
             "evaluate again: it is recorded anew; what there is stays in that folder",
         )
-    if not status["rows"]:
-        raise InputError(
-            "nothing came from the sensor", str(place), "check its cable, its power and its firmware"
-        )
+    require_samples(status, place)
     return place
 
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-from ...errors import InputError
+from ...errors import InputError, MuError
 from ...run.context import RunContext
 from ...run.progress import Sink, printable
 from ...sensing.calibration import deriver, read_calibration
@@ -103,6 +103,25 @@ def stream(
             derive=derive,
         )
     context.summary.update(status)
+    if not controlled:
+        require_samples(status, folder)
+
+
+def require_samples(status: Mapping[str, Any], folder: Path) -> None:
+    """Raise MuError, with what to do, where a session that has ended recorded nothing; status: its last."""
+    if status["rows"]:
+        return
+    if status["complaint"]:
+        what, remedy = status["complaint"]
+        raise MuError(f"nothing was recorded: {what}", str(folder), remedy)
+    what = f"{status['bytes']} bytes came, and no whole sample" if status["bytes"] else "nothing came"
+    raise MuError(
+        f"nothing was recorded: {what} in {status['duration_s']:.1f} s",
+        f"port {status['port'] or '(none found)'}",
+        "press reset on the board (some restart, or stay silent, as DTR is set when the port opens); give "
+        "the rate of the sketch's Serial.begin(...) by --baud; try another port (`ports` lists them); a "
+        "sketch that waits for a command or a button sends nothing until then",
+    )
 
 
 @contextmanager
