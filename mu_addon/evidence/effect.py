@@ -10,6 +10,10 @@ from ..errors import InputError
 
 # Another modulus of one specimen: an effect of specimens alone, see `owned`.
 BATCH = "batch_variation"
+# A height that was mistyped, a change between two tests, what fast tests have: of some experiments alone.
+GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
+# Effects that multiply the modulus in the experiments whose they are.
+SCALES = frozenset((BATCH, STEP, HEATING))
 # Another place of one marker from some moment on, see `prediction.marker_slip`.
 SLIP = "marker_slip"
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
@@ -46,9 +50,9 @@ LIBRARY = {
         "the zero of the pressure gauge drifts while it records",
         "the same hold at another pressure; the gauge read at rest for as long",
     ),
-    "force_gain": (
-        "the load cell has a gain error",
-        "a dead weight hung from the load cell, before and after",
+    "force_scale": (
+        "the force is scaled: load cell, section as typed, clamping or specimen",
+        "a dead weight on the load cell, the section measured, the specimen clamped anew",
     ),
     "force_drift": (
         "the zero of the load cell drifts while it records",
@@ -115,7 +119,19 @@ LIBRARY = {
     ),
     BATCH: (
         "the modulus of one specimen differs from that of the others",
-        "another specimen of the same print",
+        "another specimen in its place, its height and section measured, clamped anew",
+    ),
+    GEOMETRY: (
+        "a specimen's height is not what was typed, which scales its strain",
+        "the specimen measured with a calliper",
+    ),
+    STEP: (
+        "between two tests something changed and stayed so: a clamp, a setting, damage",
+        "the first test again",
+    ),
+    HEATING: (
+        "fast tests are scaled: the specimen warms itself and softens, or its rate stiffens it",
+        "the fast test after a pause, and with the rate of the slow one",
     ),
     "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }

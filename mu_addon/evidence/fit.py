@@ -13,6 +13,7 @@ from ..errors import MuError
 from .effect import Effect, Parameter
 from .noise import Source, Whitening, estimate
 from .record import Record
+from .scatter import bounded
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -153,12 +154,14 @@ class Fitter:
     def under_its_own_noise(self, fit: Fit) -> tuple[Fitter, Fit]:
         """A fitter with the noise that a fit's residual shows if it has no cause, and the fit redone by it.
 
-        Only a constant is set aside in each series (`noise.estimate`). Results are kept by fit.
+        Only a constant is set aside in each series (`noise.estimate`), and no more is noise than the readings
+        show (`scatter.bounded`). Results are kept by fit.
         """
         if fit not in self._own:
             left = self.record.values - self.predict(fit.values)
             constant = [np.ones((s.at.stop - s.at.start, 1)) for s in self.record.series]
-            own = Fitter(self.record, self.simulator, estimate(self.record, left, constant))
+            sources = bounded(self.record, estimate(self.record, left, constant))
+            own = Fitter(self.record, self.simulator, sources)
             self._own[fit] = own, own.fit(fit.effects, fit.values)
         return self._own[fit]
 

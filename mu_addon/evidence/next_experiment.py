@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import MuError
 from ..measured import Experiment
+from .effect import BATCH, GEOMETRY, LIBRARY, OF
 from .fit import Fit, Fitter
 from .noise import Whitening
 from .record import record
@@ -65,7 +66,12 @@ def propose_experiment(
         if expected > 0.0 and (best is None or expected > best.expected):
             best = Proposal(f"{e.name}: {cause.effect.reveals}", names, expected)
     if best is None or best.expected < 1.0:
-        words = "; or ".join(dict.fromkeys(s.effect.reveals for s in seen if s.effect.name in names))
+        own = {s.effect.name: s.effect.reveals for s in seen}
+        plain = dict.fromkeys(n.partition(OF)[0].partition(" among ")[0] for n in names)
+        tied = [n for n in (BATCH, GEOMETRY) if n in plain]
+        # What scales one specimen is untied from any other cause by another specimen.
+        asked = tied[:1] or list(plain)
+        words = "; or ".join(dict.fromkeys(own.get(n, LIBRARY.get(n, ("", n))[1]) for n in asked))
         return Proposal(words, names, best.expected if best else 0.0)
     return best
 

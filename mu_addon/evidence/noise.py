@@ -119,6 +119,9 @@ class _Clocks:
         self._timed = np.repeat([not math.isnan(s.sample_s) for s in first.values()], lengths)
         self._step = np.repeat([s.sample_s for s in first.values()], lengths)
         self._count = np.concatenate([s.count for s in first.values()])
+        # A burst of noise is as good as an average of fewer samples.
+        louder = [s.count if s.louder is None else s.count / s.louder**2 for s in first.values()]
+        self._averaged = np.concatenate(louder)
         # Nothing persists into the first of a series, nor from value to value without a clock.
         apart = [np.diff(s.time_s, prepend=-math.inf) for s in first.values()]
         self._apart = np.where(self._timed, np.concatenate(apart), math.inf)
@@ -131,10 +134,10 @@ class _Clocks:
         kept, first = _block(self._count, self._step / source.time_s)
         slow = max(source.slow, LEAST_SLOW * source.white)
         # Noise that does not last from block to block is white; what of it persists has some variance still.
-        variance = np.maximum(slow**2 * kept, 1e-12 * source.white**2 / self._count)
+        variance = np.maximum(slow**2 * kept, 1e-12 * source.white**2 / self._averaged)
         # Without a clock each value stands alone.
         c = np.where(self._timed, variance, source.white**2)
-        v = np.where(self._timed, source.white**2 / self._count + slow**2 * first - variance, 0.0)
+        v = np.where(self._timed, source.white**2 / self._averaged + slow**2 * first - variance, 0.0)
         u = v / c
         before = np.concatenate([[0.0], u[:-1]])
         band = np.zeros((2, len(c)))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import attrs
+import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, SLIP, Effect, Parameter
+from .effect import BATCH, GEOMETRY, HEATING, SLIP, STEP, Effect, Parameter
 from .fit import Fit, Fitter
 from .residuals import strict_table, structure
 from .selection import (
@@ -36,7 +37,7 @@ OF_THE_BENCH = CAMERA.union(
         "pressure_offset",
         "pressure_gain",
         "pressure_drift",
-        "force_gain",
+        "force_scale",
         "force_drift",
         "force_lag",
         "line_lag",
@@ -54,8 +55,13 @@ OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
 OF_NONE = frozenset(("mesh_error", "gravity", SLIP))
 # Most effects fitted, those first that promise most.
 MOST_FITS = 12
-CHANGE = Parameter("change", "", -0.5, 1.0, 0.0, (0.1,), "prints and batches differ by 5 to 20 %")
+CHANGE = Parameter("change", "", -0.8, 4.0, 0.0, (0.1,), "batches differ by 5 to 20 %, struts by more")
 BATCH_EFFECT = Effect(BATCH, (CHANGE,), ())
+HEIGHT = Parameter("height", "", -0.2, 0.2, 0.0, (0.03,), "true over typed, less 1; misread or mistyped")
+# Kinds in a testing machine, whose force a specimen, its geometry and its clamping scale alike.
+MACHINE = ("coupon", "lattice_compression")
+# Rates of tests are two where they differ by more than this factor.
+FASTER = 1.5
 
 
 def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
@@ -65,7 +71,7 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
     """
     kinds = tuple(dict.fromkeys(e.kind for e in experiments))
     batch = attrs.evolve(BATCH_EFFECT, kinds=kinds)
-    found = []
+    found = [] if not kinds else list(coincident_effects(experiments))
     for effect in (*effects, batch):
         if effect.name in OF_NONE:
             continue
@@ -74,6 +80,41 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
             if len(members) < len(own):
                 found.append(attrs.evolve(effect, whose=whose))
     return tuple(found)
+
+
+def coincident_effects(experiments: Sequence[Experiment]) -> dict[Effect, frozenset[str]]:
+    """What scales the force of some experiments in a testing machine together, and their names.
+
+    The height typed for one specimen, a change between two tests that stays, and what all tests above a
+    rate have in common. A cause that is of the same experiments cannot be told from them.
+    """
+    own = [e for e in experiments if e.kind in MACHINE and "strain" in e.columns]
+    kinds = tuple(dict.fromkeys(e.kind for e in own))
+    groups: dict[tuple[str, str], frozenset[str]] = {}
+    for name, members in _owners(GEOMETRY, own).items():
+        groups[GEOMETRY, name] = frozenset(members)
+    for i in range(1, len(own)):
+        groups[STEP, f"tests from {own[i].name} on"] = frozenset(e.name for e in own[i:])
+    rates = sorted((rate, e.name) for e in own if (rate := strain_rate(e)) > 0.0)
+    for k, (rate, _) in enumerate(rates[1:], 1):
+        if rate > FASTER * rates[k - 1][0]:
+            label = f"tests at {100 * rate:.2g} %/s or faster"
+            groups[HEATING, label] = frozenset(name for _, name in rates[k:])
+    return {
+        Effect(name, (HEIGHT if name == GEOMETRY else CHANGE,), kinds, whose=whose): members
+        for (name, whose), members in groups.items()
+        if len(members) < len(own)
+    }
+
+
+def strain_rate(experiment: Experiment) -> float:
+    """The rate in 1/s at which a specimen is strained while it is, in the median; 0 without a clock."""
+    if "time_s" not in experiment.columns or len(experiment) < 3:
+        return 0.0
+    strain = experiment["strain"]
+    rate = np.abs(np.gradient(strain, experiment["time_s"]))
+    moving = rate > 0.1 * rate.max()
+    return float(np.median(rate[moving])) if moving.any() else 0.0
 
 
 def _owners(name: str, experiments: Sequence[Experiment]) -> dict[str, list[str]]:
@@ -112,9 +153,11 @@ def select_owned(
     usable = tuple({s.effect.keys: s.effect for s in every if s.effect.whose and s.worth_a_fit}.values())
     seeds = [found.base] if found.chosen is found.base else [found.base, found.chosen]
     singles = found.singles
+    wider: list[Fit] = []
     for seed in seeds:
         pool = _pool(fitter, seed, usable, progress)
         if seed is found.base:
+            wider = pool
             singles = tuple(sorted([*singles, *pool], key=cost))
         if not pool:
             continue
@@ -132,7 +175,8 @@ def select_owned(
             continue
         table = tuple(strict_table(fitter, best))
         # An effect of the last experiment alone is like something that broke before it.
-        if structure(table) or sudden(found.table_base, found.base, best, RIVAL_DELTA_CHI2):
+        margin = 0.0 if best.names[-1] == STEP else RIVAL_DELTA_CHI2
+        if structure(table) or sudden(found.table_base, found.base, best, margin):
             continue
         tried = [f.effects[-1] for f in pool[:MOST_FITS]]
         level = [f for f in [*pool, *rivals] if len(f.effects) == 1]
@@ -142,7 +186,45 @@ def select_owned(
             found, chosen=best, causes=causes, table=table, singles=singles, doubted="", p_best=p
         )
         return chosen, every
-    return found, list(seen)
+    return attrs.evolve(found, wider=tuple(wider)), list(seen)
+
+
+def coinciding(
+    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """A selection whose causes have, as rivals, what scales the same experiments' force as well as they do.
+
+    Where one specimen was tested along x, or all fast tests came last, a cause that is of x, or of the rate,
+    is one of that specimen, of its height as typed, or of what changed before those tests. Each is fitted in
+    the place of each cause; what comes within `RIVAL_DELTA_CHI2` is not told from it.
+    """
+    chosen = found.chosen
+    scales = [e for e in fitter.simulator.effects if e.name == "force_scale"]
+    owned = [e for e in owned_effects(scales, fitter.record.experiments) if set(e.kinds) & set(MACHINE)]
+    if not owned or not found.causes or found.left or found.doubted:
+        return found
+    causes = []
+    for c in found.causes:
+        others = [e for e in chosen.effects if e.keys != c.effect.keys]
+        near: list[Fit] = []
+        less = fitter.best(others, [chosen.values])
+        scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
+        for e in scaled:
+            enough = less.chi2 - chosen.chi2 - RIVAL_DELTA_CHI2
+            if e.keys in (o.keys for o in chosen.effects) or promise(fitter, less, e) < 0.5 * enough:
+                continue
+            progress(e.title)
+            fit = fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()])
+            if cost(fit) - cost(chosen) < RIVAL_DELTA_CHI2:
+                near.append(fit)
+        near = ranked(near)
+        if c.effect.among and near and cost(near[0]) < cost(chosen):
+            # One size for some does what a size of each does.
+            found, near = attrs.evolve(found, chosen=near[0]), near[1:]
+            c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
+        rivals = dict.fromkeys((*c.rivals, *(f.effects[-1].title for f in near)))
+        causes.append(attrs.evolve(c, rivals=tuple(rivals)))
+    return attrs.evolve(found, causes=tuple(causes))
 
 
 def further_owners(

@@ -173,6 +173,7 @@ def select_pooled(
     if not fits:
         return found
     fits.sort(key=lambda one: -one[0])
+    found = attrs.evolve(found, wider=(*found.wider, *(f for _, f in fits)))
     gain, best = fits[0]
     shape = len(best.effects[0].keys) - len(sizes_of(best.effects[0]))
     p = min(1.0, len(effects) * 0.5 * float(chi2.sf(max(gain, 0.0), 1 + shape)))

@@ -30,7 +30,8 @@ class Series:
     prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
     count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: in which its
     readings come, in the channel's unit, 0 where they come in none; stays: how many follow one another
-    unchanged, around a reading (`resolution.stretch`).
+    unchanged, around a reading (`resolution.stretch`). louder (b,): white noise of each block over the usual,
+    None where it is 1 throughout (`scatter.with_bursts`).
     """
 
     experiment: int
@@ -47,6 +48,7 @@ class Series:
     _first: Array = attrs.field(repr=False)
     _kept: Array = attrs.field(repr=False)
     _spread: Array | None = attrs.field(repr=False, default=None)
+    louder: Array | None = None
 
     @cached_property
     def clock(self) -> tuple[Any, ...]:
@@ -57,7 +59,8 @@ class Series:
         if math.isnan(self.sample_s):
             return (len(self.time_s),)
         apart = np.round(np.diff(self.time_s) / self.sample_s, 9)
-        return f"{self.sample_s:.12g}", self.count.tobytes(), apart.tobytes()
+        louder = None if self.louder is None else self.louder.tobytes()
+        return f"{self.sample_s:.12g}", self.count.tobytes(), apart.tobytes(), louder
 
     @cached_property
     def blocks(self) -> tuple[Any, ...]:

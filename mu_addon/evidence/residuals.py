@@ -175,6 +175,15 @@ def _response(fitter: Fitter, fit: Fit) -> Array:
     return (fitter.predict(moved) - fitter.predict(fit.values)) / p.step
 
 
+def taken_by_scales(fitter: Fitter, fit: Fit) -> float:
+    """Chi squared that a scale of each experiment's own response takes from what a fit leaves."""
+    record = fitter.record
+    response = _response(fitter, fit)
+    own = response[:, None] * (record.of_experiment[:, None] == np.arange(len(record.experiments)))
+    q = _basis(fitter.project(own))
+    return float(np.sum((q.T @ fit.residual) ** 2))
+
+
 def _channels(record: Record) -> tuple[str, ...]:
     return tuple(dict.fromkeys(s.channel for s in record.series if s.group != KNOWN))
 
@@ -705,7 +714,8 @@ def _outliers(record: Record, r: Array) -> list[Dependence]:
         return []
     worst, where, tried = 0.0, "", 0
     for s in clocked:
-        z = np.abs(r[s.at])
+        # In a burst how far a reading may be is not known.
+        z = np.abs(r[s.at]) if s.louder is None else np.where(s.louder > 1.0, 0.0, np.abs(r[s.at]))
         tried += len(z)
         if z.max() > worst:
             at = int(np.argmax(z))

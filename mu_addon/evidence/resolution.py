@@ -22,8 +22,9 @@ DIGITS = 9
 OFF_LEVEL, MOST_LEVELS = 0.05, 0.95
 # A reading is set aside if it is so many deviations from all that its neighbours predict.
 WRONG = 8.0
-# Of a record so few readings may be wrong: what happens more often is no accident.
-MOST_WRONG = 0.02
+# Of a record so few readings may stand alone: what happens more often is no accident, as corners of a fast
+# cycle are none. Beside a prediction, which has such corners, more may be wrong.
+MOST_ALONE, MOST_WRONG = 0.02, 0.1
 FEWEST = 9
 # Readings around one of which the median is what it should be off by; a change is as fast as another one from
 # this share of it on, and so many times more readings of such changes must be right.
@@ -179,7 +180,7 @@ def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
     alone = (low > WRONG * size) | (high < -WRONG * size)
     # Beyond the ends nothing says how it goes on.
     alone[:2] = alone[-2:] = False
-    if np.count_nonzero(alone) <= max(1, MOST_WRONG * n):
+    if np.count_nonzero(alone) <= max(1, MOST_ALONE * n):
         found[known[alone]] = True
     return found
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from ..errors import MuError
 from .curved_reading import curved_reading
-from .effect import SLIP, Effect, Parameter
+from .effect import SLIP, STEP, Effect, Parameter
 from .fit import PRIOR, Fit, Fitter, logarithmic
 from .outliers import NAME as OUTLIER
 from .record import KNOWN
-from .residuals import Dependence, dependence_table, strict_table, structure
+from .residuals import Dependence, dependence_table, strict_table, structure, taken_by_scales
+from .scatter import excess
 from .sensitivity import ABSORBED, Sensitivity
 
 Array = np.ndarray[Any, Any]
@@ -43,12 +44,16 @@ PROMISING = 4.0
 # Share of an effect's amplitude by which another right law of its mechanism may differ from the library's:
 # what gains no more beside it is not named.
 LAW = 0.05
+# How many times what a first effect takes may be taken by scales of single tests before no second is tried.
+ELSEWHERE = 4.0
 # Rivals of a cause that are fitted by all laws of their mechanisms: so many, that take this share of
 # what the cause takes by their first law.
 NEAREST, WORTH_LAWS = 3, 0.2
 # Share of a misfit that one effect must take to be named though structure is left, and how many times as
 # much any other one in its place must leave.
 MAINLY, APART = 0.99, 10.0
+# Share from which on the best explanation is told as such, and how many times as much any other must leave.
+GRADED, CLEAR = 0.9, 4.0
 
 
 @attrs.frozen(eq=False)
@@ -73,7 +78,8 @@ class Selection:
     singles: the fit of every single effect, best first. p_best: p-value (a probability) of the best single
     effect. doubted: why a model was not accepted, empty if it was. table: tests that `strict_table` makes of
     the chosen model's residual. table_base: `dependence_table` of the base model; by the strict tests where
-    nothing is wrong.
+    nothing is wrong. wider: fits of effects of one owner, or that differ among owners. excused: why
+    structure that is left does not count, in words.
     """
 
     base: Fit
@@ -84,11 +90,13 @@ class Selection:
     table: tuple[Dependence, ...]
     p_best: float
     doubted: str = ""
+    wider: tuple[Fit, ...] = ()
+    excused: str = ""
 
     @property
     def left(self) -> tuple[str, ...]:
         """Names of what the residual of the chosen model still depends on (`structure`)."""
-        return structure(self.table)
+        return () if self.excused else structure(self.table)
 
 
 def select(
@@ -116,6 +124,9 @@ def select(
     levels: list[list[Fit]] = []
     alone = False
     while (level := len(levels)) < min(MOST_EFFECTS, len(effects)):
+        if level and ELSEWHERE * (base.chi2 - chosen.chi2) < taken_by_scales(fitter, base):
+            # Tests differ in scale by far more than what all have in common: see `owned`, `pooled`.
+            break
         if level:
             pool = _extended(fitter, effects, levels[-1][:1], progress)
         if not pool or _of_the_law(chosen, pool[0], taken):
@@ -139,7 +150,8 @@ def select(
         if p >= FALSE_ALARM_RATE or _of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
-            doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
+            # Against those found before it says nothing; what it would take is left as structure.
+            doubted = "" if level else f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         if level == 1 and not alone:
             alone = True
@@ -168,7 +180,19 @@ def select(
     table = tuple(strict_table(fitter, chosen))
     if chosen is base and not doubted and not structure(table):
         table_base = table
+        doubted = too_far(fitter, base)
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def too_far(fitter: Fitter, fit: Fit) -> str:
+    """By how much a fit misses beyond any noise that the readings show, in words; empty where it does not."""
+    found = excess(fitter.record, fitter.record.values - fitter.predict(fit.values))
+    if found is None:
+        return ""
+    return (
+        f"the error of {found.where} is {found.error:.3g}, {found.times:.2g} times the largest noise that "
+        "its readings allow"
+    )
 
 
 def pairs_for(
@@ -353,34 +377,43 @@ def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
 
 
 def mainly(fitter: Fitter, found: Selection) -> Selection | None:
-    """A selection of the effects that take nearly all of a misfit, though structure is left; None without.
+    """A selection of the effects that take most of a misfit, though structure is left; None without.
 
-    Their law may be another than the library's. Several: see `_mainly_several`. A single one must take
-    `MAINLY` of the misfit, predict left-out experiments better, rest on no single experiment, have no value
-    at a bound but its null, and do better than a step change. Any other effect must leave ten times as much
-    in its place; those that leave less are its rivals where they take `MAINLY` of the misfit too.
+    Their law may be another than the library's. Several: see `_mainly_several`. A single one, of all, of one
+    owner or among owners, must take `GRADED` of the misfit, have no value at a bound but its null, and do
+    better than a step change; one of all must predict left-out experiments better and rest on no single
+    experiment. Others that leave less than `APART` times as much, or `CLEAR` times where it takes less than
+    `MAINLY`, are its rivals; one that takes `MAINLY` has none that take less.
     """
     if len(found.causes) > 1 and _mainly_several(fitter, found):
         return found
-    if not found.singles:
+    pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
+    if not pool:
         return None
-    best, base = found.singles[0], found.base
+    best, base = pool[0], found.base
     left = max(1.0 - share_taken(fitter, base, best), 1e-6)
+    sure = left <= 1.0 - MAINLY
+    if left > 1.0 - GRADED:
+        return None
     others: dict[str, float] = {}
-    for f in found.singles:
-        if f.names != best.names:
+    for f in [*found.singles, *found.wider]:
+        if f.effects[0].title != best.effects[0].title and (f.effects[0].whose or f.names != best.names):
             own = 1.0 - share_taken(fitter, base, f)
             others[f.effects[0].title] = min(own, others.get(f.effects[0].title, own))
-    near = sorted((title for title, own in others.items() if own < APART * left), key=lambda n: others[n])
-    if left > 1.0 - MAINLY or any(others[n] > 1.0 - MAINLY for n in near) or at_a_bound(best):
+    reach = (APART if sure else CLEAR) * left
+    near = sorted((title for title, own in others.items() if own < reach), key=lambda n: others[n])
+    of_all = any(best is f for f in found.singles)
+    if of_all and near and (not sure or any(others[n] > 1.0 - MAINLY for n in near)):
         return None
-    if near and set(structure(strict_table(fitter, best))) - {OUTLIER}:
+    if of_all and near and set(structure(strict_table(fitter, best))) - {OUTLIER}:
         # Effects that leave the same moment or the same waves are alike in what they are not.
         return None
-    shares = _share_by_experiment(fitter, best)
-    if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
-        return None
-    if sudden(found.table_base, base, best) or curved_reading(fitter, base, best):
+    if of_all:
+        shares = _share_by_experiment(fitter, best)
+        if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
+            return None
+    step = best.names[0] == STEP
+    if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
         return None
     cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, tuple(near))
     table = tuple(strict_table(fitter, best))
@@ -388,22 +421,22 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
 
 
 def _mainly_several(fitter: Fitter, found: Selection) -> bool:
-    """Whether several causes take nearly all of a misfit, each of them plainly, though structure is left.
+    """Whether several causes take most of a misfit, each of them plainly, though structure is left.
 
-    What is left is less than 1 - `MAINLY` of what any of them takes, and no other effect in the place of one
-    comes within `APART` times that. None has a value at a bound or rests on a single experiment.
+    What is left is less than 1 - `GRADED` of what any of them takes, and no other effect in the place of one
+    comes within `CLEAR` times that. None has a value at a bound or rests on a single experiment.
     """
     base, chosen = found.base, found.chosen
     if found.doubted or at_a_bound(chosen) or any(c.rivals for c in found.causes):
         return False
     left, taken = max(chosen.chi2 - len(fitter.record), 0.0), base.chi2 - chosen.chi2
     for c in found.causes:
-        if left > (1.0 - MAINLY) * c.loss:
+        if left > (1.0 - GRADED) * c.loss:
             return False
         others = [e for e in chosen.effects if e is not c.effect]
         # So near a rival would have been told (`causes_of`).
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
-        if APART * left > near and _any_within(fitter, found, others, APART * left):
+        if CLEAR * left > near and _any_within(fitter, found, others, CLEAR * left):
             return False
         last = fitter.fit([*others, c.effect], chosen.values)
         shares = _share_by_experiment(fitter, last)
@@ -440,6 +473,9 @@ def size_at_bound(fit: Fit) -> bool:
 
 
 def _bounded(p: Parameter, value: float) -> bool:
+    if not p.plausible[0] <= value <= p.plausible[1]:
+        # What no specimen has is no cause, though a fit may go there.
+        return True
     ends = [b for b in (p.low, p.high) if b != p.null]
     if logarithmic(p):
         # Over decades the range's own size is near the low end's neighbours, too.

@@ -12,9 +12,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured import Experiment
-from .effect import BATCH, OF, Effect, Parameter
+from .effect import GEOMETRY, OF, SCALES, Effect, Parameter
 
 Array = np.ndarray[Any, Any]
+
+HEIGHT = f"{GEOMETRY}.height"
 
 # Part of the name of every modulus among the nuisances.
 MODULUS = "modulus"
@@ -73,6 +75,8 @@ class Composite:
         self._known = dict(known)
         self._kept: OrderedDict[Any, tuple[Experiment, Array]] = OrderedDict()
         self.calls = 0
+        # Names of experiments by what they are called together, where that is no specimen or session.
+        self.groups: dict[str, frozenset[str]] = {}
         self.refused: dict[str, str] = {}
         nuisances: dict[str, Parameter] = {}
         effects: dict[tuple[str, ...], Effect] = {}
@@ -127,7 +131,7 @@ class Composite:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key][1]
-        found = simulator.predict(experiment, own)
+        found = simulator.predict(_of_height(experiment, own.pop(HEIGHT, 0.0)), own)
         found.flags.writeable = False
         self.calls += 1
         # With the experiment, whose identity would otherwise be given to another one.
@@ -147,11 +151,12 @@ class Composite:
         )
         for key, value in values.items():
             plain, _, whose = key.partition(OF)
-            if key in own or whose not in owners:
+            if key in own or not (whose in owners or experiment.name in self.groups.get(whose, ())):
                 continue
-            if plain in knows:
+            name = plain.partition(".")[0]
+            if plain in knows or name == GEOMETRY:
                 own[plain] = value
-            elif plain.startswith(BATCH):
+            elif name in SCALES:
                 moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)
                 own |= {p.name: own.get(p.name, p.null) * (1.0 + value) for p in moduli}
         return own
@@ -167,6 +172,14 @@ class Composite:
                 f"models exist for {', '.join(self._simulators)}",
             )
         return self._simulators[experiment.kind]
+
+
+def _of_height(experiment: Experiment, off: float) -> Experiment:
+    """The experiment of a specimen that is higher than was typed by a share, so that it was strained less."""
+    if not off:
+        return experiment
+    strain = experiment["strain"] / (1.0 + off)
+    return attrs.evolve(experiment, columns={**experiment.columns, "strain": strain})
 
 
 def _shared(known: Parameter, other: Parameter) -> Parameter:

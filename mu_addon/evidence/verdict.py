@@ -12,19 +12,33 @@ import numpy as np
 
 from ..measured import Experiment
 from .drive import denoised_drives
-from .effect import Effect
+from .effect import Effect, Parameter
 from .fit import Fit, Fitter
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
 from .outliers import NAME as OUTLIER
 from .outliers import without_outliers
-from .owned import further_owners, select_owned
+from .owned import coincident_effects, coinciding, further_owners, select_owned
 from .plausibility import require_plausible
 from .pooled import select_pooled
 from .record import Record, record
+from .residuals import structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
-from .selection import TOGETHER, Cause, Selection, interval, mainly, one_more, reselected, select, share_taken
+from .scatter import NEAR, with_bursts, within_scatter
+from .selection import (
+    TOGETHER,
+    Cause,
+    Selection,
+    at_a_bound,
+    interval,
+    mainly,
+    one_more,
+    ranked,
+    reselected,
+    select,
+    share_taken,
+)
 from .sensitivity import (
     ABSORBED,
     SEEN,
@@ -41,6 +55,8 @@ from .thinning import thinned
 Array = np.ndarray[Any, Any]
 
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
+# What may belong to one specimen, or differ among them, where nothing that all have explains it.
+OPEN = ("unexplained", "unidentifiable")
 # A nuisance this many spreads from what was known of it is no longer only a nuisance.
 UNLIKELY = 3.0
 # So many, and it stands in for what differs among owners: three leaks as one, with valves shut late.
@@ -63,7 +79,8 @@ class Verdict:
     the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). refused: why
     models that were tried have no prediction, by the titles of their effects. share_taken: of the base
     model's misfit by the chosen one; a verdict `named` or `ambiguous` may leave structure
-    (`selection.mainly`).
+    (`selection.mainly`). nearest: title of the best single explanation, named or not, and its share of the
+    misfit. far: nuisances that are far from what was known of them, the farthest first.
     `as_json` is the content of verdict.json.
     """
 
@@ -80,6 +97,8 @@ class Verdict:
     set_aside: tuple[str, ...] = ()
     refused: Mapping[str, str] = MappingProxyType({})
     share_taken: float = 0.0
+    nearest: tuple[str, float] | None = None
+    far: tuple[Parameter, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -148,6 +167,7 @@ class Verdict:
                 }
                 for d in self.selection.table_base
             ],
+            "nearest": {"effect": self.nearest[0], "share": self.nearest[1]} if self.nearest else None,
             "next_experiment": {"what": next_.what, "separates": list(next_.separates)} if next_ else None,
             "identifiability": dict(self.identifiability),
         }
@@ -202,6 +222,8 @@ def diagnose(
     set_aside += averaged
     experiments, again = denoised_drives(experiments, simulator)
     progress("noise")
+    fitted = [e for e in experiments if e.role == "fit"]
+    simulator.groups |= {e.whose: names for e, names in coincident_effects(fitted).items()}
     measured, fitter, base = _base(experiments, again, simulator)
     experiments, more = without_unpredicted_readings(experiments, simulator, base.values)
     if more:
@@ -234,9 +256,9 @@ def diagnose(
             sources = fitter.sources
             seen = _seen(fitter, base)
             chosen = reselected(fitter, seen, chosen)
-    if _kind(fitter, chosen) == "unexplained":
+    if _kind(fitter, chosen) in OPEN:
         chosen, seen = select_owned(fitter, seen, chosen, progress)
-    if _kind(fitter, chosen) == "unexplained" or (chosen.causes and _strained(fitter, chosen.chosen)):
+    if _kind(fitter, chosen) in OPEN or (chosen.causes and _strained(fitter, chosen.chosen)):
         chosen = select_pooled(fitter, chosen, progress)
     chosen = further_owners(fitter, chosen, progress)
     if chosen.causes and not chosen.causes[0].effect.among:
@@ -252,6 +274,7 @@ def diagnose(
                 chosen = one_more(fitter, seen, chosen, progress)
             if _kind(fitter, chosen) == "unexplained" and not owned:
                 chosen, seen = select_owned(fitter, seen, chosen, progress)
+    chosen = coinciding(fitter, chosen, progress)
     before = experiments, set_aside, fitter, base, seen, chosen
     for _ in range(ROUNDS):
         if OUTLIER not in chosen.left or (chosen.doubted and chosen.causes):
@@ -270,8 +293,22 @@ def diagnose(
     if chosen.left or chosen.doubted:
         # They were not all that was wrong.
         experiments, set_aside, fitter, base, seen, chosen = before
+    if _kind(fitter, chosen) == "unexplained":
+        left = fitter.record.values - fitter.predict(chosen.chosen.values)
+        measured, bursts = with_bursts(fitter.record, left)
+        if bursts:
+            progress("noise in bursts")
+            other = Fitter(measured, simulator, noise_of(measured, simulator, chosen.chosen.values))
+            anew = select(other, seen, progress)
+            if _kind(other, anew) != "unexplained":
+                fitter, base, chosen = other, anew.base, anew
+                set_aside = [*set_aside, *bursts]
     measured, sources = fitter.record, fitter.sources
     kind = _kind(fitter, chosen)
+    if kind == "unexplained" and (words := _of_no_size(fitter, chosen)):
+        chosen = attrs.evolve(chosen, chosen=chosen.base, causes=(), doubted="", excused=words)
+        set_aside = [*set_aside, words]
+        kind = _kind(fitter, chosen)
     if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
         chosen = most
         kind = "ambiguous" if any(c.rivals for c in chosen.causes) else "named"
@@ -283,7 +320,9 @@ def diagnose(
     ]
     proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
-    bounds = {k: interval(fitter, known, k) for k in known.keys}
+    # Of what is no cause the curvature will do.
+    sure = kind != "unexplained"
+    bounds = {k: interval(fitter, known, k) if sure else _by_curvature(known, k) for k in known.keys}
     identifiability = _identifiability(seen, chosen)
     return Verdict(
         kind,
@@ -299,7 +338,32 @@ def diagnose(
         tuple(set_aside),
         dict(simulator.refused),
         share_taken(fitter, chosen.base, chosen.chosen),
+        _nearest(fitter, chosen),
+        tuple(unlikely(fitter.curved, chosen.base)),
     )
+
+
+def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
+    """Title and share of the misfit of the single explanation that takes most of it; None without any."""
+    pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
+    return (pool[0].effects[0].title, share_taken(fitter, found.base, pool[0])) if pool else None
+
+
+def _of_no_size(fitter: Fitter, found: Selection) -> str:
+    """Why a misfit that no significant effect explains is none, in words: it is as small as the scatter."""
+    left = fitter.record.values - fitter.predict(found.base.values)
+    if found.causes or not within_scatter(fitter.record, left):
+        return ""
+    on = ", ".join(n.replace("_", " ") for n in structure(found.table)) or "no quantity"
+    return (
+        f"the residual depends on {on}, by less than {NEAR:g} times the scatter of the readings: slow or "
+        "uneven noise of the instruments does that"
+    )
+
+
+def _by_curvature(fit: Fit, key: str) -> tuple[float, float]:
+    """The 95 % interval (low, high) of a fitted value by the curvature of chi squared, in its unit."""
+    return fit.values[key] - 1.96 * fit.sd(key), fit.values[key] + 1.96 * fit.sd(key)
 
 
 def _base(
@@ -356,10 +420,13 @@ def _kind(fitter: Fitter, found: Selection) -> str:
         return "unexplained"
     if found.causes:
         return "ambiguous" if any(c.rivals for c in found.causes) else "named"
-    for p in fitter.curved:
-        if abs(found.base.values[p.name] - p.null) > UNLIKELY * p.spread and math.isfinite(p.spread):
-            return "unidentifiable"
-    return "none"
+    return "unidentifiable" if unlikely(fitter.curved, found.base) else "none"
+
+
+def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
+    """Nuisances whose values are far from what was known of them, the farthest first."""
+    away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
+    return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
 
 
 def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:

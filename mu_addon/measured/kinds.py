@@ -34,6 +34,7 @@ UNITS = {
     "voltage": "V",
     "volume": "mm3",
     "orientation": "deg",
+    "room": "C",
 }
 # What a column may be in instead: how much of the unit it is read in one of it is.
 CONVERTED = {
@@ -140,7 +141,12 @@ KINDS = {
             needs_keys=("mode",),
             may_have_keys=("section_mm", "length_mm", "axis", "mass_g"),
         ),
-        Kind("pressure_hold", (("pressure_kPa",),), may_have_keys=("chamber_volume_mm3", "pressure")),
+        Kind(
+            "pressure_hold",
+            (("pressure_kPa",),),
+            ("room_C",),
+            may_have_keys=("chamber_volume_mm3", "pressure"),
+        ),
         Kind(
             "beam_deadweight",
             (("added_mass_g", "tip_deflection_mm"),),

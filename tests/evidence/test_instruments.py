@@ -266,5 +266,5 @@ def test_a_load_cell_whose_gain_was_another_one_day_is_told():
         made.append(attrs.evolve(e, columns={**e.columns, "stress_kPa": read}))
     found = diagnose(made, Composite(dict(bench_simulators(made))))
     # Two sessions are too few for a spread, and a last one is like something that broke before it.
-    assert [c.effect.title for c in found.selection.causes] == ["force_gain among experiments"]
+    assert [c.effect.title for c in found.selection.causes] == ["force_scale among experiments"]
     assert found.kind == "named"

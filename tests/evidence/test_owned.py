@@ -107,7 +107,7 @@ def test_a_specimen_that_is_softer_is_another_batch_or_at_least_may_be():
     assert found.kind in ("named", "ambiguous")
     assert "batch_variation of specimen C" in titles
     # A load cell that was off in its only test does the same.
-    cell = {t for t in titles if t.startswith("force_gain of experiment")}
+    cell = {t for t in titles if t.startswith("force_scale of experiment")}
     assert len(cell) < 2
     assert all(title.endswith("of specimen C") for title in titles - cell)
 

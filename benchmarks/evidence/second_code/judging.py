@@ -22,7 +22,7 @@ from mu_addon.evidence.verdict import Verdict, diagnose
 from mu_addon.measured import Experiment, read_folder
 
 from .recording import write
-from .sets import Order, made
+from .sets import Order, made, noise_of
 from .units import bent, force
 
 # What two codes of a unit differ by, as the engine believes.
@@ -31,7 +31,7 @@ PRESSURES = np.linspace(-25.0, 50.0, 61)
 # Faults of what measures and holds: naming one of them blames no part of the unit or its resin.
 INSTRUMENTS = frozenset(
     (
-        "pressure_offset", "pressure_gain", "pressure_drift", "force_gain", "force_drift", "force_lag",
+        "pressure_offset", "pressure_gain", "pressure_drift", "force_scale", "force_drift", "force_lag",
         "angle_offset", "angle_drift", "camera_scale", "camera_tilt", "camera_perspective", "lens_distortion",
         "clock_offset", "line_lag", "led_drift", "ambient_light", "seating", "frame_compliance",
         "marker_slip",
@@ -96,15 +96,38 @@ def judged(of: Order) -> dict[str, Any]:
         "left": list(verdict.selection.left),
         "doubted": verdict.selection.doubted,
         "partly": list(verdict.selection.chosen.names),
+        "share": verdict.share_taken,
+        "error_over_noise": error_over_noise(of, experiments, verdict),
         "values": {k: verdict.selection.chosen.values[k] for k in verdict.intervals},
         "intervals": {k: list(v) for k, v in verdict.intervals.items()},
-        "outcome": outcome(of.truth, verdict),
+        "outcome": lab_outcome(of, verdict) if of.part == "lab" else outcome(of.truth, verdict),
         "seconds": round(time.process_time() - began, 2),
     }
 
 
+def error_over_noise(of: Order, experiments: Sequence[Experiment], verdict: Verdict) -> float:
+    """The largest root mean square error of the base model in an experiment, over the noise that was added.
+
+    Both of the channel that was measured, without readings that were set aside.
+    """
+    values, noise, worst = verdict.selection.base.values, noise_of(of), 0.0
+    simulator = simulator_of(experiments)
+    for e in verdict.experiments:
+        for row, channel in enumerate(simulator.channels(e)):
+            if (added := noise.get((e.name, channel))) is not None:
+                off = e[channel] - simulator.predict(e, values)[row]
+                worst = max(worst, float(np.sqrt(np.nanmean(off**2))) / added)
+    return worst
+
+
 def _set(verdict: Verdict) -> set[str]:
     return {title.split(" of ")[0].split(" among ")[0] for title in verdict.ambiguity}
+
+
+def lab_outcome(of: Order, verdict: Verdict) -> str:
+    """As `outcome`, of a mishap that any of several names is right for: in_set where one of them is there."""
+    found = outcome((), verdict)
+    return "in_set" if found in ("wrong", "wrong_set") and set(of.truth) & _set(verdict) else found
 
 
 def outcome(truth: Sequence[str], verdict: Verdict) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from . import gas, light, machine, units
+from . import gas, lab, light, machine, units
 from .recording import NOISES, Trial, instrument, read
 
 Rng = np.random.Generator
@@ -137,6 +137,7 @@ ROUND = {
     "single": len(_LAWS),
     "outside": len(_FAULTS),
     "two": len(_BOTH),
+    "lab": len(lab.CASES),
 }
 CLASSES = (*ROUND,)
 
@@ -155,6 +156,8 @@ class Order:
     @property
     def truth(self) -> tuple[str, ...]:
         """The library's names of what is hidden; none of a clean set and of a fault outside."""
+        if self.part == "lab":
+            return lab.RIGHT[next(iter(self.faults))]
         names = (SINCE.get(name, name) for name in self.faults)
         return tuple(name for name in names if not name.startswith("outside"))
 
@@ -191,8 +194,17 @@ def _hidden(part: str, number: int, rng: Rng) -> tuple[str, Faults]:
         group, name = _FAULTS[number % len(_FAULTS)]
         kind = MACHINE[(number // len(_FAULTS)) % 2] if group == "machine" else group
         return kind, {name: drawn(rng, OUTSIDE[group][name])}
+    if part == "lab":
+        kind, name = lab.CASES[number % len(lab.CASES)]
+        return kind, {name: {}}
     kind, pair = _BOTH[number % len(_BOTH)]
     return kind, {n: drawn(rng, SINGLE[kind][n][int(rng.integers(len(SINGLE[kind][n])))]) for n in pair}
+
+
+def noise_of(of: Order) -> dict[tuple[str, str], float]:
+    """Standard deviation of the noise added to each channel, as read, by experiment and channel."""
+    tests = BENCHES[of.kind](np.random.default_rng(of.seed), of.faults, of.noise)
+    return {(t.name, t.channel): of.level * t.scale for t in tests}
 
 
 def made(of: Order) -> list[Trial]:
@@ -200,4 +212,7 @@ def made(of: Order) -> list[Trial]:
     rng = np.random.default_rng(of.seed)
     tests = BENCHES[of.kind](rng, of.faults, of.noise)
     by = instrument(rng, tests)
+    if of.part == "lab":
+        mishap, _ = lab.MISHAPS[next(iter(of.faults))]
+        tests = mishap(rng, tests, of.level * tests[0].scale)
     return [read(rng, test, of.noise, of.level, by) for test in tests]

@@ -27,7 +27,7 @@ FILTERED = ("force_lag.time_s", "force_lag.period_s")
 def amplifier(kind: str) -> tuple[Effect, ...]:
     """Effects, for a kind, of the load cell's amplifier: its gain, a filter of one pole, or of two."""
     return (
-        Effect("force_gain", (GAIN,), (kind,)),
+        Effect("force_scale", (GAIN,), (kind,)),
         Effect("force_lag", FILTER, (kind,)),
         Effect(
             "force_lag",
@@ -41,7 +41,7 @@ def amplifier(kind: str) -> tuple[Effect, ...]:
 
 def amplified(force: Array, values: Mapping[str, float]) -> Array:
     """Force or stress (n,) with the gain that a load cell has beside the right one (`amplifier`)."""
-    gain = values.get("force_gain.gain", 0.0)
+    gain = values.get("force_scale.gain", 0.0)
     return force * (1.0 + gain) if gain else force
 
 

@@ -38,7 +38,18 @@ TILT = Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (), "clamps set by eye or 
 EFFECTS = (
     Effect(
         "gravity",
-        (Parameter("density_kg_m3", "kg/m3", 0.0, 4000.0, 0.0, (1000.0,), "elastomers 950 to 1300"),),
+        (
+            Parameter(
+                "density_kg_m3",
+                "kg/m3",
+                0.0,
+                4000.0,
+                0.0,
+                (1000.0,),
+                "elastomers 950 to 1300, filled ones 1800",
+                plausible=(0.0, 2000.0),
+            ),
+        ),
         (KIND,),
         "the beam sags under its own weight",
     ),

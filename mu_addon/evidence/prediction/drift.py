@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 
 from ...measured import Experiment
@@ -15,6 +16,8 @@ Array = np.ndarray[Any, Any]
 # Times of a law's course in s, and where fits of it begin, as shares of the longest record.
 SHORTEST_s, LONGEST_s, NULL_s = 0.5, 1e4, 30.0
 EARLY = (0.02, 0.2)
+# Of the largest reading: a gauge whose zero is farther off is seen to be so before anything is measured.
+OFFSET_SHARE, LEAST_OFFSET_kPa = 0.1, 1.0
 
 
 def drifts(name: str, unit: str, most: float, kind: str, experiments: Sequence[Experiment]) -> list[Effect]:
@@ -70,6 +73,17 @@ def drift(name: str, time_s: Array, values: Mapping[str, float]) -> Array | floa
     if over := get(f"{name}.over_100_s", 0.0):
         found = found + over * (t / 100.0) ** get(f"{name}.power", 0.5)
     return found
+
+
+def zeroed(effects: Iterable[Effect], kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
+    """Effects of a kind, its gauge's offset no larger than a gauge's: a share of what it reads, or 1 kPa."""
+    most = max(OFFSET_SHARE * largest_reading("pressure_kPa", kind, experiments), LEAST_OFFSET_kPa)
+    return tuple(
+        attrs.evolve(e, parameters=(e.parameters[0].narrowed(-most, most), *e.parameters[1:]))
+        if e.name == "pressure_offset"
+        else e
+        for e in effects
+    )
 
 
 def largest_reading(column: str, kind: str, experiments: Sequence[Experiment]) -> float:

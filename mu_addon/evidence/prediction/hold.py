@@ -13,13 +13,15 @@ import numpy as np
 from ...measured import Experiment
 from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
-from .drift import drift, drifts, largest_reading
+from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import first_order_lag
 from .unit import GAUGE_SHARE, TIMED
 
 Array = np.ndarray[Any, Any]
 
 KIND = "pressure_hold"
+# The column of a room's temperature, where it was logged.
+ROOM = "room_C"
 ROOM_K = 296.0
 AIR_GAMMA = 1.4
 SUPPLY_K = 5.0
@@ -123,6 +125,12 @@ EFFECTS = (
     ),
     Effect(
         "temperature_drift",
+        (Parameter("room_K_per_hour", "K/h", -12.0, 12.0, 0.0, (2.0,), "rooms over a morning; logs tell"),),
+        (KIND,),
+        "the room warms or cools steadily, and the gas in the chamber with it",
+    ),
+    Effect(
+        "temperature_drift",
         (
             Parameter("warmth", "", 0.0, 1.0, 0.0, (0.05,), "share of what compression without loss warms"),
             Parameter("cools_s", "s", 0.5, 3600.0, 30.0, (10.0, 60.0), "to the temperature of the wall"),
@@ -158,7 +166,7 @@ class ChamberPressure:
         self._compliance = compliance_per_kPa
         most = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, experiments)
         self.effects = (
-            *map(partial(_warmed, experiments), EFFECTS),
+            *zeroed(map(partial(_warmed, experiments), EFFECTS), KIND, experiments),
             *drifts("pressure_drift", "kPa", most, KIND, experiments),
         )
         nuisances = []
@@ -211,6 +219,13 @@ class ChamberPressure:
             cooling_per_kPa=0.01 * get("temperature_drift.cooling_K_per_100_kPa", 0.0),
             rates=[get(f"temperature_drift.{k}", v) for k, v in _TWO_RATES.items()],
         )
+        per_hour = get("temperature_drift.room_K_per_hour", 0.0)
+        warm = per_hour * (experiment["time_s"] - experiment["time_s"][0]) / 3600.0
+        if (room := experiment.columns.get(ROOM)) is not None:
+            warm = room - room[0]
+        if warm.any():
+            # What leaks away meanwhile is that of the room as it was.
+            p = (p + ATMOSPHERE_kPa) * (1.0 + warm / ROOM_K) - ATMOSPHERE_kPa
         p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
         p = p + drift("pressure_drift", experiment["time_s"], values)
         return p[None]

@@ -16,7 +16,7 @@ from ...measured import Experiment
 from ...measured.pose import Direction, X, down
 from ..effect import Effect, Parameter
 from .camera import camera_effects, read_by_camera
-from .drift import drift, drifts, largest_reading
+from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
@@ -382,7 +382,8 @@ class UnitPressure:
         camera = camera_effects(self.channels_known, self.kind, experiments)
         self._recordings = Recordings(experiments)
         slips = slip_effects(self.channels_known, self.kind, self._recordings)
-        self.effects = (*TIMED, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera, *slips)
+        timed = zeroed(TIMED, self.kind, experiments)
+        self.effects = (*timed, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera, *slips)
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 

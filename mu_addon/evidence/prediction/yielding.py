@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,9 @@ _HARDENING = 0.1
 _SMALL = np.array([1e-4])
 # Of Bouc and Wen's first loading curve, in yield strains: beyond it has its end to rounding.
 _FARTHEST = 40.0
+# Gauss-Legendre points on 0..1.
+_AT, _WEIGHT = np.polynomial.legendre.leggauss(8)
+_AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
 
 
 def yielding(kind: str) -> Effect:
@@ -129,37 +133,31 @@ def _borne_by_one(x: Array, power: float) -> Array:
     loading, whose strain x = int_0^z du/(1 - u^n) is tabulated.
     """
     way, height = _first_loading(power)
-    z, before, found = 0.0, 0.0, []
-    for now in x.tolist():
-        step, before = now - before, now
-        if z * step < 0.0:
-            # Back to zero elastically, as far as the step goes.
-            back = min(abs(step), abs(z))
-            z += math.copysign(back, step)
-            step -= math.copysign(back, step)
-        if step:
-            along = float(np.interp(abs(z), height, way)) + abs(step)
-            z = math.copysign(float(np.interp(along, way, height)), step)
-        found.append(z)
-    return np.array(found)
+    found = np.zeros(len(x))
+    at = np.flatnonzero(signs := np.sign(np.diff(x, prepend=0.0)))
+    turns = at[np.flatnonzero(np.diff(signs[at])) + 1]
+    z = start = 0.0
+    for first, end in pairwise((0, *turns.tolist(), len(x))):
+        gone, side = np.abs(x[first:end] - start), np.sign(x[end - 1] - start) or 1.0
+        # Along the stretch: elastic up to 0, as far as it goes, and first loading from there.
+        begun = side * z
+        loaded = float(np.interp(max(begun, 0.0), height, way)) + gone - max(-begun, 0.0)
+        along = np.where(begun + gone < 0.0, begun + gone, np.interp(loaded, way, height))
+        found[first:end] = side * along
+        z, start = float(found[end - 1]), float(x[end - 1])
+    return found
 
 
 @lru_cache(maxsize=16)
 def _first_loading(power: float) -> tuple[Array, Array]:
-    """Strains in yield strains and z of first loading, both ascending: dz/dx = 1 - z^n from 0."""
-    from scipy.integrate import solve_ivp
+    """Strains in yield strains and z of first loading, both ascending: x = int_0^z du/(1 - u^n).
 
-    at = np.concatenate([np.linspace(0.0, 4.0, 800, endpoint=False), np.linspace(4.0, _FARTHEST, 400)])
-    found = solve_ivp(
-        lambda _, z: 1.0 - np.clip(z, 0.0, 1.0) ** power,
-        at[[0, -1]],
-        [0.0],
-        "LSODA",
-        at,
-        rtol=1e-9,
-        atol=1e-12,
-    )
-    height = np.minimum(found.y[0], 1.0)
+    With z = 1 - exp(-s) the integrand is smooth in s; Gauss and Legendre's rule between the table's rows.
+    """
+    s = _FARTHEST * np.linspace(0.0, 1.0, 3001) ** 2
+    step = np.diff(s)
+    at = s[:-1, None] + step[:, None] * _AT
+    slope = np.exp(-at) / -np.expm1(power * np.log1p(-np.exp(-at)))
+    way = np.concatenate([[0.0], np.cumsum(step * (slope @ _WEIGHT))])
     # `interp` wants them to ascend; at the end z is 1 to rounding.
-    height += 1e-12 * np.arange(len(at))
-    return at, height
+    return way, -np.expm1(-s) + 1e-15 * np.arange(len(s))

@@ -291,7 +291,7 @@ def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
     if gained < RIVAL_DELTA_CHI2:
         return f"no significant gain ({_figures(max(gained, 0.0))}){bound}"
     if not selection.chosen.effects:
-        return f"gains {gained:.3g}, not significant for this number of tests{bound}"
+        return f"gains {gained:.3g}, which slow noise of these records could as well{bound}"
     more = f.chi2 - selection.chosen.chi2
     return f"leaves {more:.3g} more than the chosen model{bound}"
 

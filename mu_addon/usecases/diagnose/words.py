@@ -16,6 +16,8 @@ from .remedies import what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
+# Share of a misfit from which on what takes it is worth a sentence.
+WORTH_TELLING = 0.1
 
 
 def readable(name: str) -> str:
@@ -54,7 +56,8 @@ def sized(verdict: Verdict, cause: Cause) -> str:
         value, low, high = cause.effect.spread
         unit = cause.effect.parameters[0].unit
         size = f"{value:.3g} {unit}".rstrip()
-        sizes.append(f"standard deviation between {cause.effect.among}s {size} (95 %: {between(low, high)})")
+        # So many intervals are a table.
+        return f"standard deviation between {cause.effect.among}s {size} (95 %: {between(low, high)})"
     for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         unit = f" {p.unit}" if p.unit else ""
@@ -101,7 +104,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
         message = (
-            "The model is wrong. Each of these effects explains the data, and these data do not "
+            "Each of these effects explains the data, and these data do not "
             f"distinguish them. Fitted values: {'; '.join(sizes)}."
         )
         if not found.left:
@@ -111,14 +114,14 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     if verdict.kind == "none":
         return (
             "no model error detected",
-            "The residual is consistent with instrument noise. An effect larger than its limit in the "
-            "table below would have been detected.",
+            f"The error, {_error(verdict)}, is no larger than the noise that the readings themselves show. "
+            "An effect larger than its limit in the table below would have been detected.",
         )
     if verdict.kind == "unidentifiable":
         return (
             "not identifiable",
-            "The model fits the data only with a parameter far from its known value. More data of "
-            "this kind cannot identify the cause.",
+            f"The model fits the data only with {_far(verdict)}. More data of this kind cannot identify the "
+            "cause.",
         )
     where = [readable(n) for n in found.left if n != SPREAD]
     tried = (
@@ -127,13 +130,35 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     tried += f"The residual depends on {listed(where)}. " if where else ""
     if found.doubted:
         tried += f"{_upper(readable(found.doubted))}. "
-    if found.chosen.effects:
-        names = listed([readable(n) for n in found.chosen.names])
-        tried += f"The best fit, {names}, is not named because its residual has structure."
     return (
         "unexplained by any known effect",
-        f"The model is wrong, and no effect of the library explains it. {tried}".strip(),
+        f"The model misses these data by {_error(verdict)}, and no effect of the library explains that. "
+        f"{tried}{_near(verdict)}".strip(),
     )
+
+
+def _error(verdict: Verdict) -> str:
+    """Root mean square error of the base model on fitted data, with its unit."""
+    return f"{verdict.gain.fit.before:.3g} {verdict.gain.fit.unit}".rstrip()
+
+
+def _far(verdict: Verdict) -> str:
+    """The nuisance that is farthest from what was known of it, its value and what was known, in words."""
+    if not verdict.far:
+        return "a parameter far from its known value"
+    p, value = verdict.far[0], verdict.selection.base.values[verdict.far[0].name]
+    unit = f" {p.unit}" if p.unit else ""
+    return (
+        f"{bare(p)} at {value:.3g}{unit}, where {p.null:.3g} ± {p.spread:.2g}{unit} was expected ({p.source})"
+    )
+
+
+def _near(verdict: Verdict) -> str:
+    """What comes nearest to an explanation, and its share of the misfit, in words."""
+    if verdict.nearest is None or verdict.nearest[1] < WORTH_TELLING:
+        return "No single effect takes a tenth of the misfit."
+    title, share = verdict.nearest
+    return f"The nearest single effect, {readable(title)}, takes {100 * share:.3g} % of the misfit (of χ²)."
 
 
 def _what_remains(verdict: Verdict) -> str:
@@ -158,7 +183,9 @@ def advice(verdict: Verdict) -> str:
         places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
         places.sort(key=lambda d: d.p_value)
         at = f" The deviation is largest at: {places[0].where}." if places else ""
-        return f"Repeat an experiment unchanged: what does not recur is not a model error.{at}"
+        first = places[0].where.partition(", ")[0] if places else ""
+        which = first if first in {e.name for e in verdict.experiments} else "an experiment"
+        return f"Repeat {which} unchanged: what does not recur is not a model error.{at}"
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
         return ""
@@ -176,6 +203,8 @@ def to_do(verdict: Verdict) -> str:
         return "Trust the simulation for experiments like these."
     if verdict.kind == "ambiguous":
         return "Make the next measurement below before anything is changed."
+    if verdict.kind == "unexplained":
+        return f"Do not trust the simulation to better than {_error(verdict)} until this is explained."
     return what_to_do(verdict.names)
 
 

@@ -1,0 +1,166 @@
+"""The noise that readings show by themselves: what bounds any noise that is estimated from a misfit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from .drive import FEWEST, reading_noise
+from .noise import Source
+from .record import KNOWN, Record, Series
+from .resolution import divided
+
+Array = np.ndarray[Any, Any]
+
+# Noise may be so many times what readings scatter from one to the next: slow noise of an instrument is some
+# two to three times its fast part (3.1 at most in 42 clean sets of a second code).
+TIMES = 4.0
+# Share by which an estimate of scatter from n readings is low, times the root of n.
+FEW = 4.0
+# What gauges and load cells are accurate to where nothing is stated, as a share of the largest reading: slow
+# noise up to this needs no fast part beside it.
+ACCURACY = 0.002
+# Of few readings, or in no order, no scatter is seen: a model that misses by this share of them is no model.
+UNSEEN = 0.1
+# What is left of readings and is less than so many times their scatter decides nothing for anyone.
+NEAR = 2.0
+# Blocks in a window of a burst, and times the usual scatter: less happens by chance.
+WINDOW, LOUD = 15, 2.5
+# Deviations from those around it beyond which a block is a burst of its own, as so many may be.
+ALONE, MOST = 5.0, 0.2
+# A block that is louder still does not count any more.
+LOUDEST = 1e3
+
+
+def scatter(record: Record, series: Series) -> float:
+    """Standard deviation of a series' readings from one to the next, in its unit; nan for too few to tell."""
+    e = record.experiments[series.experiment]
+    values = e[series.channel]
+    seen = np.isfinite(values)
+    if np.count_nonzero(seen) < 2 * FEWEST:
+        return math.nan
+    clock = e.columns.get("time_s", np.arange(len(values), dtype=float))
+    # The least of several estimates: of few readings it is too small.
+    few = 1.0 + FEW / math.sqrt(np.count_nonzero(seen))
+    return max(few * reading_noise(clock[seen], values[seen]), series.step / math.sqrt(12.0))
+
+
+def shown_noise(record: Record, series: Series) -> float:
+    """The largest standard deviation of noise that a series' readings allow, in its channel's unit.
+
+    `TIMES` the scatter from reading to reading (`reading_noise`, or the display's steps), or `ACCURACY` of
+    the largest reading; `UNSEEN` of it where there are too few readings to tell.
+    """
+    largest = float(np.nanmax(np.abs(record.experiments[series.experiment][series.channel])))
+    seen = scatter(record, series)
+    return UNSEEN * largest if math.isnan(seen) else max(TIMES * seen, ACCURACY * largest)
+
+
+def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
+    """Sources of noise by group, none larger than its readings show (`shown_noise`, in the root mean square).
+
+    A larger one is made smaller as a whole, so that it stays as slow as it is.
+    """
+    found = {}
+    for group, source in sources.items():
+        most = [shown_noise(record, s) ** 2 for s in record.series if s.group == group]
+        share = math.sqrt(sum(most) / max(len(most), 1)) / math.hypot(source.white, source.slow)
+        smaller = attrs.evolve(source, white=share * source.white, slow=share * source.slow)
+        found[group] = smaller if share < 1.0 else source
+    return found
+
+
+@attrs.frozen
+class Excess:
+    """The series whose error is most beyond what its noise may be.
+
+    error, noise: root mean square of the misfit and largest noise that the readings show, in `unit`. where:
+    its experiment and channel.
+    """
+
+    error: float
+    noise: float
+    where: str
+
+    @property
+    def times(self) -> float:
+        """Error over noise."""
+        return self.error / max(self.noise, 1e-300)
+
+
+def excess(record: Record, left: Array) -> Excess | None:
+    """The series of a misfit (N,), in the record's units, that is most beyond its noise; None within it.
+
+    Series by series: neither their number nor their length dilutes one that misses.
+    """
+    found = []
+    for s in record.series:
+        if s.group != KNOWN:
+            own = left[s.at] if s.louder is None else left[s.at] / s.louder
+            error = float(np.sqrt(np.mean(own**2)))
+            where = f"{record.experiments[s.experiment].name}, {s.channel}"
+            found.append(Excess(error, shown_noise(record, s), where))
+    worst = max(found, key=lambda e: e.times, default=None)
+    return worst if worst is not None and worst.times > 1.0 else None
+
+
+def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
+    """The record with each block's noise where it comes in bursts or grows with load, and where, in words.
+
+    By the scatter of a misfit (N,) from block to block, in windows: of a smooth error of the model there is
+    none, so that no burst hides one. Unchanged where the scatter is even.
+    """
+    found, words = [], []
+    for s in record.series:
+        louder = None if s.group == KNOWN or math.isnan(s.sample_s) else _loudness(s.time_s, left[s.at])
+        found.append(attrs.evolve(s, louder=louder))
+        if louder is not None:
+            at = s.time_s[int(np.argmax(louder))]
+            words.append(
+                f"{record.experiments[s.experiment].name}, {s.channel}: the noise is up to "
+                f"{louder.max():.2g} times the usual, most at {at:.4g} s; readings there count for less"
+            )
+    return attrs.evolve(record, series=tuple(found)) if words else record, words
+
+
+def _loudness(time_s: Array, left: Array) -> Array | None:
+    """Noise (b,) of each block of a misfit (b,) over the usual, where it is `LOUD` or more; None for even.
+
+    By the scatter of windows, and of single blocks by how far they are from those around them: up to
+    a share `MOST` of all may be so.
+    """
+    from scipy.ndimage import maximum_filter1d, median_filter
+
+    if len(left) < 4 * WINDOW:
+        return None
+    scatter = np.abs(divided(time_s, left, 2))
+    if len(scatter) != len(left) - 2:
+        return None
+    usual = float(np.median(scatter))
+    if not usual > 0.0:
+        return None
+    local = maximum_filter1d(median_filter(scatter, WINDOW, mode="nearest"), WINDOW)
+    share = np.pad(local / usual, 1, "edge")
+    apart = np.abs(left - median_filter(left, WINDOW, mode="nearest"))
+    apart /= max(1.4826 * float(np.median(apart)), 1e-300)
+    alone = apart > np.maximum(ALONE, 2.0 * share)
+    if np.count_nonzero(alone) <= MOST * len(left):
+        share = np.where(alone, apart, share)
+    share = np.minimum(share, LOUDEST)
+    return np.where(share > LOUD, share, 1.0) if (share > LOUD).any() else None
+
+
+def within_scatter(record: Record, left: Array) -> bool:
+    """Whether a misfit (N,) is below `NEAR` times the readings' scatter, no stretch beyond `TIMES`."""
+    for s in record.series:
+        own = left[s.at] if s.louder is None else left[s.at] / s.louder
+        stretch = np.convolve(own, np.ones(min(WINDOW, len(own))) / min(WINDOW, len(own)), "valid")
+        # Slow noise stays for a while where it goes.
+        worst = max(float(np.sqrt(np.mean(own**2))), NEAR / TIMES * float(np.abs(stretch).max(initial=0.0)))
+        if s.group == KNOWN or not worst < NEAR * scatter(record, s):
+            return False
+    return True

@@ -1,0 +1,138 @@
+"""What coincides is told: a cause of the same tests as a specimen, a height or a change is not alone."""
+
+import attrs
+import numpy as np
+
+from mu_addon.evidence.owned import coincident_effects, strain_rate
+from mu_addon.evidence.prediction.beam import EFFECTS as BEAM
+from mu_addon.evidence.prediction.bench import bench_simulators
+from mu_addon.evidence.prediction.drift import zeroed
+from mu_addon.evidence.prediction.hold import ChamberPressure
+from mu_addon.evidence.prediction.unit import TIMED
+from mu_addon.evidence.prediction.yielding import _borne_by_one
+from mu_addon.evidence.selection import _bounded
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from mu_addon.usecases.diagnose.words import sentence, to_do
+from tests.evidence.bench import experiment
+
+T = np.linspace(0.0, 60.0, 100)
+
+
+def pressed(axis="z", modulus=40.0, name="block", seconds=60.0, noise=0.02, seed=0, **fields):
+    strain = 0.15 * T / 60.0
+    stress = modulus * strain + noise * np.random.default_rng(seed).normal(size=len(T))
+    columns = {"time_s": T * seconds / 60.0, "strain": strain, "stress_kPa": stress}
+    return experiment(
+        "lattice_compression",
+        columns,
+        name,
+        axis=axis,
+        section_mm=(30.0, 30.0),
+        length_mm=30.0,
+        **fields,
+    )
+
+
+def titles(found):
+    return {c.effect.title for c in found.selection.causes} | {
+        r for c in found.selection.causes for r in c.rivals
+    }
+
+
+def test_one_block_a_direction_does_not_tell_direction_from_specimen():
+    made = [
+        pressed(name="b0", specimen="S0", seed=1),
+        pressed("x", 37.0, "b1", specimen="S1", seed=2),
+        pressed(name="b2", specimen="S2", seed=3),
+    ]
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert found.kind == "ambiguous"
+    assert {"anisotropy", "geometry_as_typed of specimen S1", "batch_variation of specimen S1"} <= titles(
+        found
+    )
+    assert "calliper" in found.proposal.what or "clamped anew" in found.proposal.what
+    assert "model is wrong" not in sentence(found)[1]
+
+
+def test_fast_tests_that_are_the_soft_ones_are_told_by_their_rate():
+    made = [
+        pressed(name=f"b{i}", modulus=38.0 if fast else 40.0, seconds=6.0 if fast else 60.0, specimen="S",
+                   seed=i)
+        for i, fast in enumerate([False, True, False, True, False, True])
+    ]  # fmt: skip
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert found.kind in ("named", "ambiguous")
+    assert any(t.startswith("self_heating of tests at ") for t in titles(found))
+
+
+def test_groups_are_heights_changes_and_rates():
+    made = [
+        pressed(name="a", specimen="S0"),
+        pressed(name="b", specimen="S1", seconds=6.0),
+        pressed(name="c", specimen="S1"),
+    ]
+    groups = {(e.name, e.whose): set(names) for e, names in coincident_effects(made).items()}
+    assert groups == {
+        ("geometry_as_typed", "specimen S0"): {"a"},
+        ("geometry_as_typed", "specimen S1"): {"b", "c"},
+        ("step_change", "tests from b on"): {"b", "c"},
+        ("step_change", "tests from c on"): {"c"},
+        ("self_heating", "tests at 2.5 %/s or faster"): {"b"},
+    }
+    np.testing.assert_allclose(10.0 * strain_rate(made[0]), strain_rate(made[1]))
+
+
+def test_a_height_scales_the_strain_of_its_specimen_alone():
+    made = [pressed(name="a", specimen="S0"), pressed(name="b", specimen="S1")]
+    model = Composite(bench_simulators(made))
+    plain = {"lattice_modulus_kPa": 40.0}
+    typed = {**plain, "geometry_as_typed.height of specimen S1": 0.25}
+    np.testing.assert_array_equal(model.predict(made[0], typed), model.predict(made[0], plain))
+    np.testing.assert_allclose(1.25 * model.predict(made[1], typed), model.predict(made[1], plain))
+
+
+def test_a_gauge_is_not_off_by_a_fifth_of_what_it_reads():
+    made = [experiment("pressure_hold", {"time_s": T, "pressure_kPa": 35.0 + 0.0 * T})]
+    (offset,) = (e for e in zeroed(TIMED, "pressure_hold", made) if e.name == "pressure_offset")
+    assert (offset.parameters[0].low, offset.parameters[0].high) == (-3.5, 3.5)
+
+
+def test_a_density_that_no_resin_has_is_no_cause():
+    weight = next(e for e in BEAM if e.name == "gravity").parameters[0]
+    assert _bounded(weight, 3710.0)
+    assert not _bounded(weight, 1070.0)
+
+
+def test_gas_warms_with_its_room_as_logged_or_as_fitted():
+    log = 20.0 + 3.0 * T / 60.0
+    plain = experiment("pressure_hold", {"time_s": 60.0 * T, "pressure_kPa": 100.0 + 0.0 * T})
+    logged = attrs.evolve(plain, columns={**plain.columns, "room_C": log})
+    model = ChamberPressure([plain])
+    by_log = model.predict(logged, {})[0]
+    np.testing.assert_allclose(by_log + 101.325, 201.325 * (1.0 + (log - 20.0) / 296.0))
+    by_rate = model.predict(plain, {"temperature_drift.room_K_per_hour": 3.0})[0]
+    np.testing.assert_allclose(by_rate, by_log)
+
+
+def test_one_element_that_yields_unloads_elastically_and_ends():
+    x = np.array([0.0, 1.0, 1.0, 0.5, -0.2, -4.0, -3.9])
+    z = _borne_by_one(x, 1.0)
+    # First loading of power 1 is 1 - exp(-x).
+    first = 1.0 - np.exp(-1.0)
+    back = first - 0.5
+    np.testing.assert_allclose(z[:4], [0.0, first, first, back], atol=1e-5)
+    np.testing.assert_allclose(z[5], -(1.0 - np.exp(-(4.0 + 1.0 - first))), atol=1e-4)
+    np.testing.assert_allclose(z[6] - z[5], 0.1, atol=1e-4)
+
+
+def test_what_is_not_explained_says_how_far_the_model_misses():
+    strain = T / 60.0
+    made = [pressed(name="a", specimen="S", seed=1)]
+    stress = made[0]["stress_kPa"] + 1.5 * np.sin(9.0 * strain)
+    made = [attrs.evolve(made[0], columns={**made[0].columns, "stress_kPa": stress})]
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert found.kind == "unexplained"
+    _, words = sentence(found)
+    assert "kPa, and no effect of the library explains that" in words
+    assert "Do not trust the simulation to better than" in to_do(found)
