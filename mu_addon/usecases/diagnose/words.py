@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,12 @@ from .remedies import what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
+# Names of experiments and specimens that are of a rigid chamber, and what to ask for where one is there.
+_RIGID = re.compile(r"rigid|control|blank|alumin|metal|steel|plug", re.IGNORECASE)
+_INSTEAD = {
+    "the same hold with a plug of metal in the unit's place": "the same hold with soapy water on its joints",
+    "a longer hold, and the same in a rigid chamber of that volume": "a hold ten times as long",
+}
 # Share of a misfit from which on what takes it is worth a sentence.
 WORTH_TELLING = 0.1
 
@@ -172,7 +179,15 @@ def _what_remains(verdict: Verdict) -> str:
 
 
 def advice(verdict: Verdict) -> str:
-    """What to measure next, in words."""
+    """What to measure next, in words; no rigid chamber where one is among the experiments."""
+    words = _asked(verdict)
+    if any(_RIGID.search(f"{e.name} {e.specimen or ''}") for e in verdict.experiments):
+        for asked, instead in _INSTEAD.items():
+            words = words.replace(asked, instead).replace(_upper(asked), _upper(instead))
+    return words
+
+
+def _asked(verdict: Verdict) -> str:
     if verdict.proposal is not None:
         effects = listed([readable(n) for n in verdict.proposal.separates])
         return f"{_upper(verdict.proposal.what)}. It distinguishes {effects}."
