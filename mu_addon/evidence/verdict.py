@@ -38,6 +38,7 @@ from .selection import (
     reselected,
     select,
     share_taken,
+    too_far,
 )
 from .sensitivity import (
     ABSORBED,
@@ -308,6 +309,9 @@ def diagnose(
     if kind == "unexplained" and (words := _of_no_size(fitter, chosen)):
         chosen = attrs.evolve(chosen, chosen=chosen.base, causes=(), doubted="", excused=words)
         set_aside = [*set_aside, words]
+        kind = _kind(fitter, chosen)
+    if kind == "none" and not chosen.excused and (words := too_far(fitter, chosen.base)):
+        chosen = attrs.evolve(chosen, doubted=words)
         kind = _kind(fitter, chosen)
     if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
         chosen = most
