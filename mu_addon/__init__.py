@@ -3,6 +3,8 @@
 import importlib
 from typing import Any
 
+__version__ = "0.1.0"
+
 
 def register() -> None:
     """Called by Blender when the extension is enabled; a second call changes nothing."""

@@ -9,6 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+from .. import __version__
 from . import all_commands
 
 STATUSES = (
@@ -29,7 +30,15 @@ class _Commands(argparse._SubParsersAction):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, and where help is."""
+    """Says what is wrong in one line, what may have been meant, and where help is."""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            from ..design.toml_text import nearest
+
+            names = [str(name) for name in action.choices]
+            words = f"{value!r} is unknown{nearest(str(value), names)} (choose from {', '.join(names)})"
+            raise argparse.ArgumentError(action, words)
 
     def error(self, message: str) -> None:  # type: ignore[override]
         from ..run.progress import printable
@@ -46,6 +55,7 @@ def parser() -> argparse.ArgumentParser:
         "lattice and an optical waveguide.",
         epilog=STATUSES,
     )
+    top.add_argument("--version", action="version", version=f"mu_addon {__version__}")
     commands = top.add_subparsers(
         dest="command", required=True, metavar="COMMAND", parser_class=_Parser, action=_Commands
     )

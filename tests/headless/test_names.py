@@ -1,0 +1,32 @@
+"""The version, and wrong names of commands and choices, as a newcomer meets them."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import mu_addon
+from mu_addon.cli.main import main
+
+ROOT = Path(mu_addon.__file__).parents[1]
+
+
+def test_one_version(capsys):
+    for name, table in (("pyproject.toml", "project"), ("blender_manifest.toml", "")):
+        found = tomllib.loads((ROOT / name).read_text(encoding="utf-8"))
+        assert (found[table] if table else found)["version"] == mu_addon.__version__
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"mu_addon {mu_addon.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [(["simulat"], "'simulate'"), (["simulate", "--fidelity", "resolve", "--out", "x"], "'resolved'")],
+)
+def test_a_wrong_name_is_told_with_the_nearest(line, meant, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(line)
+    assert ended.value.code == 2
+    assert f"did you mean {meant}?" in capsys.readouterr().err
