@@ -19,11 +19,16 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `import`."""
     command = commands.add_parser(
         "import",
-        help="Import files of test machines and data loggers (CSV, text, Excel): propose kind, columns, "
-        "units and signs, ask for what is missing, and write a folder of measured data.",
+        help="Import files of test machines and data loggers (CSV, text, Excel, HTML): propose kind, "
+        "columns, units and signs, ask for what is missing, and write a folder of measured data.",
         epilog="example: run.py import tension.csv --set mode=uniaxial --set length_mm=40 --out measured",
     )
-    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, text, .xlsx, .xls or .ods file.")
+    command.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help="CSV, text, workbook (.xlsx, .xls, .ods) or HTML table, by its content.",
+    )
     command.add_argument(
         "--set",
         dest="answers",
@@ -31,8 +36,13 @@ def add(commands: Commands[Any]) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="Answer to a question, such as kind=coupon, section_mm=12.5x3, length_mm=40, unit.Load=N, "
-        "column.Ch1=force, decimal=, or, for one experiment alone, NAME.KEY=VALUE. Repeat the option for "
-        "each answer.",
+        "column.Ch1=force, column.2=none, decimal=, or, for one experiment alone, NAME.KEY=VALUE. A column "
+        "goes by its title or its number. Repeat the option for each answer.",
+    )
+    command.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="Show what is understood, in the terminal and with pictures in import.html, and import nothing.",
     )
     add_results(command)
 
@@ -56,7 +66,16 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         answers,
         context,
         _asked_in_terminal if asks else None,
+        (lambda lines: None) if options.json else _show,
+        options.dry_run,
     )
+
+
+def _show(lines: list[str]) -> None:
+    """Lines to the terminal, before what is asked."""
+    from ..run.progress import printable
+
+    sys.stderr.write(printable("\n".join(lines), sys.stderr) + "\n")
 
 
 def _asked_in_terminal(proposal: Proposal, question: Question) -> str:

@@ -10,8 +10,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..cells.own import own_rows, own_text
 from ..errors import InputError
-from ..reading import file_text, require_rows
+from ..reading import require_rows
 
 Array = np.ndarray[Any, Any]
 
@@ -94,7 +95,7 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
     columns: the names to ask for. Raises InputError where the file is unreadable, too long or empty.
     """
     try:
-        lines = file_text(path, _LONGEST).splitlines()
+        lines = own_text(path, _LONGEST).splitlines()
     except OSError as error:
         raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
     except UnicodeDecodeError:
@@ -103,15 +104,12 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
     numbered = [(n, words) for n, line in enumerate(lines, 1) if (words := line.split("#")[0].strip())]
     if not numbered:
         raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(columns)}")
-    rows = tuple((n, words, _cells(words, f"{path}, line {n}")) for n, words in numbered)
-    return ProtocolText(path, rows[0][2], rows[0][:2], rows[1:])
-
-
-def _cells(line: str, where: str) -> tuple[str, ...]:
     try:
-        return tuple(cell.strip() for cell in next(csv.reader([line])))
+        cells = own_rows(numbered)
     except csv.Error as error:
-        raise InputError(f"not CSV: {error}", where, "correct that line") from None
+        raise InputError(f"not CSV: {error}", str(path), "separate the columns by commas") from None
+    rows = tuple((n, words, tuple(row)) for (n, words), (_, row) in zip(numbered, cells, strict=True))
+    return ProtocolText(path, rows[0][2], rows[0][:2], rows[1:])
 
 
 def read_protocol(path: Path) -> Protocol:

@@ -1,4 +1,8 @@
-"""Tables in the rows of a file: blocks of numbers with the titles, units and remarks above them."""
+"""Tables in the rows of a file, judged by column: a row belongs to one where its columns have numbers.
+
+A row with a cell that is no number, a line of text or a blank line within a table end it not; what of them is
+not read is listed with its lines and the reason.
+"""
 
 from __future__ import annotations
 
@@ -9,30 +13,71 @@ from typing import Any
 import attrs
 import numpy as np
 
-from .cells import Row, Sheet, is_numeric, number
+from ..cells.clock import clock, is_clock
+from ..cells.dialect import Row, split
+from ..cells.notation import judged, number, without_units
+from ..errors import InputError
 from .quantities import Column, column, is_unit, plain
+from .source import Sheet
 
 Array = np.ndarray[Any, Any]
 
 # A line that names the specimen whose table follows, such as "Specimen 2".
 _SPECIMEN = re.compile(
-    r"(specimen|sample|probe|probekorper|eprouvette|provino|probeta|probka)\W*[\w.-]{1,20}"
+    r"(specimen|sample|probe|probekorper|eprouvette|provino|probeta|probka|monster|prov|obrazec|vzorek)"
+    r"\W*[\w.-]{1,20}"
 )
 # A line of one cell is kept, such as "Compression test", but no prose.
 _LONGEST_LINE = 80
 # Fewer rows of numbers are a table of results or settings, not a record.
 FEWEST = 3
-# Rows of titles, units and names of specimens directly above the numbers.
-_MOST_TITLE_ROWS = 3
+# Rows of titles, units and names of specimens above the numbers, and rows that may lie between them.
+_MOST_TITLE_ROWS, _MOST_BETWEEN = 4, 3
+# Rows by which the columns of a table are known while its end is sought.
+_JUDGED = 30
+# What begins a line that is a comment, titles included.
+_COMMENT = re.compile(r"^(#+|%+|//+|;+)\s*")
+_LONGEST_UNIT = 10
+# Letters of a line that are shown where it is listed.
+_LONGEST_SHOWN = 50
+
+
+@attrs.frozen
+class Unread:
+    """Something of a file that is not read: its lines, or a column, and the reason."""
+
+    what: str
+    why: str
+    lines: tuple[int, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The same in words, such as "line 62: 'OVERLOAD' in 'Load (N)' is no number"."""
+        return f"{self.what or spans(self.lines)}: {self.why}"
+
+
+def spans(lines: Sequence[int]) -> str:
+    """Numbers of lines in words, such as "lines 3 to 7, 9"."""
+    runs: list[list[int]] = []
+    for line in sorted(set(lines)):
+        if runs and line == runs[-1][1] + 1:
+            runs[-1][1] = line
+        else:
+            runs.append([line, line])
+    words = ", ".join(f"{a} to {b}" if b > a else str(a) for a, b in runs)
+    return f"line{'s' if len(set(lines)) > 1 else ''} {words}"
 
 
 @attrs.frozen(eq=False)
 class Block:
     """A table of one record.
 
-    columns: what each holds; values (n, columns) as they stand, nan where one is missing; lines (n,) in the
-    file; label: name above its columns, "" without one; facts: what the rows above say, by name in small
-    letters: the cells after it, none of a line of one cell; decimal: the sign in these.
+    columns: what each holds; values (n, columns) as they stand, nan where one is missing or unreadable;
+    lines (n,) in the file; label: name above its columns, "" without one; facts: what the rows above say, by
+    name in small letters: the cells after it, none of a line of one cell; decimal: the sign in these; bad:
+    text of the cells that are no number, by row and column; unread: columns that are not read; unsure:
+    whether both decimal signs are possible; noted: what was concluded; clock: the column that holds times of
+    day, None for none.
     """
 
     sheet: str
@@ -42,61 +87,229 @@ class Block:
     values: Array
     lines: Array
     facts: dict[str, tuple[str, ...]]
+    bad: dict[tuple[int, int], str] = attrs.field(factory=dict)
+    unread: tuple[Unread, ...] = ()
+    unsure: bool = False
+    noted: tuple[str, ...] = ()
+    clock: int | None = None
 
 
-def blocks(sheet: Sheet) -> tuple[Block, ...]:
-    """The records of a sheet, in their order; records side by side in one table are divided."""
-    found: list[Block] = []
-    begin = facts_from = 0
-    facts: dict[str, tuple[str, ...]] = {}
-    specimen = ""
-    rows = sheet.rows
-    while begin < len(rows):
-        if not is_numeric(rows[begin], sheet.decimal):
-            begin += 1
-            continue
-        end = begin
-        while end < len(rows) and is_numeric(rows[end], sheet.decimal):
-            end += 1
-        if end - begin < FEWEST:
+@attrs.frozen(eq=False)
+class Tables:
+    """The records of a sheet in their order, the lines that are not read, and those of titles and facts."""
+
+    blocks: tuple[Block, ...]
+    unread: tuple[Unread, ...]
+    head: tuple[int, ...]
+
+
+def tables(sheet: Sheet) -> Tables:
+    """The records of a sheet; records side by side in one table are divided. Raises InputError."""
+    return _Finding(sheet).tables()
+
+
+class _Finding:
+    """A sheet on its way to tables."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self.sheet, self.rows = sheet, sheet.rows
+        self.numeric = [row.numeric for row in self.rows]
+        self.facts: dict[str, tuple[str, ...]] = {}
+        self.specimen = ""
+        self.heads: list[tuple[str, str]] = []
+        self.unread: list[Unread] = []
+
+    def tables(self) -> Tables:
+        found: list[Block] = []
+        begin = 0
+        while (start := self._start(begin)) is not None:
+            members, skipped, end = self._extent(start)
+            if len(members) < FEWEST:
+                # Results or settings: facts of the table that follows.
+                start = members[-1] + 1
+                if self._start(start) is None:
+                    break
+                self._note_numbers(range(begin, start))
+                self.facts = self.facts | _facts(self.rows[begin:start])
+                begin = start
+                continue
+            found += self._table(begin, start, members, skipped)
             begin = end
-            continue
-        above = _titles(rows[facts_from:begin], sheet.decimal)
-        remarks_above = rows[facts_from : begin - len(above)]
-        facts = facts | _facts(remarks_above)
-        specimen = _specimen(remarks_above) or specimen
-        new = [
-            attrs.evolve(block, label=block.label or specimen)
-            for block in _block(sheet, above, rows[begin:end], facts)
-        ]
-        # A recorder that writes its titles again and again goes on with one record.
-        if found and _goes_on(found[-1], new):
-            found[-1] = _joined(found[-1], new[0])
-        else:
-            found += new
-        begin = facts_from = end
-    return tuple(found)
+        if found:
+            self._leave_text([row for row in self.rows[begin:] if row.filled], "below the table")
+        told = {int(line) for block in found for line in block.lines}
+        told |= {line for one in self.unread for line in one.lines}
+        head = [row.line for row in self.rows if row.filled and not told.intersection(row.lines)]
+        return Tables(tuple(found), tuple(self.unread), tuple(head))
+
+    def _leave(self, rows: Sequence[Row], why: str) -> None:
+        lines = tuple(line for row in rows for line in row.lines)
+        if lines:
+            self.unread.append(Unread("", why, lines))
+
+    def _leave_text(self, rows: Sequence[Row], why: str) -> None:
+        """List rows with what they say."""
+        by_text: dict[str, list[Row]] = {}
+        for row in rows:
+            by_text.setdefault(" ".join(row.filled), []).append(row)
+        for text, same in by_text.items():
+            shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+            self._leave(same, f"{shown!r}: {why}")
+
+    def _note_numbers(self, places: Sequence[int] | range) -> None:
+        """List the rows of numbers that are no record."""
+        self._leave(
+            [self.rows[k] for k in places if len(self.numeric[k]) > 1],
+            f"numbers above a table, fewer than {FEWEST} rows",
+        )
+
+    def _start(self, begin: int) -> int | None:
+        """The first row from `begin` on that shares two columns of numbers with one of the next three."""
+        filled = [k for k in range(begin, len(self.rows)) if self.rows[k].cells]
+        for at, k in enumerate(filled):
+            if len(self.numeric[k]) < 2:
+                continue
+            if any(len(self.numeric[k] & self.numeric[j]) >= 2 for j in filled[at + 1 : at + 4]):
+                return k
+        return None
+
+    def _extent(self, start: int) -> tuple[list[int], list[int], int]:
+        """The rows of a table, the rows within it that hold no two numbers of it, and where it ends."""
+        near = [m for m in self.numeric[start : start + _JUDGED] if len(m) > 1]
+        counts: dict[int, int] = {}
+        for m in near:
+            for k in m:
+                counts[k] = counts.get(k, 0) + 1
+        usual = frozenset(k for k, count in counts.items() if 2 * count >= len(near))
+        self.usual = usual = usual if len(usual) > 1 else frozenset(counts)
+        least = min(2, len(usual))
+        members, pending, skipped = [start], [], []
+        for k in range(start + 1, len(self.rows)):
+            row = self.rows[k]
+            if len(self.numeric[k] & usual) >= least:
+                if k > members[-1] + 1 and self._begins_anew(members, pending, k):
+                    break
+                skipped += pending
+                pending = []
+                members.append(k)
+            elif row.filled:
+                pending.append(k)
+        return members, skipped, members[-1] + 1
+
+    def _begins_anew(self, members: Sequence[int], between: Sequence[int], k: int) -> bool:
+        """Whether another record begins at row k, after rows without numbers."""
+        if any(
+            len(row.filled) == 1 and _SPECIMEN.fullmatch(plain(row.filled[0])) for row in self._at(between)
+        ):
+            return True
+        order = self._order(members, k)
+        titles = [row for row in self._at(between) if _is_titles(row)]
+        if not titles:
+            # A first column that begins again is another record's.
+            return order is not None and order < 0
+        width = len(self.rows[k].filled)
+        known = any(sum(bool(column(c).quantity) or is_unit(c) for c in row.filled) > 1 for row in titles)
+        same = any(list(row.filled) == cells for row in titles for cells in self._titles_of(members[0]))
+        if order is not None and order > 0 and (same or not known):
+            return False
+        return known or same or any(len(row.filled) >= width for row in titles)
+
+    def _at(self, places: Sequence[int]) -> list[Row]:
+        return [self.rows[k] for k in places]
+
+    def _titles_of(self, start: int) -> list[list[str]]:
+        return [list(row.filled) for row in self.rows[max(0, start - _MOST_TITLE_ROWS) : start] if row.filled]
+
+    def _order(self, members: Sequence[int], k: int) -> int | None:
+        """1 where the first column that grows goes on growing at row k, -1 where it falls back, None else."""
+        first, last = members[0], members[-1]
+        for place in sorted(self.usual):
+            cells = [
+                self.rows[i].cells[place] if place < len(self.rows[i].cells) else "" for i in (first, last, k)
+            ]
+            read = (
+                clock(cells).seconds if all(map(is_clock, cells)) else judged(cells, self.sheet.usual).values
+            )
+            a, b, c = read
+            if np.isfinite(read).all() and (b > a or (first == last and c != b)):
+                return 1 if c > b else -1 if c < b - 0.5 * (b - a) or first == last else None
+        return None
+
+    def _table(self, begin: int, start: int, members: Sequence[int], skipped: Sequence[int]) -> list[Block]:
+        """The records of a table whose rows are known."""
+        above = self.rows[begin:start]
+        titles, damaged = self._titles(range(begin, start))
+        used = {row.line for row in titles} | {row.line for row in damaged}
+        remarks = [row for row in above if row.line not in used and row.filled]
+        self.facts = self.facts | _facts(remarks)
+        self.specimen = _specimen(remarks) or self.specimen
+        self._leave_text(damaged, "between the titles and the first row that is read")
+        self._note_numbers([k for k in range(begin, start) if self.rows[k] in remarks])
+        self._leave_text(self._at(skipped), "no row of numbers, within the table")
+        blocks = _block(self.sheet, titles, self._at(members), self.facts, self.heads)
+        self.heads = [(c.title, c.unit) for b in blocks for c in b.columns] if len(blocks) == 1 else []
+        read = {int(line) for block in blocks for line in block.lines}
+        self._leave([row for row in self._at(members) if row.line not in read], "no two columns of numbers")
+        return [attrs.evolve(block, label=block.label or self.specimen) for block in blocks]
+
+    def _titles(self, places: range) -> tuple[list[Row], list[Row]]:
+        """The rows of titles, units and labels above the numbers, and damaged rows of numbers below them."""
+        width = max(self.usual) + 1
+        found: list[Row] = []
+        damaged: list[Row] = []
+        for k in reversed(places):
+            row = self._title_row(k, width)
+            if not row.filled:
+                continue
+            if not _is_titles(row):
+                within = self.numeric[k] & self.usual
+                if found or len(damaged) == _MOST_BETWEEN or not (within or len(row.filled) == 1):
+                    break
+                damaged.insert(0, row)
+                continue
+            if len(found) == _MOST_TITLE_ROWS:
+                break
+            if found and not _is_units(found[0]) and not _is_units(row):
+                same = len(row.filled) >= len(found[0].filled) > 2
+                if not (_is_label_row(row, found[0]) or (same and _more_known(row, found[0]))):
+                    break
+            if found and _is_units(row):
+                break
+            found.insert(0, row)
+        return (found, damaged) if found else ([], [])
+
+    def _title_row(self, k: int, width: int) -> Row:
+        """A row above the numbers with its titles apart, though another separator divides them."""
+        row = self.rows[k]
+        cells = (_COMMENT.sub("", row.cells[0]), *row.cells[1:]) if row.cells else row.cells
+        if len([c for c in cells if c]) == 1 and width > 1:
+            text = next(c for c in cells if c)
+            for delimiter in ("\t", ";", ",", "spaces"):
+                parts = split(text, delimiter)
+                if len(parts) == width and all(parts):
+                    return attrs.evolve(row, cells=parts)
+            words = re.sub(r"\s+(?=[(\[])", "\u00a0", text).split(" ")
+            if len(words) == width and self.sheet.delimiter == "spaces":
+                return attrs.evolve(row, cells=tuple(word.replace("\u00a0", " ") for word in words))
+        return attrs.evolve(row, cells=cells)
 
 
-def _titles(above: Sequence[Row], decimal: str) -> list[Row]:
-    """The rows of titles directly above numbers: text in several cells, or a row of units below one."""
-    found: list[Row] = []
-    for row in reversed(above):
-        words = [cell for cell in row.filled if number(cell, decimal) is None or is_unit(cell)]
-        units = bool(row.filled) and all(is_unit(cell) for cell in row.filled)
-        if len(found) == _MOST_TITLE_ROWS or len(words) < len(row.filled) or len(row.filled) < 2:
-            break
-        # Titles are one row; what stands above them is a row of specimens' names, with cells left empty.
-        if found and not _all_units(found[0]) and not _is_label_row(row, found[0]):
-            break
-        if units and found:
-            break
-        found.insert(0, row)
-    return found
+def _is_titles(row: Row) -> bool:
+    """Whether a row may be titles or units: text in two cells or more, and nothing that is a reading."""
+    filled = row.filled
+    numbers = [cell for cell in filled if not is_unit(cell) and row.cells.index(cell) in row.numeric]
+    return len(filled) >= 2 and not numbers
 
 
-def _all_units(row: Row) -> bool:
-    return all(is_unit(cell) for cell in row.filled)
+def _is_units(row: Row) -> bool:
+    """Whether a row is of units, known ones or not: all in brackets, or most known and all short."""
+    filled = row.filled
+    if all(re.fullmatch(r"[(\[].*[)\]]", cell) for cell in filled):
+        return True
+    known = sum(map(is_unit, filled))
+    return (
+        2 * known >= len(filled) and all(is_unit(c) or len(c) <= _LONGEST_UNIT for c in filled) and known > 0
+    )
 
 
 def _is_label_row(row: Row, titles: Row) -> bool:
@@ -104,41 +317,202 @@ def _is_label_row(row: Row, titles: Row) -> bool:
     return 2 <= len(row.filled) < len(titles.filled) and len(row.cells) > len(row.filled)
 
 
+def _more_known(row: Row, below: Row) -> bool:
+    """Whether titles in two rows are known by the upper one."""
+
+    def count(cells: Sequence[str]) -> int:
+        return sum(bool(column(cell).quantity) for cell in cells)
+
+    return count(row.cells) > count(below.cells)
+
+
 def _block(
-    sheet: Sheet, titles: Sequence[Row], rows: Sequence[Row], facts: dict[str, tuple[str, ...]]
+    sheet: Sheet,
+    titles: Sequence[Row],
+    rows: Sequence[Row],
+    facts: dict[str, tuple[str, ...]],
+    before: Sequence[tuple[str, str]],
 ) -> list[Block]:
-    width = max(len(row.cells) for row in rows)
-    values = np.full((len(rows), width), np.nan)
-    for i, row in enumerate(rows):
-        for k, cell in enumerate(row.cells):
-            found = number(cell, sheet.decimal)
-            values[i, k] = np.nan if found is None else found
-    units = next((row for row in titles if _all_units(row)), None)
+    units = next((row for row in titles if _is_units(row)), None)
     named = [row for row in titles if row is not units]
+    if units is not None and not named:
+        # Columns that are known by their units alone.
+        named, units = [], units
     heads = named[-1].cells if named else ()
-    labels = named[-2].cells if len(named) > 1 else ()
-    used = [k for k in range(width) if np.isfinite(values[:, k]).any()]
-    columns = {k: column(_cell(heads, k), _cell(units.cells if units else (), k)) for k in used}
+    labels: Sequence[str] = ()
+    if len(named) > 1:
+        upper = named[-2].cells
+        if _is_label_row(named[-2], named[-1]):
+            labels = upper
+        else:
+            heads = tuple(
+                f"{_cell(upper, k)} {_cell(heads, k)}".strip() for k in range(max(len(upper), len(heads)))
+            )
+    width = max(len(row.cells) for row in rows)
+    _require_divided(sheet, heads, rows)
     lines = np.array([row.line for row in rows])
+    read = {k: _column(sheet, [_cell(row.cells, k) for row in rows], lines) for k in range(width)}
+    read = _in_one_notation(sheet, read)
+    columns: dict[int, Column] = {}
+    unread: list[Unread] = []
+    for k, one in read.items():
+        title, unit = _cell(heads, k), _cell(units.cells if units else (), k)
+        if not titles and len(before) == width:
+            title, unit = before[k]
+        if one.numbers:
+            columns[k] = attrs.evolve(column(title, unit or one.unit), place=k + 1)
+            if one.clock:
+                columns[k] = attrs.evolve(
+                    columns[k],
+                    quantity="time",
+                    unit="" if one.halves else "clock",
+                    factor=None if one.halves else 1.0,
+                )
+        elif one.words:
+            unread.append(Unread(_named(title, k), one.words))
     parts = []
     for group in _side_by_side(columns):
-        chosen = values[:, group]
-        keep = np.isfinite(chosen).sum(axis=1) >= min(2, len(group))
-        if keep.sum() < FEWEST:
+        values = np.stack([read[k].values for k in group], axis=1)
+        # Of records side by side, the shorter ends where its cells are empty.
+        filled = np.array([any(_cell(row.cells, k) for k in group) for row in rows])
+        if filled.sum() < FEWEST or len(group) < 2:
             continue
+        places = np.cumsum(filled) - 1
+        bad = {
+            (int(places[i]), n): text
+            for n, k in enumerate(group)
+            for i, text in read[k].bad.items()
+            if filled[i]
+        }
         label = next((_cell(labels, k) for k in range(group[0], -1, -1) if _cell(labels, k)), "")
         parts.append(
             Block(
                 sheet=sheet.name,
                 label=label,
-                decimal=sheet.decimal,
+                decimal=next((read[k].decimal for k in group if read[k].decimal), sheet.usual or "."),
                 columns=tuple(columns[k] for k in group),
-                values=chosen[keep],
-                lines=lines[keep],
+                values=values[filled],
+                lines=lines[filled],
                 facts=facts,
+                bad=bad,
+                unread=tuple(unread) if not parts else (),
+                unsure=any(read[k].unsure for k in group),
+                clock=next((n for n, k in enumerate(group) if read[k].clock), None),
+                noted=tuple(
+                    f"{_named(columns[k].title, k)}: {read[k].noted}" for k in group if read[k].noted
+                ),
             )
         )
     return parts
+
+
+def _named(title: str, k: int) -> str:
+    return f"column {title!r}" if title else f"column {k + 1}, which has no title"
+
+
+def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) -> None:
+    """Raise InputError where commas divide columns and decimals alike."""
+    named = sum(map(bool, heads))
+    if sheet.delimiter != "," or named < 2 or any("." in cell for row in rows[:99] for cell in row.cells):
+        return
+    widths = sorted(len(row.cells) for row in rows)
+    if widths[len(widths) // 2] >= 2 * named - 1 and widths[-1] > named:
+        raise InputError(
+            f"{widths[-1]} cells under {named} titles: commas divide columns and decimals alike",
+            f"line {rows[0].line}",
+            "export it with semicolons or tabs between columns, or with decimal points",
+        )
+
+
+@attrs.frozen(eq=False)
+class _Read:
+    """A column as it was read: numbers (values (n,)) or none, with the words that say why."""
+
+    values: Array
+    bad: dict[int, str]
+    cells: tuple[str, ...]
+    numbers: bool = True
+    decimal: str = ""
+    unsure: bool = False
+    clock: bool = False
+    halves: bool = False
+    unit: str = ""
+    words: str = ""
+    noted: str = ""
+
+
+def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
+    """A column of numbers, of a clock, or of words, as most of its cells are."""
+    filled = [cell for cell in cells if cell]
+    empty = np.full(len(cells), np.nan)
+    if not filled:
+        return _Read(empty, {}, (), numbers=False)
+    clocks = sum(map(is_clock, filled))
+    if 2 * clocks > len(filled):
+        return _clock_column(cells)
+    apart, unit = without_units(cells)
+    found = judged(apart, sheet.usual, sheet.forced)
+    if sheet.forced:
+        _require_forced(sheet, found.unreadable, apart, lines)
+    if 2 * len(found.unreadable) >= len(filled):
+        words = max(set(filled), key=filled.count) if len(filled) < 10000 else filled[0]
+        same = (
+            " in every row" if len(set(filled)) == 1 and len(filled) == len(cells) else f", such as {words!r}"
+        )
+        return _Read(
+            empty, {}, (), numbers=False, words=f"words{same}" if same[0] == "," else f"{words!r}{same}"
+        )
+    noted = ""
+    if found.both:
+        noted = (
+            f"{found.decimal!r} divides decimals and thousands alike from line {lines[found.both[0]]} on: "
+            f"{cells[found.both[0]]} is read as {found.values[found.both[0]]:.10g}"
+        )
+    bad = {i: cells[i] for i in found.unreadable}
+    unsure = not found.sure and not sheet.forced
+    return _Read(found.values, bad, tuple(apart), True, found.decimal, unsure, unit=unit, noted=noted)
+
+
+def _require_forced(sheet: Sheet, unreadable: Sequence[int], cells: Sequence[str], lines: Array) -> None:
+    """Raise InputError for a number that the answered decimal sign does not read, and the other does."""
+    other = "." if sheet.forced == "," else ","
+    for i in unreadable:
+        if number(cells[i], other) is not None:
+            raise InputError(
+                f"{cells[i]!r} is no number where {sheet.forced!r} is the decimal sign",
+                f"line {lines[i]}",
+                f"answer decimal={other}, or leave the decimal sign to the columns",
+            )
+
+
+def _clock_column(cells: list[str]) -> _Read:
+    found = clock(cells)
+    if np.nanmax(found.seconds, initial=0.0) == 0.0:
+        return _Read(found.seconds, {}, (), numbers=False, words="the same date in every row")
+    bad = {i: cells[i] for i in found.unreadable}
+    return _Read(found.seconds, bad, (), clock=True, halves=found.halves)
+
+
+def _in_one_notation(sheet: Sheet, read: dict[int, _Read]) -> dict[int, _Read]:
+    """The columns, those that do not tell their decimal sign by the sign of those that do."""
+    told = [
+        one.decimal
+        for one in read.values()
+        if one.cells and not one.unsure and any(_signed(c) for c in one.cells)
+    ]
+    if not told or sheet.forced:
+        return {k: attrs.evolve(one, unsure=one.unsure and not sheet.usual) for k, one in read.items()}
+    usual = max(set(told), key=told.count)
+    return {
+        k: attrs.evolve(one, values=judged(one.cells, usual).values, decimal=usual, unsure=False)
+        if one.unsure
+        else one
+        for k, one in read.items()
+    }
+
+
+def _signed(cell: str) -> bool:
+    return "." in cell or "," in cell
 
 
 def _cell(cells: Sequence[str], k: int) -> str:
@@ -180,19 +554,3 @@ def _specimen(rows: Sequence[Row]) -> str:
     """The name of a specimen that stands on a line of its own, the last one; "" for none."""
     lines = [row.filled[0] for row in rows if len(row.filled) == 1]
     return next((line for line in reversed(lines) if _SPECIMEN.fullmatch(plain(line))), "")
-
-
-def _goes_on(last: Block, new: Sequence[Block]) -> bool:
-    """Whether a table goes on with the record before it: equal columns, and a time that runs on."""
-    if len(new) != 1 or [c.title for c in new[0].columns] != [c.title for c in last.columns]:
-        return False
-    time = next((k for k, c in enumerate(last.columns) if c.quantity == "time"), None)
-    return time is not None and bool(new[0].values[0, time] > last.values[-1, time])
-
-
-def _joined(one: Block, other: Block) -> Block:
-    return attrs.evolve(
-        one,
-        values=np.concatenate([one.values, other.values]),
-        lines=np.concatenate([one.lines, other.lines]),
-    )

@@ -11,11 +11,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..cells.notation import number
 from ..errors import InputError
-from ..measured.kinds import AXES, KINDS, MODES, PLATES, VALVES, named
-from .blocks import Block
-from .cells import number
-from .quantities import READ_IN, Column, plain, unit_of
+from ..measured.kinds import AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
+from .blocks import Block, Unread
+from .quantities import READ_IN, Column, column, plain, unit_of
 
 Array = np.ndarray[Any, Any]
 
@@ -35,6 +35,12 @@ _NAME = re.compile(
     r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
 )
 _KEYS_OF_NUMBERS = ("temperature_C", "scale", "orientation_deg", "mass_g", "chamber_volume_mm3", "gap_mm")
+# Columns that are asked for at most.
+_MOST_ASKED = 12
+# A column that is missing in a larger share of the rows is left out instead of them, where it may be.
+_SPARSE = 0.1
+# More degrees than a full turn in radians.
+_NO_RADIANS = 7.0
 # A pressure that goes this share of its range within that share of a record, read so many times a second.
 _STEP, _WITHIN, _CAMERA_Hz = 0.6, 0.02, 20.0
 
@@ -61,20 +67,20 @@ class Question:
 class Proposal:
     """One experiment, as far as it is understood.
 
-    file, sheet, lines: where it stands, first and last line; keys: of experiments.toml; columns: arrays (n,)
-    by their names in a folder of measured data; origin: where each column comes from; concluded: what was
-    changed or assumed; unread: columns that are not read; questions: what has still to be answered; titles:
-    of all columns of the table, untitled ones by their number.
+    file, sheet: where it stands; lines (n,): of the rows that are read; keys: of experiments.toml; columns:
+    arrays (n,) by their names in a folder of measured data; origin: where each column comes from; concluded:
+    what was changed or assumed; unread: lines and columns that are not read; questions: what has still to be
+    answered; titles: of all columns of the table, and their numbers.
     """
 
     file: Path
     sheet: str
-    lines: tuple[int, int]
+    lines: Array
     keys: dict[str, Any]
     columns: dict[str, Array]
     origin: dict[str, str]
     concluded: tuple[str, ...]
-    unread: tuple[str, ...]
+    unread: tuple[Unread, ...]
     questions: tuple[Question, ...]
     titles: tuple[str, ...]
 
@@ -87,7 +93,7 @@ class Proposal:
     def place(self) -> str:
         """Name of the file, sheet and lines, in words."""
         sheet = f", sheet {self.sheet!r}" if self.sheet else ""
-        return f"{self.file.name}{sheet}, lines {self.lines[0]} to {self.lines[1]}"
+        return f"{self.file.name}{sheet}, lines {self.lines[0]} to {self.lines[-1]}"
 
     @property
     def where(self) -> str:
@@ -95,11 +101,15 @@ class Proposal:
         return f"{self.file}{self.place.removeprefix(self.file.name)}"
 
 
+class NoExperiment(InputError):
+    """A table of which no experiment can be made."""
+
+
 def propose(path: Path, block: Block, name: str, answers: Mapping[str, str]) -> Proposal:
     """What experiment a table is.
 
     name: of the experiment; answers: by key, as text, of this experiment. Raises InputError for an answer
-    that cannot be, and for a time that does not run on.
+    that cannot be, for a time that does not run on, and NoExperiment where columns are missing.
     """
     return _Proposing(path, block, name, dict(answers)).proposal()
 
@@ -120,10 +130,14 @@ class _Proposing:
 
     def __init__(self, path: Path, block: Block, name: str, answers: dict[str, str]) -> None:
         self.path, self.block, self.name, self.answers = path, block, name, answers
-        self.concluded: list[str] = []
-        self.unread: list[str] = []
+        self.concluded: list[str] = list(block.noted)
+        self.unread: list[Unread] = list(block.unread)
         self.questions: list[Question] = []
         self.keys: dict[str, Any] = {"name": name}
+        # Columns of the table by what they are read as, and those that may be asked for.
+        self.places: dict[str, int] = {}
+        self.free: list[int] = []
+        self.keep = np.full(len(block.lines), True)
 
     @property
     def where(self) -> str:
@@ -135,90 +149,165 @@ class _Proposing:
         columns, origin = self._columns()
         kind = self._kind(columns)
         if kind:
-            self._time(columns, origin, kind)
+            self._interval(columns, origin, kind)
+            self._require_needed(columns, kind)
             columns = self._of_kind(columns, kind)
+            columns = self._complete(columns, kind)
+            self._time(columns, kind)
             self._signs(columns, kind)
             self._zero(columns)
             self.keys = self._keys(columns, kind)
-        lines = self.block.lines
+        else:
+            columns = {name: values[self.keep] for name, values in columns.items()}
+        self.unread += [Unread(self._title(k), self._why_free(k)) for k in self.free]
         return Proposal(
             file=self.path,
             sheet=self.block.sheet,
-            lines=(int(lines[0]), int(lines[-1])),
+            lines=self.block.lines[self.keep],
             keys=self.keys,
             columns=columns,
             origin={column: origin[column] for column in columns},
             concluded=tuple(self.concluded),
             unread=tuple(self.unread),
             questions=tuple(self.questions),
-            titles=tuple(c.title or str(k) for k, c in enumerate(self.block.columns, 1)),
+            titles=tuple(name for c in self.block.columns for name in dict.fromkeys((c.name, str(c.place)))),
         )
+
+    def _title(self, k: int) -> str:
+        """A column in words."""
+        one = self.block.columns[k]
+        unit = f" [{one.unit}]" if one.unit and one.unit not in one.title else ""
+        return f"column {one.title!r}{unit}" if one.title else f"column {one.place}, which has no title{unit}"
+
+    def _range(self, k: int) -> str:
+        """The least and the largest number of a column in words, "" for none."""
+        values = self.block.values[:, k]
+        if not np.isfinite(values).any():
+            return ""
+        return f" ({np.nanmin(values):.6g} to {np.nanmax(values):.6g})"
+
+    def _why_free(self, k: int) -> str:
+        one = self.block.columns[k]
+        if one.quantity == "count":
+            return "no quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
+        return f"what it holds is not known; column.{one.name}=QUANTITY says it"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
         """The columns that are understood, in the units that are read, and where each comes from."""
         columns: dict[str, Array] = {}
         origin: dict[str, str] = {}
-        position: tuple[Array, str] | None = None
-        for k, one in enumerate(self.block.columns):
-            one = self._answered(one, k)
+        position: tuple[int, Array, str] | None = None
+        untitled = not any(one.title for one in self.block.columns)
+        for k, given in enumerate(self.block.columns):
+            one = self._answered(given, k, untitled)
+            if one is None:
+                self.unread.append(Unread(self._title(k), "left out by the answer none"))
+                continue
             if not one.quantity or one.quantity == "count":
-                self.unread.append(one.title or f"column {k + 1}")
+                self.free.append(k)
                 continue
             if one.factor is None:
-                one = self._unit(one)
+                one = self._unit(one, k)
+            if one.told and one.told != one.quantity:
+                self.concluded.append(f"{self._title(k)} is read as {one.quantity}, as its unit says")
             values = self.block.values[:, k] * (one.factor or 1.0)
             read = f" [{one.unit}]" if one.unit else ""
-            source = f"{one.title or f'column {k + 1}'!r}{read}"
+            source = f"{one.title or f'column {one.place}'!r}{read}"
+            target = named("displacement" if one.quantity == "position" else one.quantity)
+            # A clock beside a time in numbers says no more; a machine's position no more than an extension.
+            first = self.places.get(target)
             if one.quantity == "position":
-                position = position or (values, source)
-                continue
-            target = named(one.quantity)
-            if target in columns:
-                self.unread.append(one.title)
-                continue
-            columns[target], origin[target] = values, source
-        if position:
-            if "displacement_mm" in columns:
-                self.unread.append(position[1])
+                position = position or (k, values, source)
+                if position[0] != k:
+                    self._again(k, position[0], one)
+            elif first is not None and self.block.columns[first].unit == "clock" and target == "time_s":
+                self._again(first, k, one)
+                columns[target], origin[target], self.places[target] = values, source, k
+            elif first is not None:
+                self._again(k, first, one)
             else:
-                columns["displacement_mm"], origin["displacement_mm"] = position
+                columns[target], origin[target], self.places[target] = values, source, k
+        if position:
+            k, values, source = position
+            if "displacement_mm" in columns:
+                self._again(k, self.places["displacement_mm"], self.block.columns[k])
+            else:
+                columns["displacement_mm"], origin["displacement_mm"] = values, source
+                self.places["displacement_mm"] = k
         return columns, origin
 
-    def _answered(self, one: Column, k: int) -> Column:
-        """A column as an answer names it, `column.TITLE=quantity`; untitled ones by their number."""
-        answer = self.answers.get(f"column.{one.title or k + 1}")
+    def _again(self, k: int, first: int, one: Column) -> None:
+        self.unread.append(Unread(self._title(k), f"another {one.quantity}: {self._title(first)} is read"))
+
+    def _answer(self, key: str, one: Column) -> tuple[str, str | None]:
+        """An answer about a column by its title, or by its number: its key and text."""
+        keys = [f"{key}.{one.title}", f"{key}.{one.place}"] if one.title else [f"{key}.{one.place}"]
+        found = next((k for k in keys if k in self.answers), keys[0])
+        return found, self.answers.get(found)
+
+    def _answered(self, one: Column, k: int, untitled: bool) -> Column | None:
+        """A column as an answer names it, `column.TITLE=quantity`; None for `none`."""
+        key, answer = self._answer("column", one)
+        unit = self._answer("unit", one)[1]
         if answer is None:
-            if not one.title:
-                self.questions.append(
-                    Question(
-                        f"column.{k + 1}",
-                        f"what does column {k + 1}, which has no title, hold?",
-                        tuple(READ_IN),
-                    )
+            if untitled and not one.quantity:
+                self._ask_column(
+                    k, tuple(q for q in READ_IN if q != "count"), f"{self._title(k)}{self._range(k)}"
                 )
+            if unit is not None and unit_of(unit):
+                # The unit that is given may say that a title means another quantity.
+                again = attrs.evolve(column(one.title, unit), place=one.place)
+                if not one.quantity or again.told == "strain":
+                    one = attrs.evolve(again, quantity=again.quantity or again.likely)
             return one
         if answer == "none":
-            return attrs.evolve(one, quantity="")
+            return None
         if answer not in READ_IN:
             raise InputError(
-                f"column.{one.title or k + 1} = {answer!r} is no quantity",
+                f"{key} = {answer!r} is no quantity",
                 self.where,
                 f"choose one of {', '.join(READ_IN)}, or none",
             )
+        if one.unit == "clock" and answer == "time":
+            return one
         known = unit_of(one.unit) if one.unit else None
         fits = known is not None and known[0] == READ_IN[answer]
-        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None)
+        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, told="")
 
-    def _unit(self, one: Column) -> Column:
+    def _ask_column(self, k: int, quantities: Sequence[str], words: str) -> None:
+        """Ask what a column holds."""
+        one = self.block.columns[k]
+        values = self.block.values[:, k]
+        proposed = one.likely if one.likely in quantities else ""
+        if not one.title and "time" in quantities and k == 0 and (np.diff(values) > 0).all():
+            proposed = "time"
+        self.questions.append(
+            Question(f"column.{one.name}", f"what does {words} hold?", (*quantities, "none"), proposed)
+        )
+
+    def _unit(self, one: Column, k: int) -> Column:
         """A column with the unit that an answer gives it, `unit.TITLE=N`; asked for where none does."""
         wanted = READ_IN[one.quantity]
-        key = f"unit.{one.title}"
-        answer = self.answers.get(key)
+        key, answer = self._answer("unit", one)
         if answer is None:
+            if (
+                wanted == "deg"
+                and not one.unit
+                and np.nanmax(np.abs(self.block.values[:, k]), initial=0) > _NO_RADIANS
+            ):
+                self.concluded.append(f"{self._title(k)} is in degrees{self._range(k)}")
+                return attrs.evolve(one, unit="deg", factor=1.0)
             shown = f"{one.unit!r}, which is not known" if one.unit else "not given"
-            choices = tuple(unit for unit in _OFTEN[wanted])
+            title = repr(one.title) if one.title else f"column {one.place}"
+            halves = one.quantity == "time" and one.unit == "" and self.block.clock == k
+            choices = ("h:min", "min:s") if halves else _OFTEN[wanted]
             self.questions.append(
-                Question(key, f"the unit of {one.title!r} is {shown}", choices, self._likely(one))
+                Question(
+                    key,
+                    f"the unit of {title}{self._range(k)} is {shown}",
+                    choices,
+                    "" if halves else self._likely(one, k),
+                )
             )
             return attrs.evolve(one, factor=1.0)
         known = (wanted, 1.0) if answer == "" or answer == wanted else unit_of(answer)
@@ -228,18 +317,22 @@ class _Proposing:
             raise InputError(
                 f"{key} = {answer!r} is no unit of {one.quantity}",
                 self.where,
-                f"choose one of {', '.join(_OFTEN[wanted])}",
+                f"choose one of {', '.join(_OFTEN[wanted])}; column.{one.name}=QUANTITY says that it is no "
+                f"{one.quantity}",
             )
         return attrs.evolve(one, unit=answer, factor=known[1])
 
-    def _likely(self, one: Column) -> str:
-        """The unit that suggests itself: for strain by how large the values are."""
-        if one.quantity != "strain":
-            return (
-                _OFTEN[READ_IN[one.quantity]][0] if READ_IN[one.quantity] in ("s", "mm", "N", "deg") else ""
-            )
-        k = self.block.columns.index(next(c for c in self.block.columns if c.title == one.title))
-        return "%" if np.nanmax(np.abs(self.block.values[:, k])) > 1.5 else "1"
+    def _likely(self, one: Column, k: int) -> str:
+        """The unit that suggests itself: of strain and of time by how large the values are."""
+        values = self.block.values[:, k]
+        if one.quantity == "strain":
+            return "%" if np.nanmax(np.abs(values), initial=0) > 1.5 else "1"
+        if one.quantity == "time":
+            # Boards count milliseconds and microseconds in whole numbers, clocks of computers whole seconds.
+            step = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
+            whole = bool((values[np.isfinite(values)] % 1 == 0).all())
+            return "us" if whole and step >= 1000 else "ms" if whole and step >= 5 else "s"
+        return _OFTEN[READ_IN[one.quantity]][0] if READ_IN[one.quantity] in ("mm", "N", "deg") else ""
 
     def _kind(self, columns: Mapping[str, Array]) -> str:
         """The kind of experiment, "" where it must be asked."""
@@ -249,9 +342,9 @@ class _Proposing:
                 raise InputError(
                     f"kind = {answer!r} is not known", self.where, f"choose one of {', '.join(KINDS)}"
                 )
-            return answer
+            return "" if any(question.key.startswith("column.") for question in self.questions) else answer
         have = set(columns)
-        if {"angle_deg", "voltage_V"} <= have:
+        if {"angle_deg", "voltage_V"} <= have and "pressure_kPa" not in have:
             return "waveguide_bending"
         if {"pressure_kPa", "orientation_deg", "angle_deg"} <= have:
             return "unit_pose"
@@ -268,26 +361,85 @@ class _Proposing:
             return "unit_pressure"
         if {"added_mass_g", "tip_deflection_mm"} <= have:
             return "beam_deadweight"
-        loads = ({"strain", "stress_kPa"}, {"displacement_mm", "force_N"}, {"strain", "force_N"})
-        if any(load <= have for load in loads) or {"displacement_mm", "stress_kPa"} <= have:
+        loads = ({"strain", "stress_kPa"}, {"displacement_mm", "force_N"})
+        if any(load <= have for load in loads):
             return self._loading()
-        if "pressure_kPa" in have:
-            return "pressure_hold"
         if any(question.key.startswith("column.") for question in self.questions):
             return ""
-        self.questions.append(
-            Question(
-                "kind",
-                f"no kind of experiment has {', '.join(sorted(have)) or 'no known column'} alone",
-                tuple(KINDS),
-            )
-        )
+        if self._ask_unknown():
+            return ""
+        if "pressure_kPa" in have:
+            return "pressure_hold"
+        self._refuse(have)
         return ""
+
+    def _ask_unknown(self) -> bool:
+        """Ask for the columns of which nothing is known; returns whether there are any."""
+        unknown = [k for k in self.free if not self.block.columns[k].quantity]
+        for k in unknown[:_MOST_ASKED]:
+            unit = unit_of(self.block.columns[k].unit) if self.block.columns[k].unit else None
+            fit = tuple(
+                q for q, read in READ_IN.items() if q != "count" and (unit is None or read == unit[0])
+            )
+            self._ask_column(k, fit, f"{self._title(k)}{self._range(k)}")
+        return bool(unknown)
+
+    def _refuse(self, have: set[str]) -> None:
+        """Raise NoExperiment with what there is and what each kind needs."""
+        ways = "; ".join(
+            f"{kind.name}: {' or '.join(', '.join(g) for g in kind.needs)}" for kind in KINDS.values()
+        )
+        titles = ", ".join(self._title(k) for k in range(len(self.block.columns)))
+        raise NoExperiment(
+            f"no kind of experiment has {' and '.join(sorted(have)) or 'no known column'} alone; there are "
+            f"{titles}",
+            self.where,
+            f"export the columns of one kind ({ways}), or say with column.TITLE=QUANTITY what a column holds",
+        )
+
+    def _require_needed(self, columns: Mapping[str, Array], kind: str) -> None:
+        """Ask which column is what the kind needs; raises NoExperiment where none is left."""
+        have = set(columns)
+        groups = [set(group) | ({"time_s"} if KINDS[kind].timed else set()) for group in KINDS[kind].needs]
+        if any(group - {"time_s"} <= have for group in groups):
+            return
+        # The group that most columns are there for, or may be by their units.
+        ways = []
+        for group in groups:
+            gone = sorted(group - have - {"time_s"})
+            wanted = [q for q in READ_IN if named(q) in gone]
+            unknown = [k for k in self.free if self._may_be(k, wanted)]
+            fit = [q for q in wanted if any(self._may_be(k, [q]) for k in unknown)]
+            ways.append((len(group & have) / len(group), len(fit) / len(gone), gone, wanted, unknown))
+        _, _, gone, wanted, unknown = max(ways, key=lambda way: way[0] + way[1])
+        if not unknown:
+            titles = ", ".join(self._title(k) for k in range(len(self.block.columns)))
+            raise NoExperiment(
+                f"{kind} needs {' and '.join(gone)}, and no column is left that may hold it; there are "
+                f"{titles}",
+                self.where,
+                "export that column as well, choose another kind, or say with column.TITLE=QUANTITY and "
+                "unit.TITLE=UNIT what a column holds",
+            )
+        for k in unknown[:_MOST_ASKED]:
+            self._ask_column(
+                k, wanted, f"{self._title(k)}{self._range(k)}; {kind} needs {' and '.join(gone)}:"
+            )
+            if len(unknown) == 1 and len(wanted) == 1:
+                self.questions[-1] = attrs.evolve(self.questions[-1], proposed=wanted[0])
+
+    def _may_be(self, k: int, quantities: Sequence[str]) -> bool:
+        """Whether a column that is not read may hold one of these, by its unit."""
+        one = self.block.columns[k]
+        if self._answer("column", one)[1] is not None or (one.quantity == "count" and one.unit):
+            return False
+        known = unit_of(one.unit) if one.unit else None
+        return known is None or any(READ_IN[q] == known[0] for q in quantities)
 
     def _loading(self) -> str:
         """Whether a specimen is pulled or a lattice compressed, by the words of the file."""
         words = " ".join(
-            [self.path.stem, self.block.sheet, *(c.title for c in self.block.columns)]
+            [self.path.stem, self.block.sheet, self.block.label, *(c.title for c in self.block.columns)]
             + [" ".join((key, *cells)) for key, cells in self.block.facts.items()]
         )
         pulled = bool(_TENSION.search(plain(words)))
@@ -305,36 +457,86 @@ class _Proposing:
         )
         return ""
 
-    def _time(self, columns: dict[str, Array], origin: dict[str, str], kind: str) -> None:
-        """Time in s from the first row on; made from an interval where the file has none and needs one."""
-        if "time_s" not in columns:
-            interval = self._positive("interval_s") if "interval_s" in self.answers else None
-            if interval is None:
-                if KINDS[kind].timed:
-                    self.questions.append(
-                        Question(
-                            "interval_s", f"{kind} needs a time, and there is none: seconds from row to row?"
-                        )
-                    )
-                return
+    def _interval(self, columns: dict[str, Array], origin: dict[str, str], kind: str) -> None:
+        """A time made from an interval, where the file has none and the kind needs one."""
+        if "time_s" in columns:
+            return
+        interval = self._positive("interval_s") if "interval_s" in self.answers else None
+        if interval is not None:
             columns["time_s"] = interval * np.arange(len(self.block.lines), dtype=float)
             origin["time_s"] = f"rows, {interval:g} s apart"
-            return
-        time = columns["time_s"]
-        step = np.diff(time)
-        if np.isnan(time).any() or (step < 0).any():
-            i = int(np.flatnonzero(np.isnan(time))[0] if np.isnan(time).any() else np.argmax(step < 0) + 1)
-            raise InputError(
-                "the time is missing, or runs backward",
-                f"{self.path}, line {self.block.lines[i]}",
-                "divide the file where a new record begins",
+        elif KINDS[kind].timed:
+            self.questions.append(
+                Question("interval_s", f"{kind} needs a time, and there is none: seconds from row to row?")
             )
 
     def _of_kind(self, columns: Mapping[str, Array], kind: str) -> dict[str, Array]:
         """The columns that a kind may have."""
         kept = {name: values for name, values in columns.items() if KINDS[kind].knows(name)}
-        self.unread += [name for name in columns if name not in kept]
+        self.unread += [
+            Unread(self._title(self.places[name]), f"{name} is nothing that {kind} has")
+            for name in columns
+            if name not in kept
+        ]
         return kept
+
+    def _complete(self, columns: dict[str, Array], kind: str) -> dict[str, Array]:
+        """The rows in which nothing is missing that may not be; the others are listed with the reason."""
+        needs = KINDS[kind].needs
+        reasons: dict[str, list[int]] = {}
+        for name, values in list(columns.items()):
+            gone = np.isnan(values)
+            if not gone.any() or name not in self.places:
+                continue
+            others = set(columns) - {name}
+            if (
+                gone.mean() > _SPARSE
+                and name != "time_s"
+                and any(others.issuperset(group) for group in needs)
+            ):
+                self.unread.append(
+                    Unread(self._title(self.places[name]), f"missing in {gone.sum()} of {len(gone)} rows")
+                )
+                del columns[name]
+                continue
+            for i in np.flatnonzero(gone):
+                text = self.block.bad.get((int(i), self.places[name]))
+                if may_be_missing(name):
+                    if text is not None:
+                        why = f"{text!r} in {self._title(self.places[name])} is no number: left empty"
+                        reasons.setdefault(why, []).append(int(self.block.lines[i]))
+                elif self.keep[i]:
+                    self.keep[i] = False
+                    title = self._title(self.places[name])
+                    why = f"{text!r} in {title} is no number" if text is not None else f"no number in {title}"
+                    reasons.setdefault(why, []).append(int(self.block.lines[i]))
+        self.unread += [Unread("", why, tuple(lines)) for why, lines in reasons.items()]
+        if self.keep.sum() < KINDS[kind].fewest:
+            raise NoExperiment(
+                f"{self.keep.sum()} rows have all that {kind} needs, at least {KINDS[kind].fewest} must: "
+                + "; ".join(one.words for one in self.unread[-3:]),
+                self.where,
+                "correct these cells, or leave a column out with column.TITLE=none",
+            )
+        return {name: values[self.keep] for name, values in columns.items()}
+
+    def _time(self, columns: dict[str, Array], kind: str) -> None:
+        """Raise InputError for a time that runs backward; leave out one that stands still, if it may be."""
+        if "time_s" not in columns:
+            return
+        step = np.diff(columns["time_s"])
+        lines = self.block.lines[self.keep]
+        if (step < 0).any():
+            raise InputError(
+                "the time runs backward",
+                f"{self.path}, line {lines[int(np.argmax(step < 0)) + 1]}",
+                "divide the file where a new record begins",
+            )
+        if not KINDS[kind].timed and (step == 0).any():
+            at = lines[int(np.argmax(step == 0)) + 1]
+            why = f"time stands still at line {at}, and {kind} does not need it"
+            self.unread.append(Unread(self._title(self.places["time_s"]), why))
+            del columns["time_s"]
 
     def _signs(self, columns: dict[str, Array], kind: str) -> None:
         """Compression is positive in a block of lattice; force and stretch of a coupon have one sign."""
@@ -487,7 +689,7 @@ class _Proposing:
 
 # Units that a question offers, the usual one first.
 _OFTEN = {
-    "s": ("s", "ms", "min"),
+    "s": ("s", "ms", "us", "min", "h"),
     "mm": ("mm", "um", "cm", "m", "in"),
     "N": ("N", "kN", "mN", "lbf", "kgf"),
     "kPa": ("MPa", "kPa", "Pa", "bar", "mbar", "psi"),

@@ -11,27 +11,71 @@ from ..measured.kinds import CONVERTED, UNITS
 
 # Names of units beyond those that measured data are read in, by the unit that these are read in, and how much
 # of it is one of them. The pound-force is exactly 4.4482216152605 N, the inch 25.4 mm.
-_INCH, _POUND = 25.4, 4.4482216152605
+_INCH, _POUND, _KILOPOND = 25.4, 4.4482216152605, 9.80665
 _SPELT: dict[str, dict[str, float]] = {
-    "s": {"sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "sek": 1.0, "h": 3600.0},
-    "mm": {"in": _INCH, "inch": _INCH, "inches": _INCH, "\u00b5m": 1e-3, "\u03bcm": 1e-3},
-    "N": {"lbf": _POUND, "lb": _POUND, "kgf": 9.80665, "gf": 9.80665e-3},
+    "s": {
+        **dict.fromkeys(
+            ("sec", "secs", "second", "seconds", "sek", "sekunden", "\u0441", "\u0441\u0435\u043a"), 1.0
+        ),
+        **dict.fromkeys(("\u79d2", "\ucd08"), 1.0),
+        **dict.fromkeys(("msec", "millis", "millisecond", "milliseconds", "\u043c\u0441"), 1e-3),
+        **dict.fromkeys(("\u00b5s", "\u03bcs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
+        "ns": 1e-9,
+        **dict.fromkeys(("mins", "minute", "minutes"), 60.0),
+        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), 3600.0),
+        # Times of day of two parts are read as the former.
+        **dict.fromkeys(("h:min", "hh:mm"), 1.0),
+        **dict.fromkeys(("min:s", "mm:ss"), 1.0 / 60.0),
+    },
+    "mm": {
+        **dict.fromkeys(("in", "inch", "inches"), _INCH),
+        **dict.fromkeys(("\u00b5m", "\u03bcm", "micron", "microns", "\u043c\u043a\u043c"), 1e-3),
+        **dict.fromkeys(("millimeter", "millimeters", "millimetre", "\u043c\u043c"), 1.0),
+        **dict.fromkeys(("mil", "mils", "thou"), _INCH / 1000.0),
+        "ft": 12.0 * _INCH,
+        "nm": 1e-6,
+        "\u0441\u043c": 10.0,
+    },
+    "N": {
+        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND),
+        **dict.fromkeys(("kgf", "kp", "\u043a\u0433\u0441"), _KILOPOND),
+        **dict.fromkeys(("newton", "newtons", "\u043d"), 1.0),
+        "gf": _KILOPOND / 1000.0,
+        "ozf": _POUND / 16.0,
+        "\u043a\u043d": 1e3,
+        "dan": 10.0,
+        "cn": 1e-2,
+    },
     "kPa": {
-        "N/mm2": 1e3,
-        "N/mm\u00b2": 1e3,
-        "N/mm^2": 1e3,
-        "GPa": 1e6,
+        **dict.fromkeys(("N/mm2", "N/mm\u00b2", "N/mm^2", "\u043c\u043f\u0430"), 1e3),
+        **dict.fromkeys(("kN/mm2", "kN/mm\u00b2", "kN/mm^2", "GPa"), 1e6),
+        **dict.fromkeys(("N/m2", "N/m\u00b2", "N/m^2", "\u043f\u0430"), 1e-3),
+        **dict.fromkeys(("kgf/cm2", "kgf/cm\u00b2", "kg/cm2", "kg/cm\u00b2"), 10.0 * _KILOPOND),
+        **dict.fromkeys(("mmHg", "Torr"), 101.325 / 760.0),
+        "\u043a\u043f\u0430": 1.0,
+        "atm": 101.325,
+        "cmH2O": 0.0980665,
+        "inHg": _INCH * 101.325 / 760.0,
         "ksi": 1e3 * CONVERTED["kPa"]["psi"],
         "hPa": 0.1,
     },
-    "deg": {"\u00b0": 1.0, "degree": 1.0, "degrees": 1.0, "grad": 1.0},
-    "": {"%": 1e-2, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "1": 1.0},
-    "V": {"volt": 1.0, "volts": 1.0},
-    "mm3": {"mm\u00b3": 1.0, "mm^3": 1.0, "cm\u00b3": 1e3, "cc": 1e3, "\u00b5l": 1.0, "\u03bcl": 1.0},
+    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "\u00ba"), 1.0),
+    "": {
+        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1"), 1.0),
+        "%": 1e-2,
+        **dict.fromkeys(
+            ("\u00b5\u03b5", "\u03bc\u03b5", "ue", "microstrain", "\u00b5m/m", "\u03bcm/m"), 1e-6
+        ),
+    },
+    "V": {"volt": 1.0, "volts": 1.0, "\u0432": 1.0},
+    "mm3": {
+        **dict.fromkeys(("mm\u00b3", "mm^3", "\u00b5l", "\u03bcl"), 1.0),
+        **dict.fromkeys(("cm\u00b3", "cc", "cm^3"), 1e3),
+    },
     "g": {},
 }
 _UNITS = {
-    name.casefold(): (read, factor)
+    unicodedata.normalize("NFC", name).casefold(): (read, factor)
     for read, names in _SPELT.items()
     for name, factor in {**({read: 1.0} if read else {}), **CONVERTED[read], **names}.items()
 }
@@ -43,34 +87,88 @@ _BY_CASE = {
     "MPa": ("kPa", 1e3),
     "M": None,
     "S": None,
+    "V": ("V", 1.0),
+    "v": None,
+    "H": None,
 }
 
-# Words of columns' names in English, German, French, Italian, Spanish and Polish, the more particular first.
-_WORDS: tuple[tuple[str, str], ...] = (
-    ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
-    ("angle", r"angle|winkel|angolo|angulo|\bkat\b|biegewinkel"),
-    ("strain", r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria"),
-    ("stress", r"stress|druckspannung|zugspannung|spannung|contrainte|sforzo|esfuerzo|naprezenie"),
-    ("pressure", r"pressure|\bdruck\b|uberdruck|innendruck|pression|pressione|presion|cisnienie"),
-    ("force", r"force|\bload\b|kraft|\blast\b|charge\b|forza|carico|fuerza|carga|\bsila\b"),
-    ("time", r"time|zeit|\btemps\b|tempo|tiempo|\bczas\b|elapsed"),
-    ("volume", r"volume|volumen|objetosc|\binfused\b|dispensed"),
-    ("tip_deflection", r"tip.deflection"),
-    ("added_mass", r"added.mass|zusatzmasse"),
-    (
-        "displacement",
-        r"extension|displacement|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
-        r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection",
-    ),
-    ("position", r"position|crosshead|traverse|traversenweg"),
-    ("voltage", r"voltage|photodiode|\bled\b|signal|\bspannung\b|tension"),
-    ("count", r"\bnr\b|\bno\b|number|index|count|cycle|zyklus|schritt|\bstep\b|point"),
+
+def plain(text: str) -> str:
+    """Text in small letters without accents."""
+    text = text.replace("\u0142", "l").replace("\u0141", "L").replace("\u00df", "ss").replace("\u00f8", "o")
+    decomposed = unicodedata.normalize("NFKD", text.replace("\u0131", "i"))
+    return "".join(c for c in decomposed if not unicodedata.combining(c)).casefold()
+
+
+# Words of columns' names, the more particular first: English, German, French, Italian, Spanish, Portuguese,
+# Dutch, Scandinavian, Finnish, Polish, Czech, Hungarian, Turkish, Russian, Chinese, Japanese and Korean.
+_WORDS = tuple(
+    (quantity, re.compile(plain(pattern)))
+    for quantity, pattern in (
+        (
+            "count",
+            r"\brate\b|speed|velocity|geschwindigkeit|vitesse|velocita|velocidad|temperat|\btemp\b|humid|feuchte|"
+            r"accel|energy|energie|\bwork\b|modulus|frequen|скорост|温度|速度|온도|속도",
+        ),
+        ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
+        ("angle", r"angle|winkel|angolo|angulo|\bkat\b|hoek|vinkel|kulma|szog|\buhel|\baci\b|угол|角度|각도"),
+        (
+            "strain",
+            r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria|\brek\b|"
+            r"tojning|toyning|venyma|deformace|nyulas|sekil degistirme|относительн|应变|ひずみ|歪み|변형률",
+        ),
+        (
+            "stress",
+            r"stress|druckspannung|zugspannung|spannung|contrainte|sforzo|esfuerzo|naprezenie|tensao|tensione|tension|"
+            r"spanning|spanding|spenning|jannitys|feszultseg|napeti|gerilme|напряжение|应力|応力|응력",
+        ),
+        (
+            "pressure",
+            r"pressure|\bdruck\b|uberdruck|innendruck|pression|pressione|presion|cisnienie|pressao|\bdruk\b|\btryk|"
+            r"paine\b|nyomas|\btlak|basinc|давление|压力|壓力|圧力|압력",
+        ),
+        (
+            "force",
+            r"force|\bload\b|load ?cell|kraft|\blast\b|charge\b|forza|carico|fuerza|carga|\bsila\b|forca|"
+            r"kracht|belasting|voima|\bero\b|kuvvet|\byuk\b|усилие|сила|нагрузка|力|载荷|負荷|荷重|负荷|하중|힘",
+        ),
+        (
+            "time",
+            r"time|zeit|\btemps\b|tempo|tiempo|\bczas\b|elapsed|\btijd|\btid\b|\baika\b|\bido\b|\bcas\b|zaman|\bsure\b|"
+            r"millis|micros|время|时间|時間|时刻|시간|seconds|\bsek",
+        ),
+        ("volume", r"volume|volumen|objetosc|\binfused\b|dispensed|объем|体积"),
+        ("tip_deflection", r"tip.deflection"),
+        ("added_mass", r"added.mass|zusatzmasse"),
+        (
+            "displacement",
+            r"extension|displacement|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
+            r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
+            r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
+            r"перемещение|удлинение|деформация|位移|变形|変位|伸び|변위|신율",
+        ),
+        ("strain", r"deformac|deformazione|deformation|деформация"),
+        ("position", r"position|crosshead|traverse|traversenweg|横梁"),
+        (
+            "voltage",
+            r"voltage|photodiode|\bled\b|signal|\bspannung\b|tension|voltaje|tensao|napeti|напряжение|电压|電圧|전압",
+        ),
+        (
+            "count",
+            r"\bnr\b|\bno\b|number|index|count|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
+        ),
+    )
 )
 # What a quantity is read in; a machine's position is a displacement, a count is nothing that is read.
 READ_IN = {**UNITS, "position": "mm", "count": ""}
 # Never concluded from a unit: there is a more usual quantity of it.
-_ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation")
-_BRACKETED = re.compile(r"^(.*?)\s*(?:\(([^()]*)\)|\[([^\[\]]*)\]|/\s*([^\s()]+)|,\s*([^\s,]+))\s*$")
+_ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
+_UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
+_BRACKETED = re.compile(_UNIT)
+_AFTER_SIGN = re.compile(r"^(.*?)(?:\s*/\s*|\s+in\s+|,\s*|;\s*|:\s*|\s+|_)([^\s,;:()\[\]]+)$")
+# A quantity by another one, such as N/s, is none that is read.
+_COMPOUND = re.compile(r"[^/\s]{1,6}/[^/\s]{1,6}|[\u00b0\u00ba]\s?[CFK]|\u2103|[A-Za-z]{1,3}(\^-?|-)\d")
 
 
 @attrs.frozen
@@ -79,40 +177,58 @@ class Column:
 
     title: as the file has it; quantity: a name of `measured.kinds.UNITS`, "position", "count", or "" where it
     is not known; unit: as the file has it, "" without one; factor: how much of the unit that is read is one
-    of it, None where the unit is not given or not known.
+    of it, None where the unit is not given or not known; place: number of the column in its table; likely:
+    the quantity that the unit suggests where the title says none; told: another quantity that the title says.
     """
 
     title: str
     quantity: str
     unit: str
     factor: float | None
+    place: int = 0
+    likely: str = ""
+    told: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its title, or its number where it has none: what answers call it."""
+        return self.title or str(self.place)
 
 
 def column(title: str, unit: str = "") -> Column:
-    """What a column of this title, and this cell in the row of units, holds."""
+    """What a column of this title, and this cell in the row of units, holds.
+
+    Where title and unit disagree, as in "Strain" in mm, the unit says the quantity.
+    """
     name = title
     if not unit:
         name, unit = _apart(title)
-    unit = unit.strip().strip("()[]").strip()
+    unit = unit.strip().strip("()[]{}").strip()
     known = unit_of(unit) if unit else None
-    quantity = _named(name, known[0] if known else None)
-    if not quantity and known:
-        # A unit that only one quantity has names it.
-        fit = [q for q, read in UNITS.items() if read == known[0] and q not in _ONLY_BY_NAME and known[0]]
-        quantity = fit[0] if len(fit) == 1 else ""
-    if known and quantity and READ_IN[quantity] != known[0]:
+    if unit and not known and _COMPOUND.fullmatch(unit):
+        return Column(title, "count", unit, None)
+    said = _said(name)
+    if said == "count" and not (known and known[0]):
+        return Column(title, "count", unit, None)
+    quantity = _said(name, known[0]) if known else said
+    if quantity == "count" or (not known and quantity == "strain" and not unit):
         return Column(title, quantity, unit, None)
-    if quantity == "strain" and not unit:
-        return Column(title, quantity, "", None)
-    return Column(title, quantity, unit, known[1] if known else None)
+    if quantity or not known or not known[0]:
+        return Column(title, quantity, unit, known[1] if known else None)
+    # The unit says it, where only one quantity has it, or the title speaks of another one of a test.
+    fit = [q for q, read in UNITS.items() if read == known[0] and q not in _ONLY_BY_NAME]
+    likely = fit[0] if len(fit) == 1 else ""
+    if likely and (said in ("strain", "stress", "force", "displacement", "") and (said or known[0] != "mm")):
+        return Column(title, likely, unit, known[1], told=said)
+    return Column(title, "", unit, known[1], likely=likely)
 
 
 def unit_of(text: str) -> tuple[str, float] | None:
     """The unit that is read in place of this one, and how much of it is one of it; None for no unit."""
-    text = unicodedata.normalize("NFC", text.strip().strip("()[]").strip())
+    text = unicodedata.normalize("NFC", text.strip().strip("()[]{}").strip())
     if text in _BY_CASE:
         return _BY_CASE[text]
-    return _UNITS.get(text.casefold())
+    return _UNITS.get(text.casefold()) or (_UNITS.get(text[:-1].casefold()) if text.endswith(".") else None)
 
 
 def is_unit(cell: str) -> bool:
@@ -120,32 +236,31 @@ def is_unit(cell: str) -> bool:
     return unit_of(cell) is not None
 
 
-def plain(text: str) -> str:
-    """Text in small letters without accents."""
-    text = text.replace("\u0142", "l").replace("\u0141", "L").replace("\u00df", "ss")
-    decomposed = unicodedata.normalize("NFKD", text)
-    return "".join(c for c in decomposed if not unicodedata.combining(c)).casefold()
+def known_words(text: str) -> int:
+    """How many cells of a text's first lines name a quantity or a unit in letters beyond ASCII."""
+    cells = [cell for cell in re.split(r"[\t;,\n()\[\]\"]| {2,}", text[:4000]) if cell and not cell.isascii()]
+    return sum(bool(_said(cell)) + is_unit(cell) for cell in cells)
 
 
 def _apart(title: str) -> tuple[str, str]:
-    """A title's name and unit, as in "Load (N)", "Force [kN]", "Kraft / N", "Time, s" and "force_N"."""
-    match = _BRACKETED.match(title)
-    if match:
-        unit = next(group for group in match.groups()[1:] if group is not None)
-        if is_unit(unit):
-            return match[1], unit
-    head, _, tail = title.rpartition("_")
-    if head and is_unit(tail):
-        return head, tail
-    return title, ""
+    """A title's name and unit, as in "Load (N)", "Force [kN] 1", "Kraft / N", "Time, s" and "force_N"."""
+    bracketed = [next(g for g in match.groups() if g is not None) for match in _BRACKETED.finditer(title)]
+    for text in reversed(bracketed):
+        if is_unit(text) or _COMPOUND.fullmatch(text.strip()):
+            return _BRACKETED.sub(" ", title).strip(), text
+    match = _AFTER_SIGN.match(title)
+    if match and match[1] and is_unit(match[2]) and not match[2].isdigit():
+        return match[1], match[2]
+    # Names of a program's variables, such as millis.
+    return title, title if is_unit(title) and len(title) > 4 else ""
 
 
-def _named(name: str, unit: str | None) -> str:
+def _said(name: str, unit: str | None = None) -> str:
     """The quantity that a name says, of those that have this unit where it is known; "" for none."""
     words = plain(name).replace("_", " ")
     if words.strip() == "t" and unit in (None, "s"):
         return "time"
     for quantity, pattern in _WORDS:
-        if re.search(pattern, words) and (unit is None or READ_IN[quantity] == unit):
+        if pattern.search(words) and (unit is None or READ_IN[quantity] == unit):
             return quantity
     return ""

@@ -1,4 +1,4 @@
-"""A file of a laboratory as sheets of cells: text in the usual encodings, or a workbook."""
+"""A file of a laboratory as sheets of cells, by its content: text in any encoding, a workbook, HTML."""
 
 from __future__ import annotations
 
@@ -8,13 +8,34 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
 
+import attrs
+
+from ..cells.dialect import Row, rows_of
+from ..cells.encoding import decoded
 from ..errors import InputError
 from ..reading import file_bytes, require_rows, unreadable
-from .cells import Row, Sheet, rows_of_text
+from .markup import is_markup, rows_of_markup
+from .quantities import known_words
 
 # Bytes that a file may have, and that a workbook, which is a ZIP archive, may unpack to.
 _LONGEST, _MOST_UNPACKED = 1 << 26, 1 << 28
-WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
+# What workbooks begin with: a ZIP archive (.xlsx, .xlsm, .xlsb, .ods), and Excel's older format (.xls).
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+
+
+@attrs.frozen
+class Sheet:
+    """Rows of a file, or of one sheet of a workbook (name "").
+
+    delimiter: what divides the cells of a text; usual: the decimal sign where cells do not tell it; forced:
+    the one that holds in any case; "" for neither.
+    """
+
+    name: str
+    rows: tuple[Row, ...]
+    delimiter: str = ""
+    usual: str = ""
+    forced: str = ""
 
 
 def read_sheets(path: Path, decimal: str | None = None) -> tuple[Sheet, ...]:
@@ -28,33 +49,29 @@ def read_sheets(path: Path, decimal: str | None = None) -> tuple[Sheet, ...]:
         raise InputError(
             f"cannot read the file: {unreadable(error)}", str(path), "check path and file"
         ) from error
-    if path.suffix.lower() in WORKBOOKS:
+    if not data.strip():
+        raise InputError("the file is empty", str(path), "export it again")
+    if data.startswith(_WORKBOOKS):
         return _workbook(path, data)
-    text = decoded(data, path)
+    text = decoded(data, str(path), known_words)
     require_rows(text.count("\n"), str(path))
-    return (rows_of_text(text, decimal),)
+    return (sheet_of_text(text, decimal, str(path)),)
 
 
-def decoded(data: bytes, path: Path) -> str:
-    """Text of a file: by its byte order mark, as UTF-8, else as Windows-1252 (of which Latin-1 is a part)."""
-    for mark, encoding in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-        if data.startswith(mark):
-            try:
-                return data.decode(encoding)
-            except UnicodeDecodeError as error:
-                raise InputError(
-                    f"the file begins like {encoding} and goes on otherwise", str(path), "export it again"
-                ) from error
-    if b"\0" in data:
+def sheet_of_text(text: str, decimal: str | None = None, where: str = "") -> Sheet:
+    """The sheet of a text, or of the tables in HTML; raises InputError for HTML without one."""
+    if not is_markup(text):
+        rows, delimiter = rows_of(text)
+        # A comma between columns is no decimal sign but in quotes.
+        usual = "." if delimiter == "," and '"' not in text else ""
+        return Sheet("", rows, delimiter, usual, decimal or "")
+    cells = rows_of_markup(text)
+    if not cells:
         raise InputError(
-            "the file holds NUL bytes: it is no text",
-            str(path),
-            "export it as CSV or text, or give a workbook its ending (.xlsx, .xls, .ods)",
+            "the file is HTML or XML without a table", where, "export the table as CSV or a workbook"
         )
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
+    rows = tuple(Row(n, tuple(" ".join(cell.split()) for cell in row)) for n, row in enumerate(cells, 1))
+    return Sheet("", rows, "", "", decimal or "")
 
 
 def _workbook(path: Path, data: bytes) -> tuple[Sheet, ...]:
@@ -72,7 +89,7 @@ def _workbook(path: Path, data: bytes) -> tuple[Sheet, ...]:
             require_rows(len(cells), f"{path}, sheet {name!r}")
             rows = tuple(Row(i, tuple(_text(cell) for cell in row)) for i, row in enumerate(cells, 1))
             if any(row.filled for row in rows):
-                sheets.append(Sheet(name, rows, "."))
+                sheets.append(Sheet(name, rows, usual="."))
     except (CalamineError, ValueError, OSError) as error:
         raise InputError(
             f"the workbook cannot be read: {str(error)[:200]}",

@@ -6,13 +6,14 @@ import difflib
 import hashlib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
+from ..cells.own import own_text
 from ..errors import InputError
 from ..reading import file_bytes, file_text, parse_toml
 from .experiment import Array, Experiment
@@ -116,7 +117,7 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
             raise InputError(f"key {key!r} is missing", at(), f"{kind.name} needs it")
     fields = _described(entry, kind, at)
     path = _file(_word(entry, "file", at), at)
-    text = _text(path, f"{FILE} names it; correct the name or put the file there")
+    text = _text(path, f"{FILE} names it; correct the name or put the file there", own_text)
     table = read_table(text, kind, path)
     columns, remarks = dict(table.columns), list(table.remarks)
     if "pressure_kPa" in columns:
@@ -370,9 +371,9 @@ def _file(name: str, at: _Place) -> Path:
     return at.path.parent / path
 
 
-def _text(path: Path, remedy: str) -> str:
+def _text(path: Path, remedy: str, read: Callable[[Path], str] = file_text) -> str:
     try:
-        return file_text(path)
+        return read(path)
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
     except OSError as error:

@@ -38,7 +38,7 @@ UNITS = {
 }
 # What a column may be in instead: how much of the unit it is read in one of it is.
 CONVERTED = {
-    "s": {"ms": 1e-3, "min": 60.0},
+    "s": {"ms": 1e-3, "us": 1e-6, "min": 60.0},
     "kPa": {"Pa": 1e-3, "MPa": 1e3, "mbar": 0.1, "bar": 100.0, "psi": 6.894757293168361},
     "deg": {"rad": 180.0 / math.pi},
     "mm": {"um": 1e-3, "cm": 10.0, "m": 1e3},

@@ -14,6 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..cells.own import own_lines, own_rows
 from ..errors import InputError
 from ..reading import require_rows
 from .kinds import Kind, markers, may_be_missing, named, quantity_of, units_of
@@ -95,11 +96,12 @@ def _at(path: Path, row: int | None = None, column: str = "") -> str:
 
 def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Cells of the header, and of every further line with its number."""
-    found: list[tuple[int, list[str]]] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            require_rows(len(found), _at(path))
-            found.append((number, [cell.strip() for cell in next(csv.reader(io.StringIO(line)))]))
+    numbered = own_lines(text)
+    require_rows(len(numbered) - 1, _at(path))
+    try:
+        found = own_rows(numbered)
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", _at(path), "separate columns by commas") from None
     if not found:
         raise InputError("the file contains no table", _at(path), "the first line must hold the column names")
     row, header = found[0]
@@ -138,12 +140,6 @@ def _plain_numbers(text: str) -> tuple[list[str], Array, Array] | None:
 
 def _check_names(header: Sequence[str], row: int, path: Path) -> None:
     """Raise InputError for a first line, at a row of the file, that does not name columns."""
-    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
-        raise InputError(
-            "the columns are not separated by commas",
-            _at(path, row),
-            "separate columns by commas, decimals by points",
-        )
     if all(_is_number(cell) for cell in header):
         raise InputError(
             "the first line holds numbers instead of the columns' names",

@@ -34,12 +34,13 @@ class Tracks:
     """Markers tracked through a clip: (m, n, 2) in pixels, right and down from the upper left corner.
 
     names: of the m markers; positions are nan in frames where a marker was lost. fps: frames per s, 0 where
-    the clip does not give it.
+    the clip does not give it; time_s (n,): of the frames in s, None where only fps says it.
     """
 
     names: tuple[str, ...]
     pixels: Array
     fps: float = 0.0
+    time_s: Array | None = None
 
     def __len__(self) -> int:
         return int(self.pixels.shape[1])

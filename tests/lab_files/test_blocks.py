@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from mu_addon.lab_files.blocks import blocks
-from mu_addon.lab_files.cells import rows_of_text
+from mu_addon.lab_files import blocks
 from mu_addon.lab_files.quantities import column, unit_of
+from mu_addon.lab_files.source import sheet_of_text
 
 from . import exports
 
 
 def tables(text):
-    return blocks(rows_of_text(text))
+    return blocks.tables(sheet_of_text(text)).blocks
 
 
 def test_bluehill():

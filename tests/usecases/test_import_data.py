@@ -255,5 +255,5 @@ def test_the_command_line(tmp_path):
     done = subprocess.run([*run, *given], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "out/summary.json").read_text())
-    assert summary["experiments"]["one"]["not_read"] == ["Nr"]
+    assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': no quantity that is read"]
     assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)

@@ -7,8 +7,9 @@ import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from ...cells.own import own_lines, own_rows, own_text
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from ...reading import unreadable
 
 # Bytes of a filled sheet: a hundred times as many as the empty ones have.
 _LONGEST = 1 << 17
@@ -26,7 +27,10 @@ def sheet_text(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def sheet_rows(path: Path, remedy: str) -> list[tuple[str, dict[str, str]]]:
     """Rows of a filled sheet, each with its place in words; raises InputError with the remedy."""
     try:
-        rows = list(csv.DictReader(io.StringIO(file_text(path, _LONGEST))))
+        rows = own_rows(own_lines(own_text(path, _LONGEST)))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the sheet: {unreadable(error)}", str(path), remedy) from error
-    return [(f"{path}, line {number}", row) for number, row in enumerate(rows, 2)]
+    except csv.Error as error:
+        raise InputError(f"cannot read the sheet: {error}", str(path), remedy) from error
+    names = rows[0][1] if rows else []
+    return [(f"{path}, line {number}", dict(zip(names, cells, strict=False))) for number, cells in rows[1:]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,11 @@ _PICTURES = (
     ("time_s", "stress_kPa"),
 )
 _MOST_POINTS = 2000
+# Bars of a column's course in a terminal, and their heights.
+_BARS = 32
+_HEIGHTS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
+
+Array = np.ndarray[Any, Any]
 
 
 def page_of(found: Understood, name: str) -> str:
@@ -43,13 +49,11 @@ def page_of(found: Understood, name: str) -> str:
 
 def _section(p: Proposal) -> str:
     """Picture, keys, columns and what was concluded, of one experiment."""
-    ranges = [
-        ([name, p.origin[name], f"{np.nanmin(v):.6g}", f"{np.nanmax(v):.6g}", str(len(v))], False)
-        for name, v in p.columns.items()
-    ]
+    ranges = [([name, p.origin[name], *_extent(v), str(len(v))], False) for name, v in p.columns.items()]
     head = [("column", ""), ("from", ""), ("least", "n"), ("most", "n"), ("rows", "n")]
     concluded = "".join(f"<li>{escape(words)}</li>" for words in p.concluded)
-    unread = f"<p>Not read: {escape(', '.join(p.unread))}.</p>" if p.unread else ""
+    listed = "".join(f"<li>{escape(one.words)}</li>" for one in p.unread)
+    unread = f"<p>Not read:</p><ul>{listed}</ul>" if listed else ""
     return (
         _picture(p)
         + facts_table("key", "value", {**p.keys, "from": p.place})
@@ -57,6 +61,41 @@ def _section(p: Proposal) -> str:
         + (f"<ul>{concluded}</ul>" if concluded else "")
         + unread
     )
+
+
+def _extent(values: Array) -> tuple[str, str]:
+    """The least and the largest value as text, empty where all are missing."""
+    if not np.isfinite(values).any():
+        return "", ""
+    return f"{np.nanmin(values):.6g}", f"{np.nanmax(values):.6g}"
+
+
+def terminal_lines(found: Understood) -> list[str]:
+    """What was understood, for a terminal: each column with its extent and a picture of its course."""
+    lines: list[str] = []
+    for p in found.proposals:
+        kind = p.keys.get("kind", "kind not known yet")
+        lines.append(f"{p.name}: {kind}, {len(p.lines)} rows, {p.place}")
+        rows = [(name, p.origin[name], *_extent(v), _trace(v)) for name, v in p.columns.items()]
+        rows.insert(0, ("column", "from", "least", "most", "course"))
+        widths = [max(len(row[k]) for row in rows) for k in range(4)]
+        for row in rows:
+            cells = [row[k].ljust(w) if k < 2 else row[k].rjust(w) for k, w in enumerate(widths)]
+            lines.append("  " + "  ".join([*cells, row[4]]).rstrip())
+        lines += [f"  concluded: {words}" for words in p.concluded]
+        lines += [f"  not read: {one.words}" for one in p.unread]
+    return [*lines, *(f"not read: {words}" for words in found.left_out)]
+
+
+def _trace(values: Array) -> str:
+    """The course of a column as a row of bars, the mean of each of equal parts."""
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return ""
+    means = np.array([part.mean() for part in np.array_split(values, min(_BARS, len(values)))])
+    extent = float(np.ptp(means))
+    heights = (means - means.min()) / extent if extent else np.zeros(len(means))
+    return "".join(_HEIGHTS[int(h * (len(_HEIGHTS) - 1) + 0.5)] for h in heights)
 
 
 def _picture(p: Proposal) -> str:

@@ -16,10 +16,12 @@ from ...measured.table import Remark
 from ...measured.writing import csv_text, file_stem, put, require_free, tried
 from ...run.context import RunContext
 from ...toml_writer import toml_text
-from .report import page_of
+from .report import page_of, terminal_lines
 from .understood import Understood, understand
 
 PAGE = "import.html"
+# Choices that are written into the option which answers a question.
+_FEW = 6
 Ask = Callable[[Proposal, Question], str]
 
 
@@ -29,30 +31,43 @@ def import_files(
     answers: Mapping[str, str],
     context: RunContext,
     ask: Ask | None = None,
+    show: Callable[[list[str]], None] = lambda lines: None,
+    dry: bool = False,
 ) -> tuple[Proposal, ...]:
     """Put the experiments of files into a folder of measured data; fills `context.summary`.
 
     ask: gives the answer to a question; without it open questions raise InputError, after the page with what
-    was understood was written.
+    was understood was written. show: is given the same as lines of a terminal before questions. dry: the page
+    is all that is written, and open questions are told.
     """
     context.open_folder(folder)
     context.console_summary = console_summary
     given = dict(answers)
+    remarks: list[Remark] = []
     with context.progress.stage("import"):
         found = understand(files, given)
-        while found.open and ask is not None:
+        if found.open and not dry:
+            show(terminal_lines(found))
+        while found.open and ask is not None and not dry:
             # The same question of further experiments has the same answer.
             given |= {question.key: ask(p, question) for p, question in found.asked}
             found = understand(files, given)
-        remarks = write(found, folder)
+        if dry:
+            write_page(found, folder)
+        else:
+            remarks = write(found, folder)
     for remark in remarks:
         context.progress.warning(remark.what, remark.where, remark.remedy)
     context.summary |= {
         "experiments": {p.name: _figures(p) for p in found.proposals},
         "left_out": list(found.left_out),
         "remarks": [remark.what for remark in remarks],
+        "understood": terminal_lines(found),
         "report": str(folder / PAGE),
     }
+    if dry:
+        questions = [_asked(p, question) for p, question in found.asked]
+        context.summary |= {"dry_run": True, "questions": questions}
     return found.proposals
 
 
@@ -90,7 +105,7 @@ def _table(p: Proposal) -> str:
     """The CSV file of an experiment: comments on where it comes from, then its rows."""
     lines = [f"from {p.place}"]
     lines += [f"{column} is {source}" for column, source in p.origin.items()]
-    lines += p.concluded
+    lines += [*p.concluded, *(f"not read: {one.words}" for one in p.unread)]
     comments = "".join(f"# {' '.join(words.split())}\n" for words in lines)
     return comments + csv_text(p.columns)
 
@@ -98,21 +113,18 @@ def _table(p: Proposal) -> str:
 def _figures(p: Proposal) -> dict[str, Any]:
     """What an experiment comes to, in plain data."""
     return {
-        "kind": p.keys["kind"],
-        "rows": len(next(iter(p.columns.values()))),
+        "kind": p.keys.get("kind", ""),
+        "rows": len(p.lines),
         "from": p.where,
         "columns": dict(p.origin),
         "concluded": list(p.concluded),
-        "not_read": list(p.unread),
+        "not_read": [one.words for one in p.unread],
     }
 
 
 def _open_questions(found: Understood, folder: Path) -> tuple[str, str, str]:
     """What, where and what to do of the questions that are open."""
-    lines = [
-        f"{p.name}: {question.text}" + (f"; likely {question.proposed}" if question.proposed else "")
-        for p, question in found.asked
-    ]
+    lines = [_asked(p, question) for p, question in found.asked]
     options = " ".join(f"--set {_quoted(f'{q.key}={_example(q)}')}" for _, q in found.asked)
     what = "the files leave open\n    " + "\n    ".join(lines)
     return (
@@ -122,9 +134,14 @@ def _open_questions(found: Understood, folder: Path) -> tuple[str, str, str]:
     )
 
 
+def _asked(p: Proposal, question: Question) -> str:
+    return f"{p.name}: {question.text}" + (f"; likely {question.proposed}" if question.proposed else "")
+
+
 def _example(question: Question) -> str:
     shown = {"section_mm": "WIDTHxTHICKNESS", "length_mm": "LENGTH", "interval_s": "SECONDS"}
-    return question.proposed or shown.get(question.key) or "|".join(question.choices)
+    few = len(question.choices) <= _FEW
+    return question.proposed or shown.get(question.key) or ("|".join(question.choices) if few else "QUANTITY")
 
 
 def _quoted(text: str) -> str:
@@ -132,9 +149,10 @@ def _quoted(text: str) -> str:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was imported, a line each."""
-    lines = [
-        f"{name}: {one['kind']}, {one['rows']} rows, " + ", ".join(one["columns"])
-        for name, one in summary["experiments"].items()
-    ]
-    return [*lines, *summary["left_out"], f"what was understood: {summary['report']}"]
+    """What was understood, and what is open in a dry run."""
+    lines = [*summary["understood"], f"what was understood, with pictures: {summary['report']}"]
+    if summary.get("dry_run"):
+        lines += [f"open: {question}" for question in summary["questions"]] + [
+            "dry run: nothing was imported"
+        ]
+    return lines

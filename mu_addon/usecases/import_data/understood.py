@@ -7,11 +7,11 @@ from pathlib import Path
 
 import attrs
 
+from ...cells.notation import DECIMALS
 from ...errors import InputError
-from ...lab_files.blocks import blocks
-from ...lab_files.cells import DECIMALS
-from ...lab_files.proposal import Proposal, Question, answers_for, propose
-from ...lab_files.source import read_sheets
+from ...lab_files.blocks import Block, tables
+from ...lab_files.proposal import NoExperiment, Proposal, Question, answers_for, propose
+from ...lab_files.source import Sheet, read_sheets
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
@@ -42,7 +42,7 @@ KEYS = (
 
 @attrs.frozen
 class Understood:
-    """What files come to: an experiment each, and tables that are none, in words."""
+    """What files come to: an experiment each, and in words the tables and lines that are in none."""
 
     proposals: tuple[Proposal, ...]
     left_out: tuple[str, ...]
@@ -73,35 +73,62 @@ def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
         raise InputError(f"decimal = {decimal!r} is not known", "--set", "write decimal=. or decimal=,")
     for path in files:
         before = len(proposals)
-        for sheet in read_sheets(path, decimal):
-            tables = blocks(sheet)
-            for number, block in enumerate(tables, 1):
-                where = f"{path}{f', sheet {sheet.name!r}' if sheet.name else ''}, line {block.lines[0]}"
-                known = [c for c in block.columns if c.quantity not in ("", "count")]
-                if block.columns[0].title and len(known) < 2:
-                    left_out.append(f"{where}: a table without two known quantities was left out")
-                    continue
-                parts = [path.stem, sheet.name if len(tables) == 1 else "", block.label]
-                if len(tables) > 1 and not block.label:
-                    parts.append(str(number))
-                name = _unlike(" ".join(part for part in parts if part), [p.name for p in proposals])
+        refused: InputError | None = None
+        told, unknown = _tables(path, decimal, left_out)
+        for sheet, number, count, block in told or unknown:
+            parts = [path.stem, sheet.name if count == 1 else "", block.label]
+            if count > 1 and not block.label:
+                parts.append(str(number))
+            name = _unlike(" ".join(part for part in parts if part), [p.name for p in proposals])
+            try:
                 found = propose(path, block, name, answers_for(name, answers))
-                if sheet.unsure:
-                    question = Question(
-                        DECIMAL,
-                        f"are numbers like 1,234 of {path.name} written with a point or a comma?",
-                        DECIMALS,
-                    )
-                    found = attrs.evolve(found, questions=(question, *found.questions))
-                proposals.append(found)
+            except NoExperiment as error:
+                refused = refused or error
+                left_out.append(f"{error.where}: {error.what}")
+                continue
+            if block.unsure:
+                question = Question(
+                    DECIMAL,
+                    f"are numbers like 1,234 of {path.name} written with a point or a comma?",
+                    DECIMALS,
+                )
+                found = attrs.evolve(found, questions=(question, *found.questions))
+            proposals.append(found)
+        if told:
+            left_out += [
+                f"{path}, line {block.lines[0]}: a table without two known quantities was left out"
+                for _, _, _, block in unknown
+            ]
         if len(proposals) == before:
-            raise InputError(
+            raise refused or InputError(
                 "the file holds no table of measured data",
                 str(path),
                 "give a file with columns of numbers, and their names above them",
             )
     _require_used(answers, proposals)
     return Understood(tuple(proposals), tuple(left_out))
+
+
+_Table = tuple[Sheet, int, int, Block]
+
+
+def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[_Table], list[_Table]]:
+    """The tables of a file with two known quantities, and the others; lines in none go to left_out."""
+    told: list[_Table] = []
+    unknown: list[_Table] = []
+    for sheet in read_sheets(path, decimal):
+        where = f"{path}, sheet {sheet.name!r}" if sheet.name else str(path)
+        try:
+            found = tables(sheet)
+        except InputError as error:
+            raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error
+        left_out += [f"{where}, {one.words}" for one in found.unread]
+        for number, block in enumerate(found.blocks, 1):
+            known = [c for c in block.columns if c.quantity not in ("", "count")]
+            untitled = not any(c.title for c in block.columns)
+            table = (sheet, number, len(found.blocks), block)
+            (told if len(known) > 1 or untitled else unknown).append(table)
+    return told, unknown
 
 
 def _unlike(name: str, others: Sequence[str]) -> str:
@@ -126,5 +153,5 @@ def _require_used(answers: Mapping[str, str], proposals: Sequence[Proposal]) -> 
                 f"{given!r} answers no question",
                 "--set",
                 f"experiments: {', '.join(names)}; keys: {', '.join(KEYS)}, decimal, unit.TITLE and "
-                f"column.TITLE with a title of {', '.join(sorted(titles))}",
+                f"column.TITLE with a title or number of {', '.join(sorted(titles))}",
             )

@@ -13,10 +13,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...cells.own import own_lines, own_rows, own_text
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...measured import read_folder
-from ...reading import file_text, require_rows
+from ...reading import require_rows
 from ...report.charts import canvas
 from ...report.html import cards, figure, page, table
 from ...run.context import RunContext
@@ -288,13 +289,14 @@ def _marked(recording: Recording, time_s: Array) -> Array:
 def _joined_angles(path: Path, time_s: Array) -> Array:
     """Angles (n,) in degrees at given times, interpolated in a CSV file, nan beyond its ends."""
     try:
-        lines = [line for line in file_text(path).splitlines() if not line.lstrip().startswith("#")]
+        lines = own_lines(own_text(path))
         require_rows(len(lines) - 1, str(path))
-        rows = list(csv.DictReader(lines))
-        t, a = np.array([[float(row["time_s"]), float(row["angle_deg"])] for row in rows]).T
+        (_, names), *rows = own_rows(lines)
+        places = [names.index("time_s"), names.index("angle_deg")]
+        t, a = np.array([[float(cells[k]) for k in places] for _, cells in rows]).T
     except OSError as error:
         raise InputError(f"cannot read {path.name}: {error.strerror}", str(path), "check its name") from None
-    except (KeyError, TypeError, ValueError):
+    except (csv.Error, IndexError, ValueError):
         raise InputError(
             "the file is not a table of time_s,angle_deg", str(path), "give numbers in these two columns"
         ) from None

@@ -15,6 +15,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...cells.own import own_lines, own_rows, own_text
 from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
@@ -218,7 +219,7 @@ def _finite(value: Any) -> bool:
 def read_pressure(path: Path) -> tuple[Array, Array]:
     """Time in s and pressure in kPa, (k,) each, of a recording or a protocol; raises InputError."""
     try:
-        text = file_text(path)
+        text = own_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"cannot read the pressure: {unreadable(error)}",
@@ -235,14 +236,26 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     Frames outside the pressure's record are left out. Raises InputError for a clip without a clock, one that
     does not meet the record, and a view that does not fit.
     """
-    fps = bench.fps if bench.fps is not None else tracks.fps
-    if not (math.isfinite(fps) and fps > 0):
-        raise InputError("the clip has no frame rate", where, "give fps")
-    time = bench.starts_s + np.arange(len(tracks)) / fps
-    clock, kPa = pressure
-    slack = 0.5 / fps
-    inside = (time >= clock[0] - slack) & (time <= clock[-1] + slack)
     remarks = []
+    fps = bench.fps if bench.fps is not None else tracks.fps
+    wrong = not (math.isfinite(fps) and fps > 0)
+    if wrong and (bench.fps is not None or tracks.time_s is None):
+        raise InputError("the clip has no frame rate", where, "give fps, or a column time_s")
+    if tracks.time_s is not None:
+        time = bench.starts_s + tracks.time_s
+        if bench.fps is not None:
+            remarks.append(
+                Remark(
+                    f"the markers have their own time_s, which is taken; fps = {bench.fps:g} is not used",
+                    where,
+                    "leave fps out, or remove the column time_s where it is wrong",
+                )
+            )
+    else:
+        time = bench.starts_s + np.arange(len(tracks)) / fps
+    clock, kPa = pressure
+    slack = 0.5 * float(np.median(np.diff(time)))
+    inside = (time >= clock[0] - slack) & (time <= clock[-1] + slack)
     if inside.sum() < 2:
         raise InputError(
             f"the clip lasts from {time[0]:.4g} to {time[-1]:.4g} s, the pressure record from "
@@ -259,7 +272,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
                 "start the pressure record before the clip and end it after",
             )
         )
-    kept = attrs.evolve(tracks, pixels=tracks.pixels[:, inside])
+    kept = attrs.evolve(tracks, pixels=tracks.pixels[:, inside], time_s=time[inside] - bench.starts_s)
     time = time[inside]
     p = np.interp(time, clock, kPa)
     needed = [*bench.view.base, *(bench.view.tip or ())]
@@ -289,7 +302,7 @@ def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tu
     table = f"{file_stem(name)}.csv"
     block = _block(name, table, bench)
     remarks = add_experiment(folder, name, block, table, _table(found, bench))
-    write_text(folder / f"{file_stem(name)}.pixels.csv", _pixels(found))
+    write_text(folder / f"{file_stem(name)}.pixels.csv", _pixels(found, bench.starts_s))
     return folder / table, remarks
 
 
@@ -324,9 +337,9 @@ def _csv(columns: Mapping[str, Array]) -> str:
     return csv_text(columns, lambda v: f"{v:.10g}" if v == int(v) else f"{v:.6f}")
 
 
-def _pixels(found: Filmed) -> str:
-    """Places in the picture, a row a frame, as `read_pixels` reads them."""
-    columns: dict[str, Array] = {"frame": np.arange(len(found.tracks))}
+def _pixels(found: Filmed, starts_s: float) -> str:
+    """Places in the picture, a row a frame with the time in the clip, as `read_pixels` reads them."""
+    columns: dict[str, Array] = {"time_s": found.time_s - starts_s}
     for name, at in zip(found.tracks.names, found.tracks.pixels, strict=True):
         columns |= {f"{name} right_px": at[:, 0], f"{name} down_px": at[:, 1]}
     return _csv(columns)
@@ -335,19 +348,19 @@ def _pixels(found: Filmed) -> str:
 def read_pixels(path: Path) -> Tracks:
     """Markers that were followed by any tracker: a CSV with `NAME right_px`, `NAME down_px` for each.
 
-    One row a frame; empty where a marker was lost. Raises InputError.
+    One row a frame; empty where a marker was lost; time_s, where it is there, is the time of each. Raises
+    InputError.
     """
     try:
-        lines = file_text(path).splitlines()
+        lines = own_lines(own_text(path))
+        require_rows(len(lines) - 1, str(path))
+        (_, head), *body = own_rows(lines) or [(0, [])]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"cannot read the tracked markers: {unreadable(error)}", str(path), "check path and file"
         ) from error
-    rows = [
-        (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
-    ]
-    require_rows(len(rows) - 1, str(path))
-    head, *body = [[cell.strip() for cell in cells] for cells in csv.reader(line for _, line in rows)] or [[]]
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", str(path), "separate the columns by commas") from error
     names = tuple(h.removesuffix(" right_px") for h in head if h.endswith(" right_px"))
     wanted = [f"{name} {side}_px" for name in names for side in ("right", "down")]
     missing = [column for column in wanted if column not in head]
@@ -357,15 +370,27 @@ def read_pixels(path: Path) -> Tracks:
             str(path),
             "name the columns `NAME right_px` and `NAME down_px`, a row a frame",
         )
-    pixels = np.empty((len(wanted), len(body)))
-    for i, ((number, _), cells) in enumerate(zip(rows[1:], body, strict=True)):
+    timed = [*wanted, "time_s"] if "time_s" in head else wanted
+    read = np.empty((len(timed), len(body)))
+    for i, (number, cells) in enumerate(body):
         try:
-            pixels[:, i] = [float(cells[head.index(column)] or "nan") for column in wanted]
+            read[:, i] = [float(cells[head.index(column)] or "nan") for column in timed]
         except (ValueError, IndexError) as error:
             raise InputError(
                 "a row holds something that is not a number", f"{path}, row {number}", "correct that row"
             ) from error
-    return Tracks(names, pixels.reshape(len(names), 2, -1).transpose(0, 2, 1))
+    pixels = read[: len(wanted)].reshape(len(names), 2, -1).transpose(0, 2, 1)
+    if timed is wanted:
+        return Tracks(names, pixels)
+    time = read[-1]
+    wrong = np.flatnonzero(~np.isfinite(time) | np.concatenate([[False], ~(np.diff(time) > 0)]))
+    if len(wrong):
+        raise InputError(
+            "time_s is missing, or does not increase",
+            f"{path}, row {body[wrong[0]][0]}",
+            "correct it, or leave the column out and give fps",
+        )
+    return Tracks(names, pixels, time_s=time)
 
 
 def track(

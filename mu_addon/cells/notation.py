@@ -1,0 +1,151 @@
+"""Numbers in the cells of a column: which sign divides decimals, which thousands, and what is no number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+DECIMALS = (".", ",")
+MISSING = ("", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---")
+# As typewriters and tables write them: minus signs, spaces and apostrophes.
+_SIGNS = str.maketrans(
+    dict.fromkeys("\u2212\u2013\ufe63\uff0d\u2010\u2011", "-")
+    | dict.fromkeys("\u00a0\u202f\u2009\u2007\u2006\u3000", " ")
+    | dict.fromkeys("\u2019\u02bc\u00b4`", "'")
+    | {"\uff0c": ",", "\uff0e": "."}
+)
+_EXPONENT = r"(?:[eEdD][+-]?\d{1,3})?"
+_SIGNED = r"[+-]? ?"
+_PLAIN = {
+    d: re.compile(rf"{_SIGNED}(?:\d+{re.escape(d)}?\d*|{re.escape(d)}\d+){_EXPONENT}") for d in DECIMALS
+}
+
+
+def _grouped(decimal: str) -> re.Pattern[str]:
+    """Groups of thousands, by one sign throughout; the first begins with another digit than 0."""
+    d, other = re.escape(decimal), re.escape(",.".replace(decimal, ""))
+    indian = rf"|[1-9]\d?(?:{other}\d\d)+{other}\d{{3}}" if decimal == "." else ""
+    return re.compile(rf"{_SIGNED}(?:[1-9]\d{{0,2}}([{other}' ])\d{{3}}(?:\1\d{{3}})*{indian})(?:{d}\d*)?")
+
+
+_GROUPED = {d: _grouped(d) for d in DECIMALS}
+# One sign for decimals and thousands, the last of them for decimals.
+_BOTH = {
+    d: re.compile(rf"{_SIGNED}[1-9]\d{{0,2}}(?:{re.escape(d)}\d{{3}})+{re.escape(d)}\d+") for d in DECIMALS
+}
+_LIKE = re.compile(rf"{_SIGNED}(?:\d+(?:[.,' ]\d{{2,3}})*(?:[.,]\d*)?|[.,]\d+){_EXPONENT}")
+_WITH_UNIT = re.compile(r"([+-]? ?[\d.,' ]*\d[.,]?(?:[eE][+-]?\d+)?) ?([^\d\s.,+-][^\d\s]{0,9})")
+# What float() reads as the pattern of a decimal point does.
+_SIMPLE = re.compile(r"[-+0-9.eE\n]*")
+
+
+@attrs.frozen(eq=False)
+class Numbers:
+    """The numbers of a column's cells.
+
+    values (n,): nan where a cell is empty or no number; decimal: the sign; sure: whether the cells tell it,
+    or hold none; unreadable: which cells are neither number nor empty; both: which have one sign for decimals
+    and thousands.
+    """
+
+    values: Array
+    decimal: str
+    sure: bool
+    unreadable: tuple[int, ...]
+    both: tuple[int, ...] = ()
+
+
+def plain_signs(cell: str) -> str:
+    """A cell with the minus signs, spaces and apostrophes of a typewriter."""
+    return cell if cell.isascii() else cell.translate(_SIGNS).strip()
+
+
+def is_like_number(cell: str) -> bool:
+    """Whether a cell looks like a number, whichever sign is the decimal one."""
+    return _LIKE.fullmatch(plain_signs(cell)) is not None
+
+
+def number(cell: str, decimal: str) -> float | None:
+    """The number in a cell, nan where a value is missing, None for any other text."""
+    cell = plain_signs(cell)
+    if cell.casefold() in MISSING:
+        return float("nan")
+    if not (_PLAIN[decimal].fullmatch(cell) or _GROUPED[decimal].fullmatch(cell)):
+        return None
+    for sign in ",.' ":
+        if sign != decimal:
+            cell = cell.replace(sign, "")
+    value = float(cell.replace(decimal, ".").replace("d", "e").replace("D", "e"))
+    return value if np.isfinite(value) else None
+
+
+def judged(cells: Sequence[str], usual: str = "", forced: str = "") -> Numbers:
+    """The numbers of a column's cells, by the decimal sign that reads most of them.
+
+    usual: the sign where the cells do not tell; forced: the one that holds in any case.
+    """
+    fast = _simple(cells) if forced != "," else None
+    if fast is not None and (forced or fast.sure or usual == "."):
+        return fast
+    signs = (forced,) if forced else DECIMALS
+    found = {d: [number(cell, d) for cell in cells] for d in signs}
+    strict = {d: sum(v is not None for v in found[d]) for d in signs}
+    twice = {d: _both(cells, found[d], d) for d in signs}
+    counts = {d: (strict[d] + len(twice[d]), strict[d]) for d in signs}
+    fit = [d for d in signs if counts[d] == max(counts.values())]
+    differ = len(fit) > 1 and any(
+        a is not None and b is not None and a == a and a != b
+        for a, b in zip(*(found[d] for d in fit), strict=True)
+    )
+    decimal = usual if differ and usual in fit else fit[0]
+    values = found[decimal]
+    for i, value in twice[decimal].items():
+        values[i] = value
+    unreadable = tuple(i for i, value in enumerate(values) if value is None)
+    numbers = np.array([np.nan if value is None else value for value in values])
+    return Numbers(numbers, decimal, not differ, unreadable, tuple(twice[decimal]))
+
+
+def _both(cells: Sequence[str], found: Sequence[float | None], decimal: str) -> dict[int, float]:
+    """Numbers, by place, of cells that are none but where the decimal sign divides thousands, too."""
+    both = {}
+    for i, value in enumerate(found):
+        if value is None and _BOTH[decimal].fullmatch(cell := plain_signs(cells[i])):
+            head, _, tail = cell.replace(" ", "").rpartition(decimal)
+            both[i] = float(f"{head.replace(decimal, '')}.{tail}")
+    return both
+
+
+def _simple(cells: Sequence[str]) -> Numbers | None:
+    """Numbers of nothing but digits and points, many times as fast; None where there is anything else."""
+    if not _SIMPLE.fullmatch("\n".join(cells)):
+        return None
+    try:
+        values = np.array([float(cell) if cell else np.nan for cell in cells])
+    except ValueError:
+        return None
+    if np.isinf(values).any():
+        return None
+    dotted = [cell for cell in cells if "." in cell]
+    sure = not dotted or any(not _GROUPED[","].fullmatch(cell) for cell in dotted)
+    return Numbers(values, ".", sure, ())
+
+
+def without_units(cells: Sequence[str]) -> tuple[list[str], str]:
+    """Cells such as "12.5 N" without the unit that stands behind most of them, and the unit; "" for none."""
+    found = [_WITH_UNIT.fullmatch(plain_signs(cell)) for cell in cells]
+    units = [match[2] for match in found if match]
+    filled = sum(1 for cell in cells if cell)
+    unit = max(set(units), key=units.count) if units else ""
+    if not unit or units.count(unit) < 0.5 * filled:
+        return list(cells), ""
+    return [
+        match[1].strip() if match and match[2] == unit else cell
+        for match, cell in zip(found, cells, strict=True)
+    ], unit
