@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import attrs
 
 from .clock import is_clock
-from .notation import is_like_number
+from .notation import is_like_number, unit_behind
 
 DELIMITERS = ("\t", ";", ",", "|", "spaces")
 # Lines of the file by which its separator is judged, from its beginning and from its middle.
@@ -84,7 +84,7 @@ def delimiter_of(lines: Sequence[str]) -> str:
 def _share(cells: Sequence[str]) -> float:
     """The share of numbers among the cells of a row of two or more, 0 for other rows."""
     filled = [cell for cell in cells if cell]
-    numbers = sum(map(is_reading, filled))
+    numbers = sum(is_reading(cell) or bool(unit_behind(cell)) for cell in filled)
     return numbers / len(filled) if numbers > 1 or (numbers and len(filled) > 1) else 0.0
 
 

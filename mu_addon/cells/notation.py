@@ -71,6 +71,12 @@ def is_like_number(cell: str) -> bool:
     return _LIKE.fullmatch(plain_signs(cell)) is not None
 
 
+def unit_behind(cell: str) -> str:
+    """What stands behind the number in a cell such as "12.5 N", "" for nothing or for no number."""
+    match = _WITH_UNIT.fullmatch(plain_signs(cell))
+    return match[2] if match else ""
+
+
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, nan where a value is missing, None for any other text."""
     cell = plain_signs(cell)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..cells.clock import clock, is_clock
 from ..cells.dialect import Row, split
-from ..cells.notation import judged, number, without_units
+from ..cells.notation import judged, number, unit_behind, without_units
 from ..errors import InputError
 from .quantities import Column, column, is_unit, plain
 from .source import Sheet
@@ -114,9 +114,13 @@ class _Finding:
     def __init__(self, sheet: Sheet) -> None:
         self.sheet, self.rows = sheet, sheet.rows
         self.numeric = [row.numeric for row in self.rows]
+        if self._start(0) is None:
+            self.numeric = [_numeric_with_units(row) for row in self.rows]
         self.facts: dict[str, tuple[str, ...]] = {}
         self.specimen = ""
-        self.heads: list[tuple[str, str]] = []
+        # Of the last table: its titles, and the columns that have numbers.
+        self.titles: list[Row] = []
+        self.titled: frozenset[int] = frozenset()
         self.unread: list[Unread] = []
 
     def tables(self) -> Tables:
@@ -137,9 +141,9 @@ class _Finding:
             begin = end
         if found:
             self._leave_text([row for row in self.rows[begin:] if row.filled], "below the table")
-        told = {int(line) for block in found for line in block.lines}
-        told |= {line for one in self.unread for line in one.lines}
-        head = [row.line for row in self.rows if row.filled and not told.intersection(row.lines)]
+        taken = {int(line) for block in found for line in block.lines}
+        taken |= {line for one in self.unread for line in one.lines}
+        head = [row.line for row in self.rows if row.filled and not taken.intersection(row.lines)]
         return Tables(tuple(found), tuple(self.unread), tuple(head))
 
     def _leave(self, rows: Sequence[Row], why: str) -> None:
@@ -183,7 +187,9 @@ class _Finding:
         usual = frozenset(k for k, count in counts.items() if 2 * count >= len(near))
         self.usual = usual = usual if len(usual) > 1 else frozenset(counts)
         least = min(2, len(usual))
-        members, pending, skipped = [start], [], []
+        members = [start]
+        pending: list[int] = []
+        skipped: list[int] = []
         for k in range(start + 1, len(self.rows)):
             row = self.rows[k]
             if len(self.numeric[k] & usual) >= least:
@@ -223,16 +229,16 @@ class _Finding:
     def _order(self, members: Sequence[int], k: int) -> int | None:
         """1 where the first column that grows goes on growing at row k, -1 where it falls back, None else."""
         first, last = members[0], members[-1]
+        # Of the last rows one may be damaged.
+        places = (first, members[-min(2, len(members))], last, k)
         for place in sorted(self.usual):
-            cells = [
-                self.rows[i].cells[place] if place < len(self.rows[i].cells) else "" for i in (first, last, k)
-            ]
-            read = (
-                clock(cells).seconds if all(map(is_clock, cells)) else judged(cells, self.sheet.usual).values
-            )
-            a, b, c = read
+            cells = [_cell(self.rows[i].cells, place) for i in places]
+            clocks = all(map(is_clock, cells))
+            read = clock(cells).seconds if clocks else judged(cells, self.sheet.usual).values
+            a, before, b, c = read
             if np.isfinite(read).all() and (b > a or (first == last and c != b)):
-                return 1 if c > b else -1 if c < b - 0.5 * (b - a) or first == last else None
+                low = min(before, b)
+                return 1 if c > low else -1 if c < low - 0.5 * (low - a) or first == last else None
         return None
 
     def _table(self, begin: int, start: int, members: Sequence[int], skipped: Sequence[int]) -> list[Block]:
@@ -244,10 +250,16 @@ class _Finding:
         self.facts = self.facts | _facts(remarks)
         self.specimen = _specimen(remarks) or self.specimen
         self._leave_text(damaged, "between the titles and the first row that is read")
-        self._note_numbers([k for k in range(begin, start) if self.rows[k] in remarks])
+        if titles or not self.titles:
+            self._note_numbers([k for k in range(begin, start) if self.rows[k] in remarks])
+        else:
+            titles = self.titles if self.titled == self.usual else []
+            self._leave_text(
+                [row for row in remarks if row.filled != (self.specimen,)], "between two records"
+            )
         self._leave_text(self._at(skipped), "no row of numbers, within the table")
-        blocks = _block(self.sheet, titles, self._at(members), self.facts, self.heads)
-        self.heads = [(c.title, c.unit) for b in blocks for c in b.columns] if len(blocks) == 1 else []
+        blocks = _block(self.sheet, titles, self._at(members), self.facts)
+        self.titles, self.titled = titles, self.usual
         read = {int(line) for block in blocks for line in block.lines}
         self._leave([row for row in self._at(members) if row.line not in read], "no two columns of numbers")
         return [attrs.evolve(block, label=block.label or self.specimen) for block in blocks]
@@ -271,10 +283,16 @@ class _Finding:
                 break
             if found and not _is_units(found[0]) and not _is_units(row):
                 same = len(row.filled) >= len(found[0].filled) > 2
-                if not (_is_label_row(row, found[0]) or (same and _more_known(row, found[0]))):
+                above, below = _known(row), _known(found[0])
+                if same and len(found) == 1 and above > 1 and not below:
+                    # Words below the titles, of an event or a remark.
+                    damaged = [found.pop(), *damaged]
+                elif not (_is_label_row(row, found[0]) or (same and above > below)):
                     break
             if found and _is_units(row):
-                break
+                if len(found) > 1 or _known(found[0]):
+                    break
+                damaged = [found.pop(), *damaged]
             found.insert(0, row)
         return (found, damaged) if found else ([], [])
 
@@ -286,12 +304,18 @@ class _Finding:
             text = next(c for c in cells if c)
             for delimiter in ("\t", ";", ",", "spaces"):
                 parts = split(text, delimiter)
-                if len(parts) == width and all(parts):
+                known = any(column(part).quantity or is_unit(part) for part in parts)
+                if len(parts) == width and all(parts) and known:
                     return attrs.evolve(row, cells=parts)
             words = re.sub(r"\s+(?=[(\[])", "\u00a0", text).split(" ")
             if len(words) == width and self.sheet.delimiter == "spaces":
                 return attrs.evolve(row, cells=tuple(word.replace("\u00a0", " ") for word in words))
         return attrs.evolve(row, cells=cells)
+
+
+def _numeric_with_units(row: Row) -> frozenset[int]:
+    """The places of a row's cells that hold a number, also one with its unit behind it."""
+    return row.numeric | {k for k, cell in enumerate(row.cells) if is_unit(unit_behind(cell))}
 
 
 def _is_titles(row: Row) -> bool:
@@ -317,13 +341,9 @@ def _is_label_row(row: Row, titles: Row) -> bool:
     return 2 <= len(row.filled) < len(titles.filled) and len(row.cells) > len(row.filled)
 
 
-def _more_known(row: Row, below: Row) -> bool:
-    """Whether titles in two rows are known by the upper one."""
-
-    def count(cells: Sequence[str]) -> int:
-        return sum(bool(column(cell).quantity) for cell in cells)
-
-    return count(row.cells) > count(below.cells)
+def _known(row: Row) -> int:
+    """How many cells of a row name a quantity."""
+    return sum(bool(column(cell).quantity) for cell in row.cells)
 
 
 def _block(
@@ -331,7 +351,6 @@ def _block(
     titles: Sequence[Row],
     rows: Sequence[Row],
     facts: dict[str, tuple[str, ...]],
-    before: Sequence[tuple[str, str]],
 ) -> list[Block]:
     units = next((row for row in titles if _is_units(row)), None)
     named = [row for row in titles if row is not units]
@@ -357,8 +376,6 @@ def _block(
     unread: list[Unread] = []
     for k, one in read.items():
         title, unit = _cell(heads, k), _cell(units.cells if units else (), k)
-        if not titles and len(before) == width:
-            title, unit = before[k]
         if one.numbers:
             columns[k] = attrs.evolve(column(title, unit or one.unit), place=k + 1)
             if one.clock:
@@ -370,7 +387,7 @@ def _block(
                 )
         elif one.words:
             unread.append(Unread(_named(title, k), one.words))
-    parts = []
+    parts: list[Block] = []
     for group in _side_by_side(columns):
         values = np.stack([read[k].values for k in group], axis=1)
         # Of records side by side, the shorter ends where its cells are empty.
@@ -495,14 +512,14 @@ def _clock_column(cells: list[str]) -> _Read:
 
 def _in_one_notation(sheet: Sheet, read: dict[int, _Read]) -> dict[int, _Read]:
     """The columns, those that do not tell their decimal sign by the sign of those that do."""
-    told = [
+    taken = [
         one.decimal
         for one in read.values()
         if one.cells and not one.unsure and any(_signed(c) for c in one.cells)
     ]
-    if not told or sheet.forced:
+    if not taken or sheet.forced:
         return {k: attrs.evolve(one, unsure=one.unsure and not sheet.usual) for k, one in read.items()}
-    usual = max(set(told), key=told.count)
+    usual = max(set(taken), key=taken.count)
     return {
         k: attrs.evolve(one, values=judged(one.cells, usual).values, decimal=usual, unsure=False)
         if one.unsure

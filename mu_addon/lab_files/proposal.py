@@ -208,7 +208,7 @@ class _Proposing:
                 continue
             if one.factor is None:
                 one = self._unit(one, k)
-            if one.told and one.told != one.quantity:
+            if one.stated and one.stated != one.quantity:
                 self.concluded.append(f"{self._title(k)} is read as {one.quantity}, as its unit says")
             values = self.block.values[:, k] * (one.factor or 1.0)
             read = f" [{one.unit}]" if one.unit else ""
@@ -257,7 +257,7 @@ class _Proposing:
             if unit is not None and unit_of(unit):
                 # The unit that is given may say that a title means another quantity.
                 again = attrs.evolve(column(one.title, unit), place=one.place)
-                if not one.quantity or again.told == "strain":
+                if not one.quantity or again.stated == "strain":
                     one = attrs.evolve(again, quantity=again.quantity or again.likely)
             return one
         if answer == "none":
@@ -272,7 +272,7 @@ class _Proposing:
             return one
         known = unit_of(one.unit) if one.unit else None
         fits = known is not None and known[0] == READ_IN[answer]
-        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, told="")
+        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, stated="")
 
     def _ask_column(self, k: int, quantities: Sequence[str], words: str) -> None:
         """Ask what a column holds."""

@@ -166,7 +166,7 @@ READ_IN = {**UNITS, "position": "mm", "count": ""}
 _ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
 _UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
 _BRACKETED = re.compile(_UNIT)
-_AFTER_SIGN = re.compile(r"^(.*?)(?:\s*/\s*|\s+in\s+|,\s*|;\s*|:\s*|\s+|_)([^\s,;:()\[\]]+)$")
+_BEFORE_UNIT = re.compile(r"\s*/\s*|\s+in\s+|[,;:]\s*|\s+|_")
 # A quantity by another one, such as N/s, is none that is read.
 _COMPOUND = re.compile(r"[^/\s]{1,6}/[^/\s]{1,6}|[\u00b0\u00ba]\s?[CFK]|\u2103|[A-Za-z]{1,3}(\^-?|-)\d")
 
@@ -178,7 +178,7 @@ class Column:
     title: as the file has it; quantity: a name of `measured.kinds.UNITS`, "position", "count", or "" where it
     is not known; unit: as the file has it, "" without one; factor: how much of the unit that is read is one
     of it, None where the unit is not given or not known; place: number of the column in its table; likely:
-    the quantity that the unit suggests where the title says none; told: another quantity that the title says.
+    the quantity that the unit suggests where the title says none; stated: another one that the title says.
     """
 
     title: str
@@ -187,7 +187,7 @@ class Column:
     factor: float | None
     place: int = 0
     likely: str = ""
-    told: str = ""
+    stated: str = ""
 
     @property
     def name(self) -> str:
@@ -207,10 +207,10 @@ def column(title: str, unit: str = "") -> Column:
     known = unit_of(unit) if unit else None
     if unit and not known and _COMPOUND.fullmatch(unit):
         return Column(title, "count", unit, None)
-    said = _said(name)
-    if said == "count" and not (known and known[0]):
+    meant = _meant(name)
+    if meant == "count" and not (known and known[0]):
         return Column(title, "count", unit, None)
-    quantity = _said(name, known[0]) if known else said
+    quantity = _meant(name, known[0]) if known else meant
     if quantity == "count" or (not known and quantity == "strain" and not unit):
         return Column(title, quantity, unit, None)
     if quantity or not known or not known[0]:
@@ -218,8 +218,10 @@ def column(title: str, unit: str = "") -> Column:
     # The unit says it, where only one quantity has it, or the title speaks of another one of a test.
     fit = [q for q, read in UNITS.items() if read == known[0] and q not in _ONLY_BY_NAME]
     likely = fit[0] if len(fit) == 1 else ""
-    if likely and (said in ("strain", "stress", "force", "displacement", "") and (said or known[0] != "mm")):
-        return Column(title, likely, unit, known[1], told=said)
+    if likely and (
+        meant in ("strain", "stress", "force", "displacement", "") and (meant or known[0] != "mm")
+    ):
+        return Column(title, likely, unit, known[1], stated=meant)
     return Column(title, "", unit, known[1], likely=likely)
 
 
@@ -239,7 +241,7 @@ def is_unit(cell: str) -> bool:
 def known_words(text: str) -> int:
     """How many cells of a text's first lines name a quantity or a unit in letters beyond ASCII."""
     cells = [cell for cell in re.split(r"[\t;,\n()\[\]\"]| {2,}", text[:4000]) if cell and not cell.isascii()]
-    return sum(bool(_said(cell)) + is_unit(cell) for cell in cells)
+    return sum(bool(_meant(cell)) + is_unit(cell) for cell in cells)
 
 
 def _apart(title: str) -> tuple[str, str]:
@@ -248,14 +250,15 @@ def _apart(title: str) -> tuple[str, str]:
     for text in reversed(bracketed):
         if is_unit(text) or _COMPOUND.fullmatch(text.strip()):
             return _BRACKETED.sub(" ", title).strip(), text
-    match = _AFTER_SIGN.match(title)
-    if match and match[1] and is_unit(match[2]) and not match[2].isdigit():
-        return match[1], match[2]
+    for sign in _BEFORE_UNIT.finditer(title):
+        name, unit = title[: sign.start()], title[sign.end() :]
+        if name and is_unit(unit) and not unit.isdigit():
+            return name, unit
     # Names of a program's variables, such as millis.
     return title, title if is_unit(title) and len(title) > 4 else ""
 
 
-def _said(name: str, unit: str | None = None) -> str:
+def _meant(name: str, unit: str | None = None) -> str:
     """The quantity that a name says, of those that have this unit where it is known; "" for none."""
     words = plain(name).replace("_", " ")
     if words.strip() == "t" and unit in (None, "s"):

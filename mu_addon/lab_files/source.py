@@ -131,4 +131,4 @@ def _text(cell: Any) -> str:
         return repr(cell.total_seconds())
     if isinstance(cell, datetime | date | time):
         return cell.isoformat()
-    return str(cell).strip()
+    return " ".join(str(cell).split("\n")).strip()

@@ -74,8 +74,8 @@ def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
     for path in files:
         before = len(proposals)
         refused: InputError | None = None
-        told, unknown = _tables(path, decimal, left_out)
-        for sheet, number, count, block in told or unknown:
+        known_tables, unknown = _tables(path, decimal, left_out)
+        for sheet, number, count, block in known_tables or unknown:
             parts = [path.stem, sheet.name if count == 1 else "", block.label]
             if count > 1 and not block.label:
                 parts.append(str(number))
@@ -94,19 +94,28 @@ def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
                 )
                 found = attrs.evolve(found, questions=(question, *found.questions))
             proposals.append(found)
-        if told:
+        if known_tables:
             left_out += [
                 f"{path}, line {block.lines[0]}: a table without two known quantities was left out"
                 for _, _, _, block in unknown
             ]
         if len(proposals) == before:
-            raise refused or InputError(
-                "the file holds no table of measured data",
-                str(path),
-                "give a file with columns of numbers, and their names above them",
-            )
+            raise refused or _no_table(path, decimal)
     _require_used(answers, proposals)
     return Understood(tuple(proposals), tuple(left_out))
+
+
+def _no_table(path: Path, decimal: str | None) -> InputError:
+    """What a file without a table holds instead."""
+    rows = [row for sheet in read_sheets(path, decimal) for row in sheet.rows if row.filled]
+    pairs = sum(len(row.numeric) > 1 for row in rows)
+    shown = " ".join(rows[0].filled)[:60] if rows else ""
+    return InputError(
+        f"the file holds no table of measured data: {pairs} of its {len(rows)} lines have two numbers; "
+        f"it begins with {shown!r}",
+        f"{path}, line {rows[0].line}" if rows else str(path),
+        "give a file with two columns of numbers or more, and their names above them",
+    )
 
 
 _Table = tuple[Sheet, int, int, Block]
@@ -114,7 +123,7 @@ _Table = tuple[Sheet, int, int, Block]
 
 def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[_Table], list[_Table]]:
     """The tables of a file with two known quantities, and the others; lines in none go to left_out."""
-    told: list[_Table] = []
+    known_tables: list[_Table] = []
     unknown: list[_Table] = []
     for sheet in read_sheets(path, decimal):
         where = f"{path}, sheet {sheet.name!r}" if sheet.name else str(path)
@@ -127,8 +136,8 @@ def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[
             known = [c for c in block.columns if c.quantity not in ("", "count")]
             untitled = not any(c.title for c in block.columns)
             table = (sheet, number, len(found.blocks), block)
-            (told if len(known) > 1 or untitled else unknown).append(table)
-    return told, unknown
+            (known_tables if len(known) > 1 or untitled else unknown).append(table)
+    return known_tables, unknown
 
 
 def _unlike(name: str, others: Sequence[str]) -> str:

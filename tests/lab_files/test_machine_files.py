@@ -1,0 +1,386 @@
+"""Files as laboratories really have them: no row vanishes, and what is not read is told with line and reason.
+
+Each file is written here; the right values are known because the readings are those of `rows`.
+"""
+
+import os
+import random
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.lab_files.blocks import tables
+from mu_addon.lab_files.quantities import column
+from mu_addon.lab_files.source import read_sheets, sheet_of_text
+from mu_addon.usecases.import_data.report import terminal_lines
+from mu_addon.usecases.import_data.understood import understand
+
+COUPON = {"kind": "coupon", "mode": "uniaxial", "section_mm": "10x1", "length_mm": "100"}
+TITLES = "Time (s),Load (N),Extension (mm)"
+COUNT = int(os.environ.get("MUTANTS", "15"))
+
+
+def rows(count=100, separator=","):
+    """Readings each 0.1 s: 5 N/s, 1 mm/s."""
+    return [separator.join((f"{0.1 * i:.1f}", f"{0.5 * i:.2f}", f"{0.1 * i:.2f}")) for i in range(count)]
+
+
+def understood(tmp_path, text, answers=COUPON, name="a.csv", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return understand([path], answers)
+
+
+def one(tmp_path, text, answers=COUPON, **keys):
+    found = understood(tmp_path, text, answers, **keys)
+    assert found.open == ()
+    (p,) = found.proposals
+    return p, [*found.left_out, *(u.words for u in p.unread)]
+
+
+def lines(*parts):
+    return "\n".join(parts) + "\n"
+
+
+@pytest.mark.parametrize(
+    "clock",
+    [
+        lambda s: f"2026-03-01 10:00:{s:06.3f}",
+        lambda s: f"2026-03-01T10:00:{s:06.3f}Z",
+        lambda s: f"01.03.2026 10:00:{s:06.3f}".replace(".000", ",000"),
+        lambda s: f"3/1/2026 10:00:{s:06.3f} PM",
+        lambda s: f"10:00:{s:06.3f}",
+        lambda s: f"{23 if s < 5 else 0}:{59 if s < 5 else 0:02d}:{(55 + s) % 60:06.3f}",
+        lambda s: f"00:{s:06.3f}",
+    ],
+)
+def test_a_clock_is_a_time(tmp_path, clock):
+    body = [f"{clock(0.5 * i)};{0.5 * i:.2f};{0.1 * i:.2f}" for i in range(100)]
+    p, _ = one(tmp_path, lines("Timestamp;Load (N);Extension (mm)", *body))
+    assert p.columns["time_s"] == pytest.approx(0.5 * np.arange(100), abs=1e-6)
+    assert p.columns["force_N"][-1] == 49.5
+
+
+def test_a_clock_beside_a_time_says_no_more(tmp_path):
+    body = [f"10:00:{i // 10:02d},{row}" for i, row in enumerate(rows())]
+    p, unread = one(tmp_path, lines("Clock time," + TITLES, *body))
+    assert p.columns["time_s"][-1] == pytest.approx(9.9)
+    assert any("'Clock time'" in words for words in unread)
+
+
+def test_hours_and_minutes_or_minutes_and_seconds_is_asked(tmp_path):
+    text = lines(TITLES.replace(" (s)", ""), *(f"10:{i:02d},{i},{i}" for i in range(40)))
+    assert [q.key for _, q in understood(tmp_path, text).asked] == ["unit.Time"]
+    p, _ = one(tmp_path, text, COUPON | {"unit.Time": "min:s"})
+    assert p.columns["time_s"][-1] == pytest.approx(39.0)
+
+
+def test_a_column_of_words_is_listed(tmp_path):
+    p, unread = one(tmp_path, lines(TITLES + ",Status", *(f"{row},PASS" for row in rows())))
+    assert len(p.lines) == 100
+    assert p.columns["time_s"][-1] == pytest.approx(9.9)
+    assert unread == ["column 'Status': 'PASS' in every row"]
+
+
+def test_a_remark_in_some_rows_takes_none_of_them(tmp_path):
+    body = [row + (",break" if i >= 60 else "") for i, row in enumerate(rows())]
+    p, unread = one(tmp_path, lines(TITLES, *body))
+    assert [values[-1] for values in p.columns.values()] == pytest.approx([9.9, 49.5, 9.9])
+    assert unread == ["column 4, which has no title: words, such as 'break'"]
+
+
+def test_one_sign_for_decimals_and_thousands(tmp_path):
+    mm = [7.003 * i for i in range(200)]
+    body = [f"{0.02 * i:.10g};{x:.10g};{0.001 + 0.17 * i:.10g}" for i, x in enumerate(mm)]
+    body = [row.replace(".", ",") for row in body]
+    body = [row if x < 1000 else row.replace(";1", ";1,", 1) for row, x in zip(body, mm, strict=True)]
+    assert body[143].split(";")[1] == "1,001,429"
+    p, _ = one(tmp_path, lines("Time;Displacement;Force", "(s);(mm);(N)", *body))
+    assert p.columns["displacement_mm"] == pytest.approx(mm, abs=1e-3)
+    assert any("line 146" in words for words in p.concluded)
+
+
+GROUPED = lines(
+    "Time [ms];Supply [V];Pressure [bar];Angle [deg]",
+    *(
+        f"{f'{t:.3f}' if t < 1000 else f'{t // 1000}.{t % 1000:03d}.000'};3.900;{t / 5000:.3f};{t / 200:.3f}"
+        for t in range(0, 3000, 100)
+    ),
+)
+
+
+def test_a_decimal_sign_that_is_answered_wrongly_is_refused_with_the_line(tmp_path):
+    p, _ = one(tmp_path, GROUPED, {"decimal": ".", "kind": "unit_pressure"})
+    assert [values[-1] for values in p.columns.values()] == pytest.approx([2.9, 58.0, 14.5])
+    with pytest.raises(InputError, match=r"'0\.000' is no number") as caught:
+        understood(tmp_path, GROUPED, {"decimal": ",", "kind": "unit_pressure"})
+    assert caught.value.where.endswith("line 2")
+
+
+@pytest.mark.parametrize("sign", ["'", "\u2019", " ", "\u00a0", "\u202f"])
+def test_thousands_as_countries_write_them(tmp_path, sign):
+    def written(value):
+        whole, _, part = f"{value:.1f}".partition(".")
+        return (whole if len(whole) < 4 else f"{whole[:-3]}{sign}{whole[-3:]}") + "," + part
+
+    body = [f"{written(0.1 * i)};{written(20.5 * i)};{written(0.1 * i)}" for i in range(80)]
+    p, unread = one(tmp_path, lines("Zeit;Kraft;Weg", "s;N;mm", *body))
+    assert p.columns["force_N"] == pytest.approx(20.5 * np.arange(80))
+    assert unread == []
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("6.0,OVERLOAD,6.00", "line 62: 'OVERLOAD' in column 'Load (N)' is no number"),
+        ("6.0,#DIV/0!,6.00", "line 62: '#DIV/0!' in column 'Load (N)' is no number"),
+        ("6.0,,6.00", "line 62: no number in column 'Load (N)'"),
+        ("*** valve opened ***", "line 62: '*** valve opened ***': no row of numbers, within the table"),
+        ("6.0,OVERLOAD,OVERLOAD", "line 62: '6.0 OVERLOAD OVERLOAD': no row of numbers, within the table"),
+        ("", ""),
+    ],
+)
+def test_a_line_that_is_no_reading_leaves_one_record(tmp_path, line, reason):
+    body = rows()
+    p, unread = one(tmp_path, lines(TITLES, *body[:60], line, *body[61:]))
+    assert len(p.lines) == 99
+    assert p.columns["force_N"].max() == 49.5
+    assert len(unread) == bool(reason)
+    assert reason in "".join(unread)
+
+
+def test_a_typographic_minus_is_a_minus(tmp_path):
+    body = [f"{0.1 * i:.1f},{0.5 * i - 5:.2f},{0.1 * i:.2f}".replace("-", "\u2212") for i in range(80)]
+    p, _ = one(tmp_path, lines(TITLES, *body))
+    assert p.columns["force_N"] == pytest.approx(0.5 * np.arange(80) - 5)
+
+
+HTML = "<html><table><tr><th>Time (s)</th><th>Load<br>(N)<th>Extension (mm)</th></tr>" + "".join(
+    "<tr>" + "".join(f"<td>{cell}</td>" for cell in row.split(",")) + "</tr>\n" for row in rows()
+)
+XML = '<?xml version="1.0"?><Workbook xmlns:ss="x"><Worksheet ss:Name="a"><Table>' + "".join(
+    "<Row>"
+    + "".join(f'<Cell><Data ss:Type="Number">{cell}</Data></Cell>' for cell in row.split(","))
+    + "</Row>"
+    for row in [TITLES, *rows()]
+)
+
+
+@pytest.mark.parametrize(
+    "text", [lines(TITLES, *rows()).replace(",", "\t"), HTML, XML], ids=["tabs", "html", "xml"]
+)
+def test_the_content_tells_the_type(tmp_path, text):
+    p, _ = one(tmp_path, text, name="a.xls")
+    assert len(p.lines) == 100
+    assert p.columns["force_N"][-1] == 49.5
+
+
+@pytest.mark.parametrize(
+    "begin", [b"%PDF-1.7\n", b"\x1f\x8b\x08", b"TDSm\0\0", b"MATLAB 5.0 MAT-file", b"\x89HDF"]
+)
+def test_what_is_no_table_is_refused_by_what_it_is(tmp_path, begin):
+    with pytest.raises(InputError, match="the file is "):
+        understood(tmp_path, begin + bytes(range(256)))
+    with pytest.raises(InputError, match="HTML or XML without a table"):
+        understood(tmp_path, "<html><p>moved</p></html>", name="a.xls")
+
+
+def test_titles_of_two_lines_in_quotes(tmp_path):
+    p, _ = one(tmp_path, lines('Time (s),"Load\n(N)","Extension\n(mm)"', *rows(80)))
+    assert p.origin["force_N"] == "'Load (N)' [N]"
+    assert len(p.lines) == 80
+    assert p.lines[0] == 4
+
+
+def test_a_quote_that_is_never_closed_takes_no_rows(tmp_path):
+    body = rows()
+    body[50] = body[50] + ',"crack'
+    p, _ = one(tmp_path, lines(TITLES, *body))
+    assert len(p.lines) == 100
+
+
+@pytest.mark.parametrize("row", ["(s),(N),(mm),(\u00b0C)", "s,N,mm,\u00b0C", "[s],[N],[mm],[mm/min]"])
+def test_an_unknown_unit_leaves_a_row_of_units(tmp_path, row):
+    body = [f"{cells},23.{i}" for i, cells in enumerate(rows(21))]
+    p, unread = one(tmp_path, lines("Time,Load,Extension,Temperature", row, *body))
+    assert len(p.lines) == 21
+    assert p.columns["force_N"][-1] == 10.0
+    assert len(unread) == 1
+    assert "'Temperature'" in unread[0]
+
+
+def test_a_title_of_another_quantity_goes_by_its_unit(tmp_path):
+    text = lines("Pr\u00fcfzeit;Dehnung;Standardkraft", "s;mm;N", *(f"{i};0,{i:02d};{i}" for i in range(60)))
+    for encoding in ("utf-8", "cp1252", "utf-16", "utf-16-le"):
+        p, _ = one(tmp_path, text, encoding=encoding)
+        assert p.columns["displacement_mm"][-1] == pytest.approx(0.59)
+        assert any("'Dehnung' [mm] is read as displacement" in words for words in p.concluded)
+
+
+@pytest.mark.parametrize(
+    ("titles", "encoding"),
+    [
+        (
+            "\u0412\u0440\u0435\u043c\u044f;\u0421\u0438\u043b\u0430;\u041f\u0435\u0440\u0435\u043c\u0435\u0449\u0435\u043d\u0438\u0435",
+            "cp1251",
+        ),
+        ("\u65f6\u95f4;\u529b;\u4f4d\u79fb", "gb18030"),
+        ("\u6642\u9593;\u8377\u91cd;\u5909\u4f4d", "cp932"),
+        ("\uc2dc\uac04;\ud558\uc911;\ubcc0\uc704", "cp949"),
+        ("Czas;Si\u0142a;Przemieszczenie", "cp1250"),
+        ("S\u00fcre;Kuvvet;Uzama", "cp1254"),
+        ("Tijd;Kracht;Verplaatsing", "ascii"),
+        ("Tempo;For\u00e7a;Deslocamento", "cp1252"),
+        ("Aika;Voima;Siirtym\u00e4", "cp850"),
+    ],
+)
+def test_titles_in_other_languages_and_encodings(tmp_path, titles, encoding):
+    p, _ = one(tmp_path, lines(titles, "s;N;mm", *rows(40, ";")), encoding=encoding)
+    assert p.columns["force_N"][-1] == pytest.approx(19.5)
+    assert p.columns["displacement_mm"][-1] == pytest.approx(3.9)
+
+
+def test_an_unknown_title_is_asked_for_by_its_name(tmp_path):
+    text = lines("Tid;Qwx;Kraft", "s;mm;N", *rows(40, ";"))
+    ((_, question),) = understood(tmp_path, text).asked
+    assert question.key == "column.Qwx"
+    assert "'Qwx' [mm]" in question.words
+    assert question.proposed == "displacement"
+    p, _ = one(tmp_path, text, COUPON | {question.key: question.proposed})
+    assert p.columns["displacement_mm"][-1] == pytest.approx(19.5)
+
+
+def test_a_column_that_is_nowhere_is_named_beside_those_that_are(tmp_path):
+    with pytest.raises(InputError, match=r"needs displacement_mm.*'Time \(s\)'.*'Load \(N\)'"):
+        understood(tmp_path, lines("Time (s),Load (N)", *(f"{i},{i}" for i in range(9))))
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("us", 1e-6), ("\u00b5s", 1e-6), ("\u03bcs", 1e-6), ("ms", 1e-3), ("min", 60.0)]
+)
+def test_times_of_boards_and_of_machines(tmp_path, unit, factor):
+    titles = f"index,time({unit}),position(um),force(mN)"
+    p, _ = one(tmp_path, lines(titles, *(f"{i},{20000 * i},{50 * i},{35 * i}" for i in range(60))))
+    assert p.columns["time_s"][-1] == pytest.approx(1180000 * factor)
+    assert p.columns["displacement_mm"][-1] == pytest.approx(2.95)
+    assert column("firmware_timestamp_us").factor == 1e-6
+
+
+def test_untitled_columns_are_answered_one_by_one(tmp_path):
+    text = "".join(f"{100 * i},{0.02 * i:.3f},{0.5 * i:.2f}\r\n" for i in range(60))
+    kind = {"kind": "unit_pressure"}
+    assert [q.key for _, q in understood(tmp_path, text, kind).asked] == ["column.1", "column.2", "column.3"]
+    named = kind | {"column.1": "time", "column.2": "pressure", "column.3": "angle"}
+    asked = understood(tmp_path, text, named).asked
+    assert [(q.key, q.proposed) for _, q in asked] == [("unit.1", "ms"), ("unit.2", "")]
+    assert "the unit of column 1 (0 to 5900)" in asked[0][1].words
+    p, _ = one(tmp_path, text, named | {"unit.1": "ms", "unit.2": "bar"})
+    assert len(p.lines) == 60
+    assert [values[-1] for values in p.columns.values()] == pytest.approx([5.9, 118.0, 29.5])
+
+
+def test_units_behind_every_number_and_values_of_no_unit(tmp_path):
+    text = lines("Time;Load;Extension", *(f"{i} ms;{2 * i} N;0.{i:02d} mm" for i in range(40)))
+    p, _ = one(tmp_path, text)
+    assert p.columns["time_s"][-1] == pytest.approx(0.039)
+    assert p.columns["force_N"][-1] == 78.0
+
+
+def test_commas_between_columns_and_in_numbers_are_refused(tmp_path):
+    text = lines("Time,Load,Extension", *(f"{i},5,{2 * i},5,0,{i:02d}" for i in range(40)))
+    with pytest.raises(InputError, match="commas divide columns and decimals alike") as caught:
+        understood(tmp_path, text)
+    assert "line 2" in caught.value.where
+
+
+def test_a_table_below_titles_with_another_separator_or_a_comment_sign(tmp_path):
+    p, _ = one(tmp_path, lines("# time_s force_N displacement_mm", *rows(40, " ")))
+    assert p.columns["force_N"][-1] == 19.5
+    p, _ = one(tmp_path, lines("Time (s)  Load (N)  Extension (mm)", *rows(40, "   ")))
+    assert p.columns["force_N"][-1] == 19.5
+
+
+def test_the_terminal_shows_what_was_understood(tmp_path):
+    body = rows()
+    body[60] = "6.0,OVERLOAD,6.00"
+    shown = terminal_lines(understood(tmp_path, lines(TITLES, *body)))
+    assert shown[0] == "a: coupon, 99 rows, a.csv, lines 2 to 101"
+    assert any(line.split()[:1] == ["force_N"] and "49.5" in line and "\u2588" in line for line in shown)
+    assert "  not read: line 62: 'OVERLOAD' in column 'Load (N)' is no number" in shown
+
+
+REMARKS = [
+    "OVERLOAD",
+    "#DIV/0!",
+    "",
+    "nan",
+    "1'000",
+    "1,000.5",
+    "\u22125.0",
+    "12:00",
+    "x",
+    "1e999",
+    "\u00a0",
+    '"',
+]
+
+
+def _mutated(random_, body, separator):
+    """Rows of a sound file with damaged cells, further cells, and lines of other things between them."""
+    body = list(body)
+    for _ in range(random_.randrange(1, 9)):
+        k = random_.randrange(len(body))
+        cells = body[k].split(separator)
+        what = random_.randrange(6)
+        if what < 2:
+            cells[random_.randrange(len(cells))] = random_.choice(REMARKS)
+        elif what == 2:
+            cells.append(random_.choice(REMARKS))
+        elif what == 3:
+            cells.pop()
+        elif what == 4:
+            cells = [random_.choice(["*** event ***", "# remark", "Zyklus 2", "  ", "Max;3", "a,b,c"])]
+        else:
+            cells = [cell.replace(".", ",") for cell in cells]
+        body[k] = separator.join(cells)
+    return body
+
+
+@pytest.mark.parametrize("number", range(COUNT))
+def test_every_row_of_a_damaged_file_is_read_or_listed(tmp_path, number):
+    random_ = random.Random(f"rows {number}")
+    separator = random_.choice([",", ";", "\t"])
+    titles = random_.choice([[TITLES], ["Time,Load,Extension", "(s),(N),(mm)"], ["Title,report", TITLES]])
+    head = [line.replace(",", separator) for line in titles]
+    body = _mutated(random_, rows(random_.randrange(12, 60), separator), separator)
+    path = tmp_path / "a.csv"
+    path.write_text(lines(*head, *body), encoding="utf-8")
+    data = {len(head) + 1 + k for k, line in enumerate(body) if line.strip(' "\u00a0' + separator)}
+    try:
+        found = understand([path], COUPON | {"zero": "as_read"})
+    except InputError as error:
+        found, refused = None, error
+    if found is None:
+        # Refused whole: with a line, or with what is there.
+        assert all((refused.what, refused.where, refused.remedy))
+        return
+    (sheet,) = read_sheets(path)
+    read = {int(line) for p in found.proposals for line in p.lines}
+    listed = {line for u in tables(sheet).unread for line in u.lines}
+    listed |= {line for p in found.proposals for u in p.unread for line in u.lines}
+    assert not data - read - listed
+    words = " ".join([*found.left_out, *(u.words for p in found.proposals for u in p.unread)])
+    assert all(str(line) in words or " to " in words for line in data - read)
+    # What is read is what stands there.
+    for p in found.proposals:
+        for i, line in enumerate(p.lines):
+            cells = body[line - len(head) - 1].split(separator)
+            if "displacement_mm" in p.columns and len(cells) > 2 and cells[2].replace(".", "", 1).isdigit():
+                assert abs(p.columns["displacement_mm"][i]) == pytest.approx(float(cells[2]))
+
+
+def test_a_table_of_a_long_file_is_quick():
+    text = lines(TITLES, *rows(20000))
+    (block,) = tables(sheet_of_text(text)).blocks
+    assert block.values.shape == (20000, 3)
