@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..cells.own import own_rows, own_text
+from ..cells.own import own_lines, own_rows, own_text
 from ..errors import InputError
 from ..reading import require_rows
 
@@ -95,13 +95,13 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
     columns: the names to ask for. Raises InputError where the file is unreadable, too long or empty.
     """
     try:
-        lines = own_text(path, _LONGEST).splitlines()
+        lines = own_lines(own_text(path, _LONGEST))
     except OSError as error:
         raise InputError(f"cannot read the protocol: {error.strerror}", str(path), "check the path") from None
     except UnicodeDecodeError:
         raise InputError("the protocol is not a text file", str(path), "save it as UTF-8 CSV") from None
-    require_rows(sum(1 for line in lines if line.split("#")[0].strip()) - 1, str(path))
-    numbered = [(n, words) for n, line in enumerate(lines, 1) if (words := line.split("#")[0].strip())]
+    numbered = [(n, words) for n, line in lines if (words := line.split("#")[0].strip())]
+    require_rows(len(numbered) - 1, str(path))
     if not numbered:
         raise InputError("the protocol is empty", str(path), f"give the columns {', '.join(columns)}")
     try:
