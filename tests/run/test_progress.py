@@ -208,10 +208,10 @@ def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
         progress.update(2 / 3)
     with progress.stage("report"):
         clock.now += 10.0
-    told = [m for m in messages if m["type"] == "progress"]
-    whole = [m["whole"] for m in told]
+    shown = [m for m in messages if m["type"] == "progress"]
+    whole = [m["whole"] for m in shown]
     assert whole == sorted(whole)
-    assert told[0]["whole_seconds_left"] == 100.0
+    assert shown[0]["whole_seconds_left"] == 100.0
     assert stream.getvalue().splitlines() == [
         "about 1 min 40 s on two cores, 3 stages",
         "  0 %  mesh ...",
