@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
-from . import costs
+from . import costs, nightly
 
 pytest_plugins = ["tests.light_law"]
 
@@ -36,3 +36,5 @@ def pytest_configure(config):
     config.pluginmanager.register(costs.Order(costs.read()))
     if config.getoption("--measure"):
         config.pluginmanager.register(costs.Measure(config))
+    if config.option.markexpr == "nightly" and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(nightly.Night())

@@ -1,7 +1,8 @@
 """What tests cost, in seconds of processor time: the longest files go first, and what takes long is `slow`.
 
-`python -m pytest --measure` writes costs.csv anew: one line a test or fixture (FILE::NAME) of more than a
-second, with what its child processes took. Nothing depends on the figures but order and mark.
+`python -m pytest --measure` writes costs.csv anew, for the files that ran: one line a test or fixture
+(FILE::NAME) of more than a second, with what its child processes took. Nothing depends on the figures but
+order and mark.
 """
 
 import csv
@@ -36,7 +37,10 @@ class Order:
     def pytest_collection_modifyitems(self, items):
         for item in items:
             file = item.nodeid.partition("::")[0]
-            if self.slow & {item.nodeid, *(f"{file}::{fixture}" for fixture in item.fixturenames)}:
+            if item.get_closest_marker("nightly") or self.slow & {
+                item.nodeid,
+                *(f"{file}::{fixture}" for fixture in item.fixturenames),
+            }:
                 item.add_marker("slow")
         items.sort(key=lambda item: -self.by_file[item.nodeid.partition("::")[0]])
 
@@ -85,7 +89,9 @@ def read():
 
 
 def write(costs):
-    """The table, longest first."""
+    """The table, longest first; what it has of files that did not run stays."""
+    ran = {name.partition("::")[0] for name in costs}
+    costs = {name: s for name, s in read().items() if name.partition("::")[0] not in ran} | dict(costs)
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(["seconds", "name"])

@@ -235,7 +235,9 @@ def test_the_page_has_the_long_studies_between_the_tables_own_sections():
     assert '<section id="open"' not in page
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_reproduce.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
+)
 def test_the_command_makes_the_table_and_the_page(tmp_path):
     out = tmp_path / "out"
     assert main(["--coarse", "--out", str(out), "--json"]) == 0

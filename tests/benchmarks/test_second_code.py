@@ -155,7 +155,9 @@ def test_what_no_specimen_can_have_is_a_refusal_and_no_verdict(monkeypatch):
     assert judged(order("clean", 12, 4))["outcome"] == "refused"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/evidence/test_pooled.py::test_moduli_that_all_differ_have_a_spread_and_none_of_them_is_named_alone"
+)
 def test_specimens_that_differ_do_not_stand_for_what_all_of_them_do():
     """Blocks that creep and stiffen: their moduli's spread took a quarter of the misfit and was named."""
     row = judged(order("two", 5, 991))

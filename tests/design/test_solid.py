@@ -223,7 +223,7 @@ def test_other_units_pass_the_gates(unit):
     assert s.gates.lattice_genus == lattice_of(unit.dimensions).cycles
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_presets_pass_every_gate")
 def test_export_quality_has_the_same_topology():
     coarse, fine = built("mu-1.0x", "alpha4").gates, built("mu-1.0x", "alpha4", "export").gates
     assert fine.genus == coarse.genus

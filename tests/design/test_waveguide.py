@@ -141,11 +141,11 @@ def test_wells_and_pockets_are_clear_of_struts(number):
             assert not inside.all(axis=-1).any()
 
 
-SLOW = pytest.mark.slow
+NIGHTLY = pytest.mark.nightly("test_every_gate_holds_with_a_waveguide")
 
 
 @pytest.mark.parametrize(
-    "path", ["alpha4", 1517, pytest.param("alpha10", marks=SLOW), pytest.param(2424, marks=SLOW)]
+    "path", ["alpha4", 1517, pytest.param("alpha10", marks=NIGHTLY), pytest.param(2424, marks=NIGHTLY)]
 )
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_gate_holds_with_a_waveguide(name, path):

@@ -91,41 +91,58 @@ def test_a_leak_is_no_drift_of_the_gauge():
     assert "pressure_drift" not in found.ambiguity
 
 
-@pytest.mark.slow
-def test_creep_by_another_law_is_at_least_a_rival_of_a_drift():
-    """Gas of a constant amount in a chamber that grows by the logarithm, or the root, of time."""
-    for course in (lambda t: np.log(1.0 + t / 20.0), lambda t: np.sqrt(t / 20.0)):
-        grown = 1.0 + 3e-3 * course(CLOCK)
-        found = judged(
-            [
-                *holds(lambda t, g=grown: (52.0 + 101.325) * (1.0 / g - 1.0), (52.0,)),
-                *holds(lambda t, g=grown: (48.0 + 101.325) * (1.0 / g - 1.0), (48.0,), seed=9),
-            ]
-        )
-        assert found.names != ("pressure_drift",) or found.kind == "ambiguous"
+def growing(course):
+    """The verdict on gas of a constant amount in a chamber that grows in time."""
+    grown = 1.0 + 3e-3 * course
+    return judged(
+        [
+            *holds(lambda t: (52.0 + 101.325) * (1.0 / grown - 1.0), (52.0,)),
+            *holds(lambda t: (48.0 + 101.325) * (1.0 / grown - 1.0), (48.0,), seed=9),
+        ]
+    )
 
 
-@pytest.mark.slow
-def test_stress_that_relaxes_by_another_law_is_no_drift_of_the_load_cell():
-    """One ramp and one hold, as in a test of relaxation: the logarithm of time, its power, two times."""
+def test_creep_by_the_root_of_time_is_at_least_a_rival_of_a_drift():
+    found = growing(np.sqrt(CLOCK / 20.0))
+    assert found.names != ("pressure_drift",) or found.kind == "ambiguous"
+
+
+@pytest.mark.nightly("test_creep_by_the_root_of_time_is_at_least_a_rival_of_a_drift")
+def test_creep_by_the_logarithm_of_time_is_at_least_a_rival_of_a_drift():
+    found = growing(np.log(1.0 + CLOCK / 20.0))
+    assert found.names != ("pressure_drift",) or found.kind == "ambiguous"
+
+
+NIGHTLY = pytest.mark.nightly("test_creep_by_the_root_of_time_is_at_least_a_rival_of_a_drift")
+
+
+@pytest.mark.parametrize(
+    "course",
+    [
+        lambda since: (1.0 + since / 2.0) ** -0.05,
+        pytest.param(lambda since: 1.0 - 0.04 * np.log(1.0 + since / 2.0), marks=NIGHTLY),
+        pytest.param(
+            lambda since: 1.0 - 0.06 * (1 - np.exp(-since / 5.0)) - 0.08 * (1 - np.exp(-since / 80.0)),
+            marks=NIGHTLY,
+        ),
+    ],
+    ids=["a power of time", "its logarithm", "two times"],
+)
+def test_stress_that_relaxes_by_another_law_is_no_drift_of_the_load_cell(course):
+    """One ramp and one hold, as in a test of relaxation."""
     t = np.concatenate([np.linspace(0.0, 2.0, 21)[:-1], np.arange(2.0, 400.0, 1.0)])
     strain = np.minimum(t / 2.0, 1.0) * 0.3
     stretch = 1.0 + strain
-    since = np.maximum(t - 1.0, 0.0)
-    for course in (
-        1.0 - 0.04 * np.log(1.0 + since / 2.0),
-        (1.0 + since / 2.0) ** -0.05,
-        1.0 - 0.06 * (1 - np.exp(-since / 5.0)) - 0.08 * (1 - np.exp(-since / 80.0)),
-    ):
-        rng = np.random.default_rng(3)
-        made = []
-        for i in range(2):
-            stress = 400.0 * (stretch - stretch**-2.0) * course + noise(rng, 0.2, len(t))
-            columns = {"time_s": t, "strain": strain, "stress_kPa": stress}
-            how = {"section_mm": (10.0, 4.0), "length_mm": 30.0, "mode": "uniaxial"}
-            made.append(experiment("coupon", columns, f"relaxation {i}", specimen="AB"[i], **how))
-        found = judged(made)
-        assert not (found.kind == "named" and "force_drift" in found.names)
+    rng = np.random.default_rng(3)
+    made = []
+    for i in range(2):
+        elastic = 400.0 * (stretch - stretch**-2.0)
+        stress = elastic * course(np.maximum(t - 1.0, 0.0)) + noise(rng, 0.2, len(t))
+        columns = {"time_s": t, "strain": strain, "stress_kPa": stress}
+        how = {"section_mm": (10.0, 4.0), "length_mm": 30.0, "mode": "uniaxial"}
+        made.append(experiment("coupon", columns, f"relaxation {i}", specimen="AB"[i], **how))
+    found = judged(made)
+    assert not (found.kind == "named" and "force_drift" in found.names)
 
 
 def coupons(fault, seed=0):

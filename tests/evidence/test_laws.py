@@ -124,9 +124,10 @@ def test_a_law_that_refines_is_offered_apart():
             {"led_drift": {"share": 0.0425, "time_s": 284.0}, "ambient_light": {"share": 0.0597}},
         ),
         # A tanh of the way below the largest strain, and a warm block of its own.
-        (
+        pytest.param(
             "lattice_compression",
             {"mullins_softening": {"rate": 0.71, "tanh": 1.0}, "temperature_drift": {"rate": 0.0081}},
+            marks=pytest.mark.nightly("test_two_effects_by_other_laws_are_both_named"),
         ),
     ],
     ids=["light", "softening"],

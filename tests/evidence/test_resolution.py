@@ -270,6 +270,7 @@ def softened(noise, seed=6):
     return made
 
 
+@pytest.mark.nightly("tests/evidence/test_laws.py::test_two_effects_by_other_laws_are_both_named")
 def test_a_mechanism_by_another_law_is_named_with_what_remains():
     found = verdict(*softened(0.02))
     assert found.names == ("mullins_softening",)

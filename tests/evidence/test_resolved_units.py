@@ -50,20 +50,32 @@ def test_laws_of_the_resin_act_on_struts_too(mesh, name, laws):
     assert {layer.law for layer in changed.layers if np.isin(struts, layer.elements).all()} == laws
 
 
-@pytest.mark.slow
-def test_walls_that_touch_hold_the_unit_back():
-    # Three chambers with thin walls, which touch from -10 kPa on.
+def crossing_and_touching():
+    """Three chambers with thin walls, which touch from -10 kPa on."""
     thin = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, wall_mm=0.6))
     rough = MeshSettings(refine=0.4, fidelity="resolved")
-    crossing, touching = (Run(Body(thin, rough, self_contact=apart), (-14.0, 0.0)) for apart in (False, True))
+    return [Run(Body(thin, rough, self_contact=apart), (-14.0, 0.0)) for apart in (False, True)]
+
+
+def test_a_run_with_walls_that_touch_is_another():
+    crossing, touching = crossing_and_touching()
     assert crossing.key() != touching.key()
+
+
+@pytest.mark.nightly(
+    "tests/usecases/test_simulate_and_place.py::test_a_study_says_where_walls_and_struts_touch"
+)
+def test_walls_that_touch_hold_the_unit_back():
+    crossing, touching = crossing_and_touching()
     angle, volume = run(touching).values[:, 0]
     wanted = run(crossing).values[:, 0]
     assert wanted[0] < 1.1 * angle < 0
     assert wanted[1] < volume < 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/evidence/test_unit_verdicts.py::test_a_wall_in_the_data_is_named_and_where_it_stands"
+)
 def test_a_thinner_wall_is_named_though_every_size_has_a_mesh_of_its_own(tmp_path):
     at = tuple(np.concatenate([np.linspace(LOW, 0.0, 3)[:-1], np.linspace(0.0, HIGH, 5)]).tolist())
     thin = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, wall_mm=0.87 * SMALL.chambers.wall_mm))

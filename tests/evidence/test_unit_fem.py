@@ -409,7 +409,9 @@ def test_a_clogged_tangent_is_near_that_of_its_residual():
     assert np.linalg.norm(away) < 1e-2 * np.linalg.norm(expected)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/blind/test_blind.py::test_the_simulated_bench_differs_from_the_judge_s_model_by_the_mesh_alone"
+)
 def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp_path):
     """Order 2 in two processes: 4 % of the angle in vacuum and 1 % under pressure are the mesh's."""
     settings_ = UnitSettings(COARSE, FINE, effects=("mesh_error", "clogged_chamber"))

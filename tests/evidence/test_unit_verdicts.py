@@ -131,7 +131,7 @@ def test_a_wall_in_the_data_is_named_and_where_it_stands(walls):
     assert high - low < 0.2 * reach
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/blind/test_blind.py::test_a_finer_mesh_judged_by_a_coarse_one_is_called_numerics")
 def test_a_mesh_too_coarse_is_called_so_and_not_physics(tmp_path):
     """The data are of a mesh finer than the one that the verdict compares with."""
     effects = ("mesh_error", "wall_thickness", "strain_stiffening")

@@ -356,6 +356,7 @@ def test_layers_act_side_by_side_and_miss_no_element():
         blended.blended(share + 0.1, NeoHooke, soft)
 
 
+@pytest.mark.nightly("test_stress_and_tangent_are_derivatives")
 def test_an_assembled_body_of_all_laws_has_a_potential_and_a_symmetric_tangent():
     """Every law in every element at once, those with history after a step they remember."""
     mesh = bodies.hollow_box(2, n=3, clamp=False)

@@ -60,6 +60,7 @@ def ring_half(around):
     return mesh, held
 
 
+@pytest.mark.nightly("tests/fem/test_self_contact.py::test_a_vacuum_closes_a_pouch_but_never_crosses_it")
 def test_a_ring_collapses_and_lies_flat_as_the_elastica_does():
     """Its bending stiffness is the only number that both share; the wall is a 25th of the radius."""
     mesh, held = ring_half(48)
@@ -160,14 +161,13 @@ def test_a_round_body_on_a_flat_one_presses_as_hertz_says():
     assert wide == pytest.approx(np.sqrt(radius * nearer), rel=0.03)
 
 
-@pytest.mark.slow
-def test_no_body_cuts_itself_in_a_thousand_steps_that_would():
+def cut_short_without_crossing(count):
     """Waves of the whole body; told by ipctk, whose detection ends the steps, and by a test without it."""
     mesh = fork()
     contact = SelfContact(mesh, 0.05, 0.1)
     random = np.random.default_rng(2026)
     cut_short = 0
-    while cut_short < 1000:
+    while cut_short < count:
         u, size = np.zeros_like(mesh.nodes), random.uniform(0.2, 1.2)
         for _ in range(4):
             a, b = random.standard_normal((2, 3))
@@ -177,3 +177,12 @@ def test_no_body_cuts_itself_in_a_thousand_steps_that_would():
             u = u + share * (to - u)
             assert not contact.intersects(u)
             assert not crossings(mesh, u)
+
+
+def test_no_body_cuts_itself_in_steps_that_would():
+    cut_short_without_crossing(25)
+
+
+@pytest.mark.nightly("test_no_body_cuts_itself_in_steps_that_would")
+def test_no_body_cuts_itself_in_a_thousand_steps_that_would():
+    cut_short_without_crossing(1000)

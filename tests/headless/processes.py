@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import subprocess
 import sys
 from pathlib import Path
+
+from mu_addon.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 # No measure of speed: what hangs must end some time.
@@ -30,6 +34,17 @@ def run(*arguments, **options):
         stdin=subprocess.DEVNULL,
         **options,
     )
+
+
+def here(*arguments):
+    """Run to the end in this process, as a second of start-up is saved; output as text."""
+    words, out, errors = [str(word) for word in arguments], io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+        try:
+            status = main(words)
+        except SystemExit as end:  # of the parser
+            status = end.code
+    return subprocess.CompletedProcess(words, status, out.getvalue(), errors.getvalue())
 
 
 def worker_of(folder):

@@ -46,8 +46,17 @@ def whole(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
+NIGHTLY = pytest.mark.nightly("test_it_says_where_it_stood_and_resumes_to_the_same_digits")
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGSEGV,
+        pytest.param(signal.SIGABRT, marks=NIGHTLY),
+        pytest.param(signal.SIGKILL, marks=NIGHTLY),
+    ],
+)
 def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, number):
     done = hit(tmp_path, number)
     # The stack is written from the signal's handler, while other threads run on, and may fault itself.

@@ -8,7 +8,7 @@ import pytest
 from mu_addon.design.parameters import read_unit
 from tests.usecases.diagnosis_data import weighed_blocks
 
-from .processes import assert_clear_failure, run
+from .processes import assert_clear_failure, here, run
 
 REAL = Path(__file__).resolve().parents[1] / "data" / "real"
 
@@ -16,7 +16,7 @@ REAL = Path(__file__).resolve().parents[1] / "data" / "real"
 @pytest.fixture(scope="module")
 def overcured(tmp_path_factory):
     root = tmp_path_factory.mktemp("diagnose")
-    done = run("diagnose", weighed_blocks(root / "data", 0.09), "--out", root / "why")
+    done = here("diagnose", weighed_blocks(root / "data", 0.09), "--out", root / "why")
     assert done.returncode == 0, done.stderr
     return root / "why", done
 
@@ -31,14 +31,16 @@ def test_it_leaves_verdict_model_and_report(overcured):
 
 
 def test_json_ends_with_the_result(tmp_path):
-    done = run("diagnose", REAL / "silicone_beam", "--out", tmp_path, "--json")
+    done = here("diagnose", REAL / "silicone_beam", "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
     assert last["type"] == "result"
     assert last["summary"]["verdict"] in ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_named_effects.py::test_the_command_line_simulates_what_a_diagnosis_found"
+)
 def test_homogenize_takes_the_model(overcured, tmp_path):
     model = overcured[0] / "model.toml"
     stiff = {}
@@ -76,28 +78,28 @@ def test_homogenize_takes_the_model(overcured, tmp_path):
 def test_a_model_that_cannot_be_used_is_named(tmp_path, text, words):
     model = tmp_path / "model.toml"
     model.write_text(f'verdict = "named"\n{text}')
-    done = run("simulate", "--preset", "mu-1.0x", "--model", model, "--out", tmp_path / "out")
+    done = here("simulate", "--preset", "mu-1.0x", "--model", model, "--out", tmp_path / "out")
     assert_clear_failure(done, 2, *words)
 
 
 def test_bad_data_are_named_by_file_and_row(tmp_path):
     folder = weighed_blocks(tmp_path / "data", 0.0)
     (folder / "block_1.csv").write_text("strain,stress_kPa\n0,0\n0.1,much\n")
-    done = run("diagnose", folder, "--out", tmp_path / "out")
+    done = here("diagnose", folder, "--out", tmp_path / "out")
     assert_clear_failure(done, 2, "block_1.csv", "row 3", "much")
     assert not (tmp_path / "out").exists()
 
 
 def test_no_folder_is_named(tmp_path):
     assert_clear_failure(
-        run("diagnose", tmp_path / "nowhere", "--out", tmp_path / "out"), 2, "experiments.toml"
+        here("diagnose", tmp_path / "nowhere", "--out", tmp_path / "out"), 2, "experiments.toml"
     )
 
 
 def test_design_experiments_says_what_would_be_seen(tmp_path):
     folder = weighed_blocks(tmp_path / "data", 0.0)
-    done = run("design-experiments", folder, "--noise", "stress=0.2", "--out", tmp_path / "out")
+    done = here("design-experiments", folder, "--noise", "stress=0.2", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     assert "overcure: detectable from offset 0.0" in done.stdout
-    done = run("design-experiments", folder, "--noise", "stress=little", "--out", tmp_path / "other")
+    done = here("design-experiments", folder, "--noise", "stress=little", "--out", tmp_path / "other")
     assert_clear_failure(done, 2, "stress=little", "--noise")

@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset, to_toml
 
-from .processes import assert_clear_failure, command, run
+from .processes import assert_clear_failure, command, here, run
 
 
 def test_help_names_every_command():
@@ -71,29 +71,29 @@ def test_without_its_packages_it_says_how_to_install_them(tmp_path, words):
 
 
 def test_an_empty_word_names_its_option(tmp_path):
-    done = run("simulate", "--preset", "mu-1.0x", "--resin", "", "--out", tmp_path / "out")
+    done = here("simulate", "--preset", "mu-1.0x", "--resin", "", "--out", tmp_path / "out")
     assert_clear_failure(done, 2, "it is empty", "where: --resin")
 
 
 def test_unknown_preset(tmp_path):
-    done = run("place", "--preset", "mu-2.0x", "--out", tmp_path / "out")
+    done = here("place", "--preset", "mu-2.0x", "--out", tmp_path / "out")
     assert_clear_failure(done, 2, "mu-2.0x", "mu-1.0x", "what to do")
 
 
 def test_unknown_option(tmp_path):
-    assert_clear_failure(run("place", "--presett", "mu-1.0x", "--out", tmp_path), 2, "what to do", "--help")
+    assert_clear_failure(here("place", "--presett", "mu-1.0x", "--out", tmp_path), 2, "what to do", "--help")
 
 
 def test_malformed_toml_names_its_line(tmp_path):
     file = tmp_path / "unit.toml"
     file.write_text('format = 1\nname = "x"\nscale = = 2\n')
-    assert_clear_failure(run("design", "--unit", file, "--out", tmp_path / "out"), 2, "unit.toml", "line 3")
+    assert_clear_failure(here("design", "--unit", file, "--out", tmp_path / "out"), 2, "unit.toml", "line 3")
 
 
 def test_misspelt_parameter_names_its_line_and_the_right_word(tmp_path):
     file = tmp_path / "unit.toml"
     file.write_text("format = 1\nscale = 1.0\n\n[chambers]\nwal_mm = 0.7\n")
-    assert_clear_failure(run("design", "--unit", file, "--out", tmp_path / "out"), 2, "line 5", "wall_mm")
+    assert_clear_failure(here("design", "--unit", file, "--out", tmp_path / "out"), 2, "line 5", "wall_mm")
 
 
 def test_impossible_geometry_names_the_largest_wall(tmp_path):
@@ -101,7 +101,7 @@ def test_impossible_geometry_names_the_largest_wall(tmp_path):
     file.write_text(
         to_toml(load_preset("mu-1.0x"), comments=False).replace("wall_mm = 0.9", "wall_mm = 2.5", 1)
     )
-    done = run("design", "--unit", file, "--out", tmp_path / "out")
+    done = here("design", "--unit", file, "--out", tmp_path / "out")
     # a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm
     assert_clear_failure(done, 2, "wall", "1.87", "curvature")
 
@@ -121,32 +121,33 @@ def test_impossible_geometry_names_the_largest_wall(tmp_path):
 def test_unreadable_protocol_names_its_line(tmp_path, text, words):
     file = tmp_path / "protocol.csv"
     file.write_text(text)
-    done = run("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol", file)
+    done = here("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol", file)
     assert_clear_failure(done, 2, "protocol", *words)
 
 
 def test_missing_and_binary_protocols(tmp_path):
     base = ("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol")
-    assert_clear_failure(run(*base, tmp_path / "none.csv"), 2, "none.csv")
+    assert_clear_failure(here(*base, tmp_path / "none.csv"), 2, "none.csv")
     binary = tmp_path / "binary.csv"
     binary.write_bytes(bytes(range(256)))
-    assert_clear_failure(run(*base, binary), 2, "not a text file")
+    assert_clear_failure(here(*base, binary), 2, "not a text file")
 
 
 @pytest.mark.parametrize(("option", "value"), [("--times", "1"), ("--refine", "0"), ("--refine", "nan")])
 def test_numbers_out_of_range(tmp_path, option, value):
-    done = run("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", option, value)
+    done = here("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", option, value)
     assert_clear_failure(done, 2, "what to do")
 
 
 def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
-    file = tmp_path / "burst.csv"
+    file, unit = tmp_path / "burst.csv", tmp_path / "unit.toml"
     file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
+    unit.write_text("format = 1\n[chambers]\ncount = 3\n")
     out = tmp_path / "out"
-    done = run(
+    done = here(
         "simulate",
-        "--preset",
-        "mu-1.0x",
+        "--unit",
+        unit,
         "--out",
         out,
         "--protocol",
@@ -182,13 +183,13 @@ def test_a_full_disk_is_told_and_leaves_no_half_file(tmp_path):
 
 def test_a_folder_in_the_way_of_a_file(tmp_path):
     (tmp_path / "file").write_text("mine")
-    done = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "file")
+    done = here("design", "--preset", "mu-1.0x", "--out", tmp_path / "file")
     assert_clear_failure(done, 5, "what to do")
     assert (tmp_path / "file").read_text() == "mine"
 
 
 def test_an_unknown_path_is_refused_before_any_work(tmp_path):
-    done = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--path", "alpha11")
+    done = here("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--path", "alpha11")
     assert_clear_failure(done, 2, "alpha11", "alpha10")
     assert not (tmp_path / "out" / "unit.stl").exists()
 
@@ -204,23 +205,26 @@ def test_json_messages_end_with_one_terminal_message(tmp_path):
 
 def test_a_folder_with_somebody_elses_files_is_left_alone(tmp_path):
     (tmp_path / "unit.stl").write_text("mine")
-    assert_clear_failure(run("design", "--preset", "mu-1.0x", "--out", tmp_path), 2, "unit.stl", "what to do")
+    assert_clear_failure(
+        here("design", "--preset", "mu-1.0x", "--out", tmp_path), 2, "unit.stl", "what to do"
+    )
     assert (tmp_path / "unit.stl").read_text() == "mine"
     assert not (tmp_path / "summary.json").exists()
 
 
 @pytest.mark.parametrize("words", [("--preset", "", "--out", "x"), ("--preset", "mu-1.0x", "--out", "")])
-def test_empty_words(tmp_path, words):
-    assert_clear_failure(run("design", *words, cwd=tmp_path), 2, "what to do")
+def test_empty_words(tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    assert_clear_failure(here("design", *words), 2, "what to do")
     assert not list(tmp_path.iterdir())
 
 
 def test_samples_without_any_pressure_are_refused(tmp_path):
-    done = run("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--times", "2")
+    done = here("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--times", "2")
     assert_clear_failure(done, 2, "none of the 2 samples")
 
 
 def test_files_from_a_windows_editor_are_read(tmp_path):
     file = tmp_path / "unit.toml"
     file.write_bytes(b"\xef\xbb\xbf" + to_toml(load_preset("mu-1.0x")).replace("\n", "\r\n").encode())
-    assert run("design", "--unit", file, "--out", tmp_path / "out", "--no-report").returncode == 0
+    assert here("design", "--unit", file, "--out", tmp_path / "out", "--no-report").returncode == 0

@@ -13,7 +13,7 @@ from mu_addon.graph import Node, NodeTree, Source, tree_text
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.templates import template
 
-from .processes import ROOT, assert_clear_failure, command, run
+from .processes import ROOT, assert_clear_failure, command, here, run
 
 COARSE = {"order": 1, "refine": 0.4, "times": 4, "fidelity": "homogenised"}
 
@@ -126,19 +126,19 @@ def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, t
 def test_bad_files_end_with_a_clear_message(tmp_path, text, words):
     path = tmp_path / "bad.toml"
     path.write_text(text, encoding="utf-8")
-    assert_clear_failure(run("graph", path, "--out", tmp_path / "out"), 2, *words, "what to do")
+    assert_clear_failure(here("graph", path, "--out", tmp_path / "out"), 2, *words, "what to do")
 
 
 def test_a_missing_file_an_unknown_node_and_a_folder_of_another_run_are_told(file, tmp_path):
     assert_clear_failure(
-        run("graph", tmp_path / "no.toml", "--out", tmp_path / "o"), 2, "cannot read the node tree"
+        here("graph", tmp_path / "no.toml", "--out", tmp_path / "o"), 2, "cannot read the node tree"
     )
     assert_clear_failure(
-        run("graph", file, "--out", tmp_path / "o", "--node", "X"), 2, "there is no node 'X'"
+        here("graph", file, "--out", tmp_path / "o", "--node", "X"), 2, "there is no node 'X'"
     )
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "report.html").write_text("mine")
-    assert_clear_failure(run("graph", file, "--out", tmp_path / "other"), 2, "another kind of run")
+    assert_clear_failure(here("graph", file, "--out", tmp_path / "other"), 2, "another kind of run")
 
 
 def test_the_shipped_unit_is_evaluated_from_its_file(tmp_path):
@@ -234,18 +234,49 @@ def calibrated(folder):
             "--out", folder / "map",
         ),
     ):  # fmt: skip
-        done = run(*line)
+        done = here(*line)
         assert done.returncode == 0, done.stdout + done.stderr
     shutil.copy(folder / "map" / "calibration.toml", folder)
     (folder / "design.toml").write_text(LIGHTER, encoding="utf-8")
     return folder
 
 
+def without_runs(tree):
+    """The tree without the nodes that run a job of their own or take a recording, nor what hangs on them."""
+    left = {
+        name: node
+        for name, node in tree.nodes.items()
+        if not definitions()[node.kind].runs and node.kind not in ("recording", "calibration")
+    }
+    while dangling := {
+        name
+        for name, node in left.items()
+        if any(source.node not in left for sources in node.links.values() for source in sources)
+    }:
+        left = {name: node for name, node in left.items() if name not in dangling}
+    return NodeTree(tree.name, left)
+
+
+def test_every_kind_of_node_that_runs_no_job_is_computed_and_found_again(tmp_path):
+    tree = without_runs(every_kind(box(tmp_path), tmp_path / "bench"))
+    assert len({node.kind for node in tree.nodes.values()}) > 12
+    computed_and_found_again(tmp_path, tree)
+
+
+@pytest.mark.nightly("test_every_kind_of_node_that_runs_no_job_is_computed_and_found_again")
 def test_every_kind_of_node_is_computed_and_found_again(tmp_path):
+    tree = every_kind(box(tmp_path), calibrated(tmp_path / "bench"))
+    assert {node.kind for node in tree.nodes.values()} == set(definitions())
+    computed_and_found_again(tmp_path, tree)
+
+
+def box(tmp_path):
     wall = tmp_path / "wall.stl"
     trimesh.creation.box((10.0, 10.0, 10.0)).export(wall)
-    tree = every_kind(wall, calibrated(tmp_path / "bench"))
-    assert {node.kind for node in tree.nodes.values()} == set(definitions())
+    return wall
+
+
+def computed_and_found_again(tmp_path, tree):
     (tmp_path / "every.toml").write_text(tree_text(tree), encoding="utf-8")
     first = evaluated(tmp_path / "every.toml", tmp_path / "out")
     assert set(states(first).values()) == {"computed"}

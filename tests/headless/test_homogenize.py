@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.homogenize.effective import read_effective
 
-from .processes import run
+from .processes import here, run
 
 COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
 TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
@@ -56,7 +56,7 @@ def test_it_leaves_tensor_curves_law_and_report(lattice):
         assert words in report or words.replace("&#x27;", "'") in report
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/homogenize/test_compression.py::test_a_cancelled_run_goes_on_to_the_same_states")
 def test_it_resumes_from_what_was_finished(lattice):
     out, _ = lattice
     before = (out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()
@@ -67,7 +67,7 @@ def test_it_resumes_from_what_was_finished(lattice):
     assert (out / "report.html").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/homogenize/test_cell_mesh.py::test_scales_share_one_mesh_and_one_tensor")
 def test_other_inputs_set_the_old_results_aside(lattice):
     out, _ = lattice
     done = run(
@@ -98,7 +98,7 @@ def test_other_inputs_set_the_old_results_aside(lattice):
     ],
 )
 def test_bad_input_is_named(tmp_path, more, status, words):
-    done = run("homogenize", "--preset", "mu-1.0x", *more, "--out", str(tmp_path / "out"))
+    done = here("homogenize", "--preset", "mu-1.0x", *more, "--out", str(tmp_path / "out"))
     assert done.returncode == status
     assert words in done.stderr
     assert "Traceback" not in done.stderr
@@ -107,7 +107,7 @@ def test_bad_input_is_named(tmp_path, more, status, words):
 def test_an_offset_that_fills_the_cell_is_named(tmp_path):
     unit = tmp_path / "unit.toml"
     unit.write_text("format = 1\nscale = 0.2\n[print]\noffset_xy_mm = 0.5\noffset_z_mm = 0.5\n")
-    done = run("homogenize", "--unit", str(unit), "--no-specimen", "--out", str(tmp_path / "out"))
+    done = here("homogenize", "--unit", str(unit), "--no-specimen", "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert "[print]" in done.stderr or "offset" in done.stderr
     assert "Traceback" not in done.stderr

@@ -8,12 +8,14 @@ import pytest
 from mu_addon.homogenize.effective import read_effective, write_effective
 
 from ..homogenize.lattice_laws import body_centred
-from .processes import assert_clear_failure, run
+from .processes import assert_clear_failure, here, run
 
 SMALL = ("--preset", "mu-1.0x", "--refine", "0.4", "--order", "1", "--times", "5")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_lattice_law.py::test_the_lattices_law_decides_the_motion_and_is_kept_with_it"
+)
 def test_a_run_with_a_law_of_the_lattice_keeps_and_reports_it(tmp_path):
     law, folder = tmp_path / "mine.toml", tmp_path / "out"
     write_effective(law, body_centred())
@@ -38,6 +40,6 @@ def test_a_run_with_a_law_of_the_lattice_keeps_and_reports_it(tmp_path):
 def test_a_law_that_cannot_be_used_is_named_before_any_work(tmp_path):
     law = tmp_path / "mine.toml"
     law.write_text(body_centred().text().replace("format = 1", "format = 7"))
-    done = run("place", *SMALL, "--out", tmp_path / "out", "--lattice", law)
+    done = here("place", *SMALL, "--out", tmp_path / "out", "--lattice", law)
     assert_clear_failure(done, 2, "mine.toml", "format is 7")
     assert not (tmp_path / "out" / "unit.stl").exists()

@@ -7,7 +7,9 @@ import pytest
 
 from mu_addon.cli.main import main
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly(
+    "tests/usecases/test_reproduce.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
+)
 
 
 def rows(path):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 
+import attrs
 import numpy as np
 import pytest
 
@@ -16,8 +17,9 @@ from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 from .processes import assert_clear_failure, command, run, worker_of
 
+UNIT = load_preset("mu-1.0x")
 JOB = Job(
-    load_preset("mu-1.0x"),
+    attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4)),
     grasp(),
     mesh=MeshSettings(refine=0.4, order=1),
     times=7,
@@ -40,7 +42,18 @@ def whole(tmp_path_factory, with_light):
     return folder, resumed(folder)
 
 
-@pytest.mark.parametrize("pattern", ["unit.stl", "cache/mesh-*", "cache/state-*", "cache/sweep-*"])
+NIGHTLY = pytest.mark.nightly("test_killed_at_any_stage_it_goes_on_to_the_same_digits")
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        pytest.param("unit.stl", marks=NIGHTLY),
+        pytest.param("cache/mesh-*", marks=NIGHTLY),
+        "cache/state-*",
+        "cache/sweep-*",
+    ],
+)
 def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, with_light, tmp_path, pattern):
     reference, expected = whole
     with_light(tmp_path)

@@ -133,7 +133,7 @@ def test_large_blocks_approach_the_periodic_cell():
     assert (sticking > found[:3]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_large_blocks_approach_the_periodic_cell")
 def test_blocks_of_the_papers_lattice_approach_its_periodic_cell(tmp_path):
     """Its bending struts are far softer along an edge than in shear: plates that hold it count for more."""
     cell = StrutCell(kind("body-centred"), U, 0.75, 1.0)

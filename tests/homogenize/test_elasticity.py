@@ -161,7 +161,7 @@ def test_a_body_centred_lattice_bends_or_stretches_with_direction(tmp_path):
     assert np.isclose(beams[-1].E100, simple, rtol=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_body_centred_lattice_bends_or_stretches_with_direction")
 def test_a_simple_cubic_lattice_stretches(tmp_path):
     runs = slender(cells.SIMPLE_CUBIC, [0.6, 0.3], 10.0, tmp_path)
     density = np.array([e.relative_density for _, e in runs])

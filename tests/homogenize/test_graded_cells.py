@@ -19,7 +19,9 @@ def moduli(factor):
     return np.array([found.E100, found.C[0, 1], found.C44])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/fem/test_graded_lattice.py::test_slender_struts_bend_along_an_axis_and_stretch_in_shear"
+)
 def test_two_diameters_against_pytetwilds_cell():
     nominal = moduli(1.0)
     for factor in (0.75, 1.3):

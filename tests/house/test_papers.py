@@ -50,11 +50,12 @@ def test_the_readme_gives_both_commands():
     assert TESTS in lines
 
 
-def test_ci_runs_the_readme_test_command():
+def test_ci_runs_the_readme_test_command_and_then_lint_and_types():
     script = ROOT / ".ci" / "run"
     assert script.stat().st_mode & 0o111
     lines = script.read_text(encoding="utf-8").splitlines()
-    assert lines[-1] == TESTS
+    assert lines[-2:] == [TESTS, ".ci/lint"]
+    assert (ROOT / ".ci" / "lint").stat().st_mode & 0o111
     assert "set -euo pipefail" in lines
     assert subprocess.run(["bash", "-n", str(script)], check=False).returncode == 0
 

@@ -57,7 +57,7 @@ def test_a_body_that_is_no_mirror_image_is_meshed_whole(tmp_path):
     assert again.hash() == mesh.hash()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_body_that_is_no_mirror_image_is_meshed_whole")
 def test_bodies_bend_as_their_shape_says(tmp_path):
     """A box that is wider on one side bends; a body that is round about the axis has no side to bend to.
 

@@ -51,7 +51,9 @@ def body():
     return found, states
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/optimization/test_tip.py::test_slopes_are_those_of_full_solutions_on_morphed_meshes"
+)
 def test_they_are_those_of_full_solutions_on_morphed_meshes(body):
     unit, states = body
     values = np.array([q.value(unit.structure, states) for q in ASKED])

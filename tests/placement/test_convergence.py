@@ -25,7 +25,9 @@ def meshes():
     return [mesh_unit(UNIT, MeshSettings(refine=refine)) for refine in REFINEMENTS]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/fem/test_manufactured.py::test_displacement_converges_one_order_faster_than_its_gradient"
+)
 def test_the_default_mesh_is_within_three_percent_of_the_finest(meshes):
     """Tip angle at -20, 20 and 40 kPa on three refinements; the default is the middle one."""
     found = []

@@ -52,6 +52,7 @@ def test_what_remembers_nothing_is_where_pressure_alone_takes_it(mesh):
     assert np.abs(moved[1] - free.alone(0, np.array([-0.004]))[0]).max() < 1e-6
 
 
+@pytest.mark.nightly("test_a_wall_that_relaxes_lets_a_candidate_go_on")
 def test_an_obstacle_holds_a_candidate_back(mesh):
     time, pressure = np.array([0.0, 1.0]), np.array([0.0, 10.0])
     free, held = (

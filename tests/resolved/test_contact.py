@@ -110,7 +110,7 @@ def test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit(mesh
     assert force[0] == pytest.approx(force[1], rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_plate_on_the_tip_is_held_by_the_base_and_its_work_is_stored")
 def test_a_plate_drawn_along_the_struts_takes_what_it_gives(mesh):
     """Pressed on the lattice's side and drawn along z: Coulomb's force, and what its work went into."""
     side, friction = SMALL.printed.bounds[1][1], 0.3

@@ -76,6 +76,9 @@ def test_slopes_are_those_of_the_bar_s_deformation():
     np.testing.assert_allclose((at(1) - at(-1)) / 2.0, slopes @ step, atol=1e-12)
 
 
+@pytest.mark.nightly(
+    "tests/placement/test_resolved_influence.py::test_a_part_made_stiffer_moves_the_points_as_the_map_says"
+)
 def test_it_predicts_what_a_printed_waveguide_does():
     """A bent path off the mirror plane of three chambers at 1 kPa, against the full solution with it."""
     unit = load_preset("mu-1.0x")

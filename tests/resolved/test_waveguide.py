@@ -83,6 +83,7 @@ def test_it_adds_the_resin_that_the_drawn_waveguide_adds(mesh, sensed):
     assert added == pytest.approx(added_mm3(SMALL, ALONG_ALL), rel=0.02)
 
 
+@pytest.mark.nightly("test_only_the_struts_that_a_waveguide_meets_are_thickened")
 def test_struts_that_it_thickens_are_as_thick_as_drawn(thin):
     sensed = with_waveguide(thin, bar_of(THIN, ALONG_ALL), THIN)
     count = len(thin.nodes)
@@ -91,6 +92,7 @@ def test_struts_that_it_thickens_are_as_thick_as_drawn(thin):
     require_linear_motions_kept(sensed)
 
 
+@pytest.mark.nightly("test_it_adds_the_resin_that_the_drawn_waveguide_adds")
 def test_a_bent_waveguide_off_the_mirror_plane_adds_what_is_drawn(mesh, bent):
     added = resin_mm3(bent) - resin_mm3(mesh)
     assert added == pytest.approx(added_mm3(SMALL, path_of(SMALL)), rel=0.02)

@@ -170,7 +170,13 @@ def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
     assert any("3 x 3 x 3 cells between plates that hold" in words for words in context.summary["remarks"])
 
 
-@pytest.mark.parametrize("gauge_kPa", [0.0, 0.02])
+@pytest.mark.parametrize(
+    "gauge_kPa",
+    [
+        pytest.param(0.0, marks=pytest.mark.nightly("test_a_unit_is_judged_by_its_angle_and_markers")),
+        0.02,
+    ],
+)
 def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_kPa):
     """A clogged chamber; the unit's own simulation is stood in for by one that is written down."""
     folder = bent_unit(tmp_path / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)

@@ -50,19 +50,20 @@ def for_good(request: pytest.FixtureRequest) -> bool:
 
 
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each third call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
     monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)
 
-    assert inject_each(run, tmp_path, failing, 5, PARTIAL) == []
+    assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=3) == []
 
 
-@pytest.mark.slow
-def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each ninth call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
-    assert inject_each(placement(monkeypatch), tmp_path, failing, 5, PARTIAL, step=9) == []
+@pytest.mark.parametrize("step", [31, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    """Each 31st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    assert inject_each(placement(monkeypatch), tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
 def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

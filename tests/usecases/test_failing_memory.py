@@ -65,14 +65,14 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=7) == []
 
 
-@pytest.mark.slow
-def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [151, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """What follows from the states of the unit and of its candidates; all of it by benchmarks/faults.py."""
-    assert inject_each(placement(monkeypatch), tmp_path, layer, MuError.status, PARTIAL, step=41) == []
+    assert inject_each(placement(monkeypatch), tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
-@pytest.mark.slow
-def test_export(tmp_path: Path) -> None:
+@pytest.mark.parametrize("step", [101, pytest.param(31, marks=pytest.mark.nightly("test_export"))])
+def test_export(tmp_path: Path, step: int) -> None:
     job = ExportJob(
         STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
     )
@@ -80,7 +80,7 @@ def test_export(tmp_path: Path) -> None:
     def run(folder: Path, context: RunContext) -> None:
         exporting.USE_CASE.start(job, folder, context)
 
-    assert inject_each(run, tmp_path, layer, MuError.status, step=31) == []
+    assert inject_each(run, tmp_path, layer, MuError.status, step=step) == []
 
 
 @pytest.mark.slow

@@ -238,7 +238,7 @@ def short_gripper(folder):
     return folder / "g.toml"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does")
 def test_a_printed_waveguide_disturbs_a_finger_on_a_cube(tmp_path, monkeypatch):
     """One load of the protocol: what is printed moves the backbone, and a rerun finds it solved."""
     monkeypatch.setattr(path_deviation, "_samples", lambda: (np.array([0.0, 1.0]), np.array([0.0, 15.0])))
@@ -256,7 +256,9 @@ def test_a_printed_waveguide_disturbs_a_finger_on_a_cube(tmp_path, monkeypatch):
     assert ranked(load=kept.get) == found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/resolved/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit"
+)
 def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""
     gripper = short_gripper(tmp_path)

@@ -227,7 +227,7 @@ def test_what_was_kept_of_a_unit_is_what_was_found(job):
     assert (again.why, again.model_a) == ("", 3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_robust_search_judges_by_the_finer_mesh_and_within_its_uncertainty")
 def test_what_is_proposed_is_simulated_strut_by_strut_where_that_is_asked_for():
     """On the printed body the angle and the strain have other values; along a sensor's path there is none."""
     text = TEXT.replace('preset = "mu-1.0x"', 'preset = "mu-1.0x"\ncheck_fidelity = "resolved"')

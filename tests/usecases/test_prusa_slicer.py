@@ -99,7 +99,9 @@ def test_what_it_says_of_a_file_is_read():
     assert complaints({}) == ["None parts", "no manifold"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_export.py::test_both_packages_are_read_by_the_consortiums_own_library"
+)
 @pytest.mark.skipif(SLICER is None, reason="PrusaSlicer is not installed")
 @pytest.mark.parametrize("preset", units())
 def test_it_opens_the_files_of_every_preset_as_one_body(preset, tmp_path):

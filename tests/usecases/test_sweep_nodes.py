@@ -152,7 +152,7 @@ def test_without_dask_processes_of_this_machine_do_the_tasks(monkeypatch):
     assert [rows[k]["minutes"] for k in range(3)] == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_without_dask_processes_of_this_machine_do_the_tasks")
 def test_a_study_that_starts_at_blenders_entry_gives_the_same_figures(monkeypatch):
     """As in Blender, where the package has another name and there is no psutil."""
 

@@ -17,6 +17,7 @@ from mu_addon.evidence import unit_fem
 
 from ...evidence import analytic
 from ...headless.processes import run
+from ...made_once import made_once
 from ...usecases.bent_motion import write_bent_run
 from ...usecases.diagnosis_data import bent_unit, weighed_blocks
 from ...usecases.test_diagnose import run as diagnosed
@@ -82,15 +83,18 @@ def blender(each_bpy, tmp_path_factory):
 # What a quick look takes, with one path of the whole lattice beside the ten of the anchors.
 PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.5", "--rule", "volume_fraction"]
 PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
+PLACE += ["--no-report"]
 
 
 @pytest.fixture(scope="session")
 def placed(tmp_path_factory):
     """A finished study of `place`; whoever writes into it takes `study`."""
-    folder = tmp_path_factory.mktemp("placed") / "out"
-    done = run(*PLACE, "--out", folder)
-    assert done.returncode == 0, done.stderr
-    return folder
+
+    def make(folder):
+        done = run(*PLACE, "--out", folder)
+        assert done.returncode == 0, done.stderr
+
+    return made_once(tmp_path_factory, "placed", make)
 
 
 @pytest.fixture

@@ -143,10 +143,8 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
     assert "there is no such file" in refused(bpy.ops.mu.evidence_open, what="report")
 
 
-def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
-    """Applied, undone, saved, simulated, changed and removed; found again as what the results are of."""
-
-    folder = tmp_path
+def applied(folder, clogged):
+    """A unit that was given what its verdict named, saved and read again; returns it and what it asks for."""
     shutil.copytree(clogged / "study", folder / "study")
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
@@ -188,6 +186,20 @@ def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
     asked = {"effects": {"clogged_chamber": {"share_lost": share}}}
     assert effects.inputs(root) == asked
     assert "Applied to the unit" in drawn(panels.MU_PT_simulate)
+    return root, asked
+
+
+def test_what_has_no_parameter_is_applied_undone_saved_and_removed(tmp_path, clogged):
+    root, _ = applied(tmp_path, clogged)
+    assert bpy.ops.mu.evidence_remove() == {"FINISHED"}
+    assert "With named effects" not in drawn(panels.MU_PT_simulate)
+    assert not effects.named_effects(root)
+
+
+@pytest.mark.nightly("test_what_has_no_parameter_is_applied_undone_saved_and_removed")
+def test_what_has_no_parameter_goes_into_the_simulation(tmp_path, clogged):
+    """Simulated, changed and removed; found again as what the results are of."""
+    root, asked = applied(tmp_path, clogged)
 
     def simulated():
         assert bpy.ops.mu.simulate() == {"FINISHED"}

@@ -279,7 +279,7 @@ def test_the_cube_is_drawn_where_the_core_puts_it():
     assert Grip().beyond_mm == 3.0, "gripper_object.BEYOND_MM, which the first test here sees drawn"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_what_a_grasp_is_asked_and_how_it_ends")
 def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
     root = held()
     props = root.mu_gripper

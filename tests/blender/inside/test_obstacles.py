@@ -152,7 +152,7 @@ def test_a_box_stands_before_the_tip():
     assert not obstacles.placed(root, box).flaws
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_what_moves_or_is_edited_is_another_obstacle")
 def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
 
     def bent(folder):

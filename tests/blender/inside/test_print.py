@@ -324,7 +324,9 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     assert "plug-1.stl" in texts
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_check_print.py::test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how"
+)
 def test_a_file_is_checked_and_repaired_before(tmp_path):
     """As `check --stl FILE --repair`: a cube with one face turned over."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
@@ -401,7 +403,9 @@ def test_jobs_that_fail_and_one_that_is_stopped():
     assert "Not checked yet" in drawn()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_check_print.py::test_a_part_that_must_not_be_printed_ends_with_status_6"
+)
 def test_a_unit_that_must_not_be_printed():
     """A wall of 0.54 mm at this scale: the child ends with an error, which the panel shows as found."""
     root = short()
@@ -419,7 +423,9 @@ def test_a_unit_that_must_not_be_printed():
     assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/design/printing/test_faults.py::test_a_unit_in_a_user_defined_body_has_its_size_and_inches_are_still_found"
+)
 def test_a_body_of_ones_own_is_checked_by_its_solid():
     root = short()
     bpy.ops.mesh.primitive_cylinder_add(vertices=64, radius=20, depth=30, location=(0, 0, 14))

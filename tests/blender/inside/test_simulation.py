@@ -213,7 +213,7 @@ def test_printed_struts_are_the_resolved_model_and_may_keep_apart():
     assert not job_of(root).self_contact, "it is of printed struts alone"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_printed_struts_are_the_resolved_model_and_may_keep_apart")
 def test_printed_struts_are_simulated_and_played(tmp_path):
     """A short unit, inflated a little: its motion is that of its struts, drawn up to their wall."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "struts.blend"))

@@ -205,8 +205,12 @@ def test_a_part_a_little_too_tall_is_not_taken_for_inches():
     assert "inches" not in found.what
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["mu-0.75x", "mu-1.0x", "mu-1.5x"])
+NIGHTLY = pytest.mark.nightly("test_the_presets_have_no_errors")
+
+
+@pytest.mark.parametrize(
+    "name", ["mu-0.75x", pytest.param("mu-1.0x", marks=NIGHTLY), pytest.param("mu-1.5x", marks=NIGHTLY)]
+)
 def test_the_presets_have_no_errors(name):
     from mu_addon.design.anchors import window
     from mu_addon.design.parameters import load_preset
@@ -215,8 +219,8 @@ def test_the_presets_have_no_errors(name):
     unit = load_preset(name)
     path = window(unit, "alpha4")
     solid = build_solid(unit, path)
-    # Layers are as those of 1.0x, larger or smaller.
-    stages = ("thickness", "chambers", "layers") if unit.scale == 1.0 else ("thickness", "chambers")
+    # Layers of the largest are as those of the others.
+    stages = ("thickness", "chambers") if unit.scale > 1.0 else ("thickness", "chambers", "layers")
     found = check(solid.vertices, solid.triangles, load_printer(), unit, path, stages=stages)
     assert [f.what for f in found.findings if f.severity == "error"] == []
     by_name = {f.check: f for f in found.findings}
@@ -276,6 +280,7 @@ def test_a_missing_strut_is_a_missing_tunnel():
     assert found["volume"].severity == "pass"
 
 
+@pytest.mark.nightly("test_a_sound_unit_has_none_of_them")
 def test_the_same_unit_of_other_facets_is_the_same():
     solid, fine = parts.small_solid(), build_solid(parts.small_unit(), quality="export")
     nominal = solid.vertices, solid.triangles
