@@ -12,12 +12,17 @@ from mu_addon.run.cache import Cache
 from mu_addon.sensing.optics import Optics
 from mu_addon.usecases.simulate_and_place.light import cached_law
 
+from .made_once import made_once
+
 
 @pytest.fixture(scope="session")
 def with_light(tmp_path_factory):
     """Puts the law into the cache of a study's folder, and returns the folder."""
-    made = Cache(tmp_path_factory.mktemp("light"))
-    cached_law(load_preset("mu-1.0x").printed, Optics(), made)
+
+    def make(folder):
+        cached_law(load_preset("mu-1.0x").printed, Optics(), Cache(folder))
+
+    made = Cache(made_once(tmp_path_factory, "light", make))
 
     def put(folder):
         shutil.copytree(made.folder, folder / "cache", dirs_exist_ok=True)

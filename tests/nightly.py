@@ -1,7 +1,7 @@
 """Tests that run at night: left out by default, each with a quick one that guards against the same fault.
 
 `@pytest.mark.nightly("NAME")` names the quick one, in the same file or as `tests/...py::NAME`.
-`python -m pytest -m nightly` runs them and writes the date of those that passed into docs/engineering/nightly.md;
+`python -m pytest -m nightly` runs them and writes the date of those that passed into the page PAGE;
 `python -m tests.nightly` writes the table anew without a run, after a change of the marks.
 """
 

@@ -163,7 +163,7 @@ def test_every_order_is_given_out_once_and_what_fails_is_not_in_the_file(tmp_pat
     assert not (tmp_path / "none.ndjson").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_every_order_is_given_out_once_and_what_fails_is_not_in_the_file")
 def test_the_battery_runs_on_dask_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
     rows = tmp_path / "rows.ndjson"
     command = ["blind", "--sets", "1", "--only", "mesh,clean", "--most", "3", "--workers", "1"]

@@ -203,7 +203,7 @@ def cap(radius, wide, side):
     return Surface(np.vstack([low, high]), np.vstack([faces, walls, faces[:, ::-1] + m]))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/fem/test_obstacle.py::test_hertz_ball_on_a_half_space")
 def test_hertz_by_a_ball_of_triangles():
     """Facets a tenth of the contact's radius wide press as the ball itself does."""
     radius, approach = 10.0, 0.1

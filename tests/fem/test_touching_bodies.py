@@ -123,7 +123,7 @@ def _other_hand(tets):
     return tets[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/fem/test_obstacle.py::test_hertz_elastic_ball_on_a_plane")
 def test_a_round_body_on_a_flat_one_presses_as_hertz_says():
     """Both elastic, meshes that do not match: force and radius of the contact (Johnson, 1985, section 4.2).
 

@@ -102,6 +102,9 @@ def test_weight_is_that_of_the_resin_and_lost_to_no_tie(mesh):
     assert not reactions[mesh.tied].any()
 
 
+@pytest.mark.nightly(
+    "tests/placement/test_resolved_influence.py::test_a_whole_unit_gives_the_map_of_its_half"
+)
 def test_a_half_bends_as_the_whole_does(mesh):
     half = Equilibrium(Model(mesh), materials_of(SMALL, mesh), explains=False)
     state = half.reach(0.002, [half.at_zero_pressure()])

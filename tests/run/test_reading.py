@@ -176,7 +176,18 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("name", LONG)
+AT_NIGHT = pytest.mark.nightly("test_a_table_of_too_many_rows_is_refused")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "protocol",
+        "pixels",
+        pytest.param("pressure", marks=AT_NIGHT),
+        pytest.param("measured", marks=AT_NIGHT),
+    ],
+)
 def test_a_table_of_too_many_rows_is_refused(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -272,6 +272,7 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
     assert again.texts() == jobs[1].texts()
 
 
+@pytest.mark.nightly("test_a_diagnosis_goes_on_with_what_it_knew")
 def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic_unit):
     first, _ = run(bent_unit(tmp_path / "first", RELAXES), tmp_path / "one", load_preset("mu-1.0x"))
     assert [c["effect"] for c in first.summary["causes"]] == ["viscoelasticity"]

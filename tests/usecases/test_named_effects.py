@@ -454,6 +454,7 @@ def test_a_wall_that_relaxes_creeps_on_and_comes_back(tmp_path):
     np.testing.assert_allclose(shown["pressure_kPa"], rows["pressure_kPa"])
 
 
+@pytest.mark.nightly("test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect")
 def test_place_goes_on_where_the_unit_relaxes(tmp_path):
     with run_to_end(Progress()) as context:
         run_stages(Study(in_time("viscoelasticity"), tmp_path, context))

@@ -78,6 +78,7 @@ def test_pictures_show_what_stands_behind_the_cut():
     assert part.vertices[:, 0].max() == 0
 
 
+@pytest.mark.nightly("test_a_unit_that_meets_a_wall")
 def test_paths_are_ranked_beside_a_wall(files, capsys):
     """Each along its whole motion: another answer than that of the free unit, which shortcuts find."""
     line = ["place", "--unit", files / "unit.toml", "--protocol", files / "up.csv", "--times", 5]

@@ -69,6 +69,7 @@ def test_a_hole_is_a_second_way_out_of_a_part_that_nobody_knows():
     assert off(found["leaks"], APEX) < 1.0
 
 
+@pytest.mark.nightly("test_a_thin_wall")
 def test_a_wall_drawn_at_the_limit_is_not_refused_for_its_facets():
     """Drawn as thick as the limit it is thick enough; a little thinner, and as an STL alone, it is not."""
     unit, solid = parts.small_unit(), parts.small_solid()
