@@ -22,10 +22,8 @@ from mu_addon.usecases.simulate_and_place.motion import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 
-UNIT = load_preset("mu-1.0x")
 JOB = Job(
-    # Four chambers: as many stages as six have, and three paths in place of ten.
-    unit=attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4)),
+    unit=load_preset("mu-1.0x"),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
     mesh=MeshSettings(refine=0.4, order=1),
     times=3,
