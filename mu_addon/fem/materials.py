@@ -50,6 +50,12 @@ class Layer:
             raise InputError(f"{self.law.name}: an element is listed twice in one layer")
         self.law.valid(self.parameters)
 
+    def of(self, kept: Array) -> Layer:
+        """The layer in those of its elements that are kept, (k,) bool."""
+        return self if kept.all() else Layer(
+            self.law, self.elements[kept], self.parameters[kept], self.weight[kept]
+        )
+
     def kept(self, rows: Array, weight: Array) -> Layer:
         """The rows numbered `rows` (r,) of this layer, with new weights (r,) from 0 to 1."""
         return Layer(self.law, self.elements[rows], self.parameters[rows], weight)

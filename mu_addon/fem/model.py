@@ -16,6 +16,8 @@ from scipy import sparse
 from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import kernels
+from .beams import Beams, frames_along, sections_of
+from .carried import Carried
 from .conjugate_gradients import ConjugateGradients
 from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
@@ -65,11 +67,12 @@ class MaterialData:
     """A body's materials on the device, layer by layer, with their history.
 
     dt_s is the step's length. least_force_N: root sum of squares of the element forces of a body strained
-    by LEAST_STRAIN, roughly; below it forces drown in the rounding of stresses.
+    by LEAST_STRAIN, roughly; below it forces drown in the rounding of stresses. beams: of a mesh with some.
     """
 
     layers: tuple[LayerData, ...]
     least_force_N: float = 0.0
+    beams: Beams | None = None
     dt_s: float = 0.0
 
     @property
@@ -141,7 +144,7 @@ class Model:
         self.load: Array | None = None
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
-        self._least_force = 0.0
+        self._least_force = self._beam_forces = 0.0
         self.reference = Reference(mesh, device)
         # Now, since it raises MeshingError.
         _ = self.reference.at
@@ -157,7 +160,9 @@ class Model:
             put(weight, wp.float64),
         )
         self._energy = wp.empty(m, dtype=wp.float64, device=device)
-        self._smallest_J = wp.empty(m, dtype=wp.float64, device=device)
+        # Elements of beams have neither.
+        self._energy.zero_()
+        self._smallest_J = wp.full(m, 1.0, dtype=wp.float64, device=device)
         means = m if self._takes_means else 0
         self._mean_J = wp.empty(means, dtype=wp.float64, device=device)
         self._mean_slope = wp.empty((means, k), dtype=wp.vec3d, device=device)
@@ -177,6 +182,7 @@ class Model:
         for axis in mesh.symmetry:
             fixed[mesh.symmetry_nodes(axis), AXES.index(axis)] = True
         fixed[mesh.tied] = True
+        self._hold_beams(fixed)
         self.free = np.nonzero(~fixed.ravel())[0]
         self._build_pattern(fixed)
 
@@ -205,19 +211,26 @@ class Model:
             ends.append(np.stack([cells[:, a].ravel(), cells[:, b].ravel()], axis=1))
         self._element_blocks = len(ends[0])
         pairs = np.vstack(ends)
+        # What beams stand for has no stiffness of its own.
+        resists = np.repeat(mesh.solid, ends[0].shape[0] // max(len(mesh.tets), 1))
+        acting = np.flatnonzero(np.append(resists, np.ones(len(ends[1]), bool)))
+        parts = len(pairs)
+        pairs = pairs[acting]
         # Parts hold block (a, b); the lower triangle wants row >= column.
         flipped = pairs[:, 0] < pairs[:, 1]
         rows, columns = pairs.max(axis=1).astype(np.int64), pairs.min(axis=1).astype(np.int64)
         keys, target = np.unique(columns * n + rows, return_inverse=True)
         start, index = _lists(target, len(keys))
-        index = np.where(flipped[index], -index - 1, index).astype(np.int32)
+        index = np.where(flipped[index], -acting[index] - 1, acting[index]).astype(np.int32)
         self._block_lists = self._put(start, int), self._put(index, int)
-        self._block_parts = wp.zeros(len(pairs), dtype=mat33, device=self.device)
+        self._block_parts = wp.zeros(parts, dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         self._block_keys = keys
         self._folding = None
         if len(mesh.tied):
             self._folding, keys = folded_blocks(mesh, keys)
+        if len(mesh.beams):
+            keys = self._with_beam_blocks(keys)
         block_rows, block_columns = keys % n, keys // n
 
         self._number = number = np.full(3 * n, -1)
@@ -232,6 +245,77 @@ class Model:
         # Where the body's own entries are in a pattern that has grown by those of self-contact.
         self._own: Any = slice(None)
         self.pattern = self._own_pattern = Pattern.of(row[sorting], column[sorting], self.free)
+
+    def _hold_beams(self, fixed: Array) -> None:
+        """Fix what beams leave without stiffness of its own, and how rotation vectors are supported."""
+        mesh = self.mesh
+        self._carried = Carried(mesh) if len(mesh.beams) else None
+        if self._carried is None:
+            return
+        moved = np.concatenate([mesh.tets[mesh.solid].ravel(), mesh.cavity.ravel(), mesh.beams.ravel()])
+        idle = np.ones(len(mesh.nodes), bool)
+        idle[moved] = False
+        turns = np.unique(mesh.beams[:, 1::2])
+        clamped = fixed[turns].all(axis=1)
+        for axis in mesh.symmetry:
+            column = AXES.index(axis)
+            on = mesh.nodes[turns, column] == 0.0
+            # On a mirror plane a section turns about the plane's normal alone.
+            fixed[turns[on]] = True
+            fixed[turns[on], column] = False
+        fixed[turns[clamped]] = True
+        fixed[idle] = True
+        fixed[mesh.carried] = True
+
+    def _with_beam_blocks(self, own: Array) -> Array:
+        """Keys of the tangent's blocks, those of beams and of what they carry included; own (b,): without."""
+        mesh, n = self.mesh, len(self.mesh.nodes)
+        assert self._carried is not None
+        is_carried = np.zeros(n, bool)
+        is_carried[mesh.carried] = True
+        rows, columns = own % n, own // n
+        self._carrying = np.flatnonzero(is_carried[rows] | is_carried[columns])
+        self._carried_blocks = self._carried.pairs(rows[self._carrying], columns[self._carrying])
+        ends = mesh.beams
+        a, b = np.tril_indices(4)
+        first, second = ends[:, a].ravel().astype(np.int64), ends[:, b].ravel().astype(np.int64)
+        self._beam_turned = first < second
+        of_beams = np.minimum(first, second) * n + np.maximum(first, second)
+        f = self._carried_blocks
+        of_carried = f.column.astype(np.int64) * n + f.row
+        of_turns = np.unique(mesh.carriers[:, 1::2]).astype(np.int64) * (n + 1)
+        keys = np.unique(np.concatenate([own, of_beams, of_carried, of_turns]))
+        self._beam_places = tuple(np.searchsorted(keys, k) for k in (own, of_beams, of_carried))
+        self._all_keys = keys
+        self._three = (3 * ends[:, :, None].astype(np.int64) + np.arange(3)).reshape(-1, 12)
+        return keys
+
+    def following(self, u: Array) -> Array:
+        """Displacements u (n, 3) in mm with those of tied and carried nodes set to what they follow, in place."""
+        if self._carried is not None:
+            self._carried.follow(u)
+        return self.mesh.following(u)
+
+    def _unknowns_of_beams(self, u: Array) -> Array:
+        return np.asarray(u.ravel()[self._three])
+
+    def _beam_tangent(self, u: Array, pressure: float, m: MaterialData, own: Array) -> Array:
+        """Blocks of the tangent, those of beams and of what they carry added to its own (b, 3, 3)."""
+        assert m.beams is not None
+        assert self._carried is not None
+        found = np.zeros((len(self._all_keys), 3, 3))
+        of_own, of_beams, of_carried = self._beam_places
+        found[of_own] = own
+        stiffness = m.beams.stiffness(self._unknowns_of_beams(u)).reshape(-1, 4, 3, 4, 3)
+        a, b = np.tril_indices(4)
+        blocks = stiffness[:, a, :, b].transpose(1, 0, 2, 3).reshape(-1, 3, 3)
+        blocks = np.where(self._beam_turned[:, None, None], blocks.transpose(0, 2, 1), blocks)
+        np.add.at(found, of_beams, blocks)
+        folded = self._carried_blocks(own[self._carrying], self._carried.operators(u))
+        np.add.at(found, of_carried, folded)
+        turning, turns = self._carried.turning(u, self._forces(u, pressure, m))
+        np.add.at(found, np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)), turning)
+        return found
 
     @cached_property
     def factor(self) -> Cholesky | SuperLU | ConjugateGradients | TwoLevel:
@@ -257,7 +341,11 @@ class Model:
         stiffness = np.zeros(len(self.mesh.tets))
         points = self._dV.shape[1]
         layers = []
-        for layer in materials.layers:
+        young, poisson = np.zeros(len(covered)), np.zeros(len(covered))
+        if len(self.mesh.beams):
+            young, poisson = materials.small_strain(len(covered))
+        solid = self.mesh.solid
+        for layer in (one.of(solid[one.elements]) for one in materials.layers):
             law, k = layer.law, len(layer.elements)
             if self.mean_dilatation and not law.split_volume:
                 raise InputError(
@@ -278,7 +366,7 @@ class Model:
             )
             covered[layer.elements] = 1
             stiffness[layer.elements] += layer.weight * law.small_strain(layer.parameters).sum(axis=1)
-        bare = np.flatnonzero(covered == 0)
+        bare = np.flatnonzero((covered == 0) & solid)
         if len(bare):
             place = self.mesh.nodes[self.mesh.corners[bare[0]]].mean(axis=0).round(2)
             raise InputError(
@@ -287,7 +375,21 @@ class Model:
                 "add a layer that covers them",
             )
         least = LEAST_STRAIN * np.linalg.norm(stiffness * self.volumes ** (2 / 3))
-        return MaterialData(tuple(layers), float(least))
+        return MaterialData(tuple(layers), float(least), self._beams(young, poisson))
+
+    def _beams(self, modulus_MPa: Array, poisson: Array) -> Beams | None:
+        """Beams of the mesh, of the mean modulus and Poisson's ratio (m,) of their elements, or None."""
+        mesh = self.mesh
+        if not len(mesh.beams):
+            return None
+        count = len(mesh.beams)
+        part = np.flatnonzero(~mesh.solid)
+        of, weight = mesh.beam_of[part], self.volumes[part]
+        total = np.bincount(of, weight, count)
+        E, nu = (np.bincount(of, weight * a[part], count) / total for a in (modulus_MPa, poisson))
+        chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
+        sections = sections_of(np.linalg.norm(chord, axis=1), mesh.flexible, E, nu)
+        return Beams(chord, frames_along(chord), sections)
 
     def _mean_kappa(self, layer: Layer) -> Array:
         """Bulk modulus (k,) in MPa of a layer that acts on the mean J, 0 where it acts point by point."""
@@ -369,7 +471,7 @@ class Model:
         """
         found = u.copy()
         found.ravel()[self.free] += step
-        return self.mesh.following(found)
+        return self.following(found)
 
     def before_touch(self, u: Array, to: Array) -> Array:
         """Displacements `to`, (n, 3) in mm, or before them on the straight way from u where surfaces meet.
@@ -379,7 +481,7 @@ class Model:
         if self.self_contact is None:
             return to
         share = self.self_contact.free_share(u, to)
-        return to if share == 1.0 else u + share * (to - u)
+        return to if share == 1.0 else self.following(u + share * (to - u))
 
     def _place(self, u: Array) -> None:
         self._u.assign(np.ascontiguousarray(u))
@@ -400,6 +502,8 @@ class Model:
         work -= sum(obstacle.energy_mJ(u) for obstacle in self.obstacles)
         if self.self_contact is not None:
             work -= self.self_contact.energy_mJ(u)
+        if m.beams is not None:
+            work -= float(m.beams.energy_mJ(self._unknowns_of_beams(u)).sum())
         return float(self._energy.numpy().sum() - work)
 
     def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
@@ -433,6 +537,17 @@ class Model:
 
         Rows of supported unknowns hold the reactions.
         """
+        found = self._forces(u, pressure, m)
+        if self._carried is not None:
+            self._carried.fold(u, found)
+            assert m.beams is not None
+            forces = m.beams.forces(self._unknowns_of_beams(u))
+            found += np.bincount(self._three.ravel(), forces.ravel(), found.size).reshape(-1, 3)
+            self._beam_forces = float(np.einsum("ij,ij->", forces, forces))
+        return self.mesh.folded(found)
+
+    def _forces(self, u: Array, pressure: float, m: MaterialData) -> Array:
+        """Internal minus external forces (n, 3) in N of solids and contact, on tied and carried nodes, too."""
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
@@ -449,7 +564,7 @@ class Model:
             residual[nodes] += forces
         if self.load is not None:
             residual -= self.load
-        return self.mesh.folded(residual)
+        return residual
 
     def force_scale(self) -> float:
         """Root sum of squares of all element and face forces of the last residual, in N.
@@ -457,7 +572,7 @@ class Model:
         Never below the materials' `least_force_N`, so that a body without load can be in equilibrium.
         """
         parts = self._parts.numpy()
-        return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts))), self._least_force)
+        return max(float(np.sqrt(np.einsum("ij,ij->", parts, parts) + self._beam_forces)), self._least_force)
 
     def tangent(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
         """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
@@ -472,7 +587,10 @@ class Model:
             inputs = [part_MPa, self._x, faces, *self._face_rule]
             inputs += [self._element_blocks + first * per_face, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
-        values = self._gathered(u)
+        blocks = self._gathered(u)
+        if self._carried is not None:
+            blocks = self._beam_tangent(u, pressure, m, blocks)
+        values = np.asarray(blocks.ravel()[self._scalar_map])
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
@@ -484,11 +602,11 @@ class Model:
         contact = self.self_contact
         if contact is None:
             return found
-        h = contact.stiffness(u, convex)
+        h = self._uncarried(contact.stiffness(u, convex), u)
         rows, columns, values = self._lower(h.row, h.col, h.data)
         places, has = self.pattern.places(rows, columns)
         if not has.all():
-            more = self._lower(*contact.room(u))
+            more = self._lower(*self._room(u))
             wanted = np.concatenate([rows, more[0]]), np.concatenate([columns, more[1]])
             if len(self.pattern.indices) > MOST_GROWTH * len(own):
                 self.forget_contact()
@@ -500,6 +618,27 @@ class Model:
             found[self._own] = own
         np.add.at(found, places, values)
         return found
+
+    def _uncarried(self, stiffness: sparse.coo_matrix, u: Array) -> sparse.coo_matrix:
+        """A stiffness (3 n, 3 n) between all nodes as one between those that are not carried, at u (n, 3)."""
+        if self._carried is None:
+            return stiffness
+        nodes = np.unique(stiffness.row // 3)
+        place = np.full(len(self.mesh.nodes), -1)
+        place[nodes] = np.arange(len(nodes))
+        rows, columns = (3 * place[side // 3] + side % 3 for side in (stiffness.row, stiffness.col))
+        own = sparse.csr_matrix((stiffness.data, (rows, columns)), shape=(3 * len(nodes),) * 2)
+        to = self._carried.map(u, nodes)
+        return sparse.coo_matrix(to.T @ own @ to)
+
+    def _room(self, u: Array) -> tuple[Array, Array]:
+        """Entries that self-contact may come to fill, between nodes that are not carried."""
+        assert self.self_contact is not None
+        rows, columns = self.self_contact.room(u)
+        if self._carried is None:
+            return rows, columns
+        found = self._uncarried(sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(3 * len(self.mesh.nodes),) * 2), u)
+        return found.row, found.col
 
     def forget_contact(self) -> None:
         """Go back to the body's own pattern, without what self-contact has added: factors take less time."""
@@ -514,7 +653,7 @@ class Model:
         return rows[keep], columns[keep], np.zeros(0) if values is None else values[keep]
 
     def _gathered(self, u: Array) -> Array:
-        """The tangent's values (nnz,) of the blocks' parts, and of contact with obstacles."""
+        """The tangent's blocks (b, 3, 3) of their parts, and of contact with obstacles."""
         inputs = [self._block_parts, *self._block_lists, self._blocks]
         self._launch(kernels.gather_blocks, len(self._blocks), inputs)
         blocks: Array = self._blocks.numpy()
@@ -525,7 +664,7 @@ class Model:
             np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
         if self._folding is not None:
             blocks = self._folding(blocks)
-        return np.asarray(blocks.ravel()[self._scalar_map])
+        return blocks
 
     def matrix(self, values: Array) -> sparse.csc_matrix:
         """The whole symmetric tangent (f, f) between the f free unknowns.

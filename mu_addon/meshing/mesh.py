@@ -49,6 +49,13 @@ class Mesh:
     A mesh of parts that overlap has two tables more, else empty. filled (m, q): the share, 0 to 1, of the
     volume at each of an element's q quadrature points that counts. tied (t,), tied_to (t, k), tied_weights
     (t, k): nodes that move as the weighted sum of others, which are not tied themselves.
+
+    Where struts are beams (`fem.beams`) it has more, else empty. beams (e, 4): of either end the node on the
+    strut's axis, and a node without elements whose displacement is that end's rotation vector; flexible
+    (e, 6): integrals over their sections, see `fem.beams.sections_of`; beam_of (m,): the beam that an element
+    is part of, which then resists nothing by itself, or -1. carried (c,), carriers (c, 4), shares (c,): nodes
+    that move with the sections at two beam nodes, each given as in `beams`: the share of the first counts,
+    and the rest of the second.
     """
 
     nodes: Array = attrs.field(converter=_float64)
@@ -62,11 +69,22 @@ class Mesh:
     tied: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
     tied_to: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_int32)
     tied_weights: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
+    beams: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=_int32)
+    flexible: Array = attrs.field(factory=lambda: np.zeros((0, 6)), converter=_float64)
+    beam_of: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
+    carried: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
+    carriers: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=_int32)
+    shares: Array = attrs.field(factory=lambda: np.zeros(0), converter=_float64)
 
     @property
     def resolved(self) -> bool:
         """Whether the mesh is of a printed body, strut by strut, in parts that overlap."""
         return self.filled.size > 0
+
+    @property
+    def solid(self) -> Array:
+        """Whether each element (m,) resists by itself, and is not part of a beam."""
+        return np.ones(len(self.tets), bool) if len(self.beam_of) == 0 else self.beam_of < 0
 
     def following(self, u: Array) -> Array:
         """Displacements u (n, ...) in mm with those of tied nodes set to what they follow, in place."""
@@ -111,6 +129,8 @@ class Mesh:
         parts = [self.nodes, self.tets, self.region, self.cavity, self.base, self.tip]
         if self.resolved:
             parts += [self.filled, self.tied, self.tied_to, self.tied_weights]
+        if len(self.beams):
+            parts += [self.beams, self.flexible, self.beam_of, self.carried, self.carriers, self.shares]
         for array in parts:
             digest.update(repr((array.shape, array.dtype.str)).encode())
             digest.update(array.tobytes())

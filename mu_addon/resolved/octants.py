@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import attrs
 import numpy as np
 
@@ -65,6 +67,14 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
     return SweptNodes(attrs.evolve(lattice, factors=None), nodes).of(lattice)
 
 
+class Places(NamedTuple):
+    """Nodes (p,) and struts (p,) that they belong to, and where in these they lie, as `strut.placed` has it."""
+
+    node: Array
+    strut: Array
+    at: Array
+
+
 class SweptNodes:
     """Nodes (n, 3) in mm of the struts of a lattice of half diagonals, to be swept again with other radii.
 
@@ -85,6 +95,18 @@ class SweptNodes:
         law = self._law(lattice, np.arange(len(self._node)))
         self._places = places_of(half, law, (nodes[self._node] - corner) * self._sign)
         self._ends = ends(half, law, self._places[:, :2])
+
+    @property
+    def places(self) -> Places:
+        """Where each node lies in its strut."""
+        return Places(self._node, self._strut, self._places)
+
+    def strut_of(self, points: Array) -> Array:
+        """The strut (p,) in whose octant each of some points (p, 3) in mm lies; none of them between two."""
+        found = np.full(len(points), -1)
+        point, strut = _octants_of(self._lattice, points)
+        found[point] = strut
+        return found
 
     def of(self, other: Lattice) -> Array:
         """The nodes (n, 3) in mm of struts of other radii or factors, in as many cells; those given where

@@ -20,9 +20,13 @@ from ..meshing.morph import WallGrid
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.unit import mesh_unit
+from .beams import with_beams
 from .lattice import LEAST_SUPPORT, clearance, struts, support
+from .strut import is_half_diagonal
 
 Progress = Callable[[str, float], None]
+
+REACH = 0.75
 
 TIE_MM = 0.1
 """Struts' nodes this near the wall outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
@@ -81,6 +85,7 @@ def mesh_printed(
     cache: Path | None = None,
     body: Body | None = None,
     sizes: Sizes | None = None,
+    beams: bool = True,
 ) -> Mesh:
     """The printed unit as quadratic tetrahedra: wall and caps, and struts whose nodes in the wall follow it.
 
@@ -109,8 +114,12 @@ def mesh_printed(
     lattice = struts(d, sizes.rings, sizes.layers, full, cache, body)
     report("ties", 0.5)
     near = TIE_MM * d.cell / CELL_MM / s.refine
-    mesh = tied(wall, lattice, clearance(d, lattice.nodes) - near)
+    clear = clearance(d, lattice.nodes)
+    mesh = tied(wall, lattice, clear - near)
     check_positive(mesh)
+    if beams and is_half_diagonal(d):
+        reach = REACH * d.junction_diameter
+        mesh = with_beams(mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach)
     report("mesh", 1.0)
     return mesh
 

@@ -1,0 +1,155 @@
+"""Nodes that move with the sections of beams: where they are, and what acts on them acts on the beams."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from scipy import sparse
+
+from .beams import rotations, turned_curvature, turned_slopes
+
+if TYPE_CHECKING:
+    from ..meshing.mesh import Mesh
+
+Array = np.ndarray[Any, Any]
+
+
+class Carried:
+    """The carried nodes of a mesh with beams (`Mesh.carried`).
+
+    A node at X moves by the mean, weighted by its two shares, of what the sections at two beam nodes would
+    do to it: u + (R - 1)(X - X_b), with displacement u and rotation R of the beam node at X_b.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        node, turn = mesh.carriers[:, 0::2], mesh.carriers[:, 1::2]
+        shares = np.stack([mesh.shares, 1 - mesh.shares], axis=1)
+        # One row for each pair of a node and what carries it.
+        own, side = np.nonzero(shares)
+        self.count = len(mesh.nodes)
+        self.nodes = mesh.carried
+        self._own, self._node, self._turn = own, node[own, side], turn[own, side]
+        self._share = shares[own, side]
+        self._arm = mesh.nodes[mesh.carried[own]] - mesh.nodes[self._node]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def follow(self, u: Array) -> Array:
+        """Displacements u (n, 3) in mm with those of carried nodes set, in place."""
+        moved = np.einsum("kij,kj->ki", rotations(u[self._turn]), self._arm) - self._arm + u[self._node]
+        for axis in range(3):
+            u[self.nodes, axis] = np.bincount(self._own, self._share * moved[:, axis], len(self.nodes))
+        return u
+
+    def slopes(self, u: Array) -> Array:
+        """Slopes (k, 3, 3) of each carried node's displacement by a rotation vector, its share included."""
+        return self._share[:, None, None] * turned_slopes(u[self._turn], self._arm)
+
+    def fold(self, u: Array, forces: Array) -> Array:
+        """Forces (n, 3) in N with those on carried nodes passed on to beams, in place; couples in N mm."""
+        acting = forces[self.nodes[self._own]]
+        np.add.at(forces, self._node, self._share[:, None] * acting)
+        np.add.at(forces, self._turn, np.einsum("kji,kj->ki", self.slopes(u), acting))
+        forces[self.nodes] = 0.0
+        return forces
+
+    def turning(self, u: Array, forces: Array) -> tuple[Array, Array]:
+        """Stiffness (b, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
+
+        And the nodes (b,) that hold them: what forces that keep their direction do as their arms turn.
+        """
+        acting = self._share[:, None] * forces[self.nodes[self._own]]
+        blocks = turned_curvature(u[self._turn], self._arm, acting)
+        turns, of = np.unique(self._turn, return_inverse=True)
+        found = np.zeros((len(turns), 3, 3))
+        np.add.at(found, of, blocks)
+        return found, turns
+
+    def pairs(self, rows: Array, columns: Array) -> Folding:
+        """How 3 x 3 blocks between nodes, rows (b,) >= columns (b,), act between beam nodes; see `Folding`."""
+        return Folding.of(self, rows, columns)
+
+    def operators(self, u: Array) -> Array:
+        """By what each node's displacement changes, (1 + 2 k, 3, 3): with itself; with what carries it.
+
+        The k shares come first, then the k slopes by rotation vectors.
+        """
+        same = np.eye(3)[None]
+        return np.concatenate([same, self._share[:, None, None] * same, self.slopes(u)])
+
+    def parts_of(self, nodes: Array) -> tuple[Array, Array, Array]:
+        """What moves some nodes (j,), each once or more: its number among them, the mover, its operator."""
+        k = len(self._own)
+        place = np.full(self.count, -1)
+        place[self.nodes] = np.arange(len(self.nodes))
+        at = place[nodes]
+        start = np.searchsorted(self._own, np.arange(len(self.nodes) + 1))
+        free = np.flatnonzero(at < 0)
+        held = np.flatnonzero(at >= 0)
+        many = (start[1:] - start[:-1])[at[held]]
+        which = np.repeat(held, many)
+        row = np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many) + np.repeat(start[at[held]], many)
+        number = np.concatenate([free, which, which])
+        mover = np.concatenate([nodes[free], self._node[row], self._turn[row]])
+        operator = np.concatenate([np.zeros(len(free), int), 1 + row, 1 + k + row])
+        order = np.argsort(number, kind="stable")
+        return number[order], mover[order], operator[order]
+
+    def map(self, u: Array, nodes: Array) -> sparse.csr_matrix:
+        """How displacements (3 j,) of some nodes (j,) change with those of all that are not carried, (3 n,)."""
+        number, mover, operator = self.parts_of(nodes)
+        axes = np.arange(3)
+        rows = np.repeat(3 * number[:, None] + axes, 3, axis=1).ravel()
+        columns = np.tile(3 * mover[:, None].astype(np.int64) + axes, 3).ravel()
+        values = self.operators(u)[operator].ravel()
+        return sparse.csr_matrix((values, (rows, columns)), shape=(3 * len(nodes), 3 * self.count))
+
+
+@attrs.frozen(eq=False)
+class Folding:
+    """Where blocks with a carried node on either side act: in which pairs of nodes, and how.
+
+    block (e,): which of the given; left, right (e,): operators of its row and column, see
+    `Carried.operators`; row, column (e,): nodes of the lower triangle, and turned (e,), whether the block
+    falls there transposed; both (e,): whether its own transpose falls there, too.
+    """
+
+    block: Array
+    left: Array
+    right: Array
+    row: Array
+    column: Array
+    turned: Array
+    both: Array
+
+    @classmethod
+    def of(cls, carried: Carried, rows: Array, columns: Array) -> Folding:
+        """See `Carried.pairs`."""
+        nodes, number = np.unique(np.concatenate([rows, columns]), return_inverse=True)
+        at, mover, operator = carried.parts_of(nodes)
+        start = np.searchsorted(at, np.arange(len(nodes) + 1))
+        first, second = number[: len(rows)], number[len(rows) :]
+        many = np.diff(start)
+        each = many[first] * many[second]
+        block = np.repeat(np.arange(len(rows)), each)
+        place = np.arange(len(block)) - np.repeat(np.cumsum(each) - each, each)
+        i = start[first][block] + place // many[second][block]
+        j = start[second][block] + place % many[second][block]
+        p, q, same = mover[i], mover[j], (rows == columns)[block]
+        # A block on the diagonal holds both halves of what it gives: the upper one is not needed.
+        keep = ~same | (p >= q)
+        block, i, j, p, q, same = (a[keep] for a in (block, i, j, p, q, same))
+        turned = p < q
+        return cls(
+            block, operator[i], operator[j], np.maximum(p, q), np.minimum(p, q), turned, (p == q) & ~same
+        )
+
+    def __call__(self, blocks: Array, operators: Array) -> Array:
+        """The blocks (e, 3, 3) that some blocks (b, 3, 3) give in the lower triangle."""
+        found = operators[self.left].transpose(0, 2, 1) @ blocks[self.block] @ operators[self.right]
+        other = found.transpose(0, 2, 1)
+        found = np.where(self.turned[:, None, None], other, found)
+        return np.asarray(found + np.where(self.both[:, None, None], other, 0.0))

@@ -1,0 +1,179 @@
+"""Struts of a resolved mesh as beams, wherever they are whole: away from wall, waveguide and cuts.
+
+A strut's mesh is swept in layers from its cell's corner to its centre. Where a layer and the one beside it lie
+clear of all that struts stand on, it becomes one beam of `fem.beams`, whose sections carry the layer's nodes.
+Feet, cut struts and joints of any of these stay solid, so that what struts do to the wall is as it was.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..design.dimensions import Dimensions
+from ..design.lattice import Lattice, lattice_of
+from ..meshing.mesh import LATTICE, Mesh
+from .joints import Zones, zones_of
+from .octants import SweptNodes
+
+Array = np.ndarray[Any, Any]
+
+_WHOLE = 1.0 - 1e-9
+_GAUSS = np.polynomial.legendre.leggauss(6)
+# Pieces of a layer that the flexibility is integrated over.
+_PIECES = 8
+
+
+def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: float) -> Mesh:
+    """A resolved mesh of swept struts with beams in place of the layers that are whole and out of reach.
+
+    layers: of a strut's mesh, as in `strut_mesh`; clear (n,): distance of the nodes in mm from what struts
+    stand on, of which the struts' count; reach_mm: below which a layer stays solid. Rotation vectors are
+    nodes added at the end.
+    """
+    lattice = lattice_of(d)
+    parts = _Layers(mesh, lattice, layers)
+    whole = parts.whole(mesh, clear, reach_mm)
+    return parts.replaced(mesh, whole, zones_of(d))
+
+
+class _Layers:
+    """The layers of the struts in a resolved mesh.
+
+    elements (k,): those of struts; strut, layer (k,): of each. Of each pair of a node and a strut that it
+    belongs to: node, its strut, twice its level in layers, and whether it lies on the axis.
+    """
+
+    def __init__(self, mesh: Mesh, lattice: Lattice, layers: int) -> None:
+        self.lattice, self.count = lattice, layers
+        self.elements = np.flatnonzero(mesh.region == LATTICE)
+        rows = np.unique(mesh.tets[self.elements])
+        swept = SweptNodes(lattice, mesh.nodes[rows])
+        middles = mesh.nodes[mesh.tets[self.elements, :4]].mean(axis=1)
+        self.strut = swept.strut_of(middles)
+        pairs = swept.places
+        keep = np.isin(pairs.strut, self.strut)
+        self.node, self.node_strut = rows[pairs.node[keep]], pairs.strut[keep]
+        self.level = np.rint(2 * layers * pairs.at[keep, 2]).astype(int)
+        self.on_axis = (np.abs(pairs.at[keep, :2]) < 1e-6).all(axis=1)
+        self._key = np.argsort(self.node_strut.astype(np.int64) * len(mesh.nodes) + self.node)
+        wanted = self.strut.astype(np.int64)[:, None] * len(mesh.nodes) + mesh.tets[self.elements]
+        ordered = (self.node_strut.astype(np.int64) * len(mesh.nodes) + self.node)[self._key]
+        at = self._key[np.searchsorted(ordered, wanted)]
+        self.layer = self.level[at].min(axis=1) // 2
+        self.of_element = at
+
+    def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
+        """Whether each layer of each strut (struts, layers) can be a beam."""
+        shape = len(self.lattice.struts), self.count
+        tied = np.zeros(len(mesh.nodes), bool)
+        tied[mesh.tied] = True
+        nodes = mesh.tets[self.elements]
+        bad = (mesh.filled[self.elements] < _WHOLE).any(axis=1) | tied[nodes].any(axis=1)
+        bad |= (clear[nodes] < reach_mm).any(axis=1)
+        there = np.zeros(shape, int)
+        np.add.at(there, (self.strut, self.layer), 1)
+        spoilt = np.zeros(shape, int)
+        np.add.at(spoilt, (self.strut, self.layer), bad)
+        found = (there == there.max()) & (spoilt == 0)
+        # A joint is one of beams if all struts that are there are beams at it.
+        ends = self._ends()
+        present = (there > 0).any(axis=1)
+        free = np.ones(len(self.lattice.nodes), bool)
+        for end, layer in ((0, 0), (1, self.count - 1)):
+            free[ends[present & ~found[:, layer], end]] = False
+        for end, layer in ((0, 0), (1, self.count - 1)):
+            found[~free[ends[:, end]], layer] = False
+        return np.asarray(found)
+
+    def _ends(self) -> Array:
+        """Joints (s, 2) of the struts, the cell's corner first."""
+        struts = self.lattice.struts
+        return np.where(self.lattice.is_corner[struts[:, 0]][:, None], struts, struts[:, ::-1])
+
+    def replaced(self, mesh: Mesh, whole: Array, zones: Zones) -> Mesh:
+        """The mesh with beams in place of the whole layers (struts, layers)."""
+        count = self.count
+        beam = np.full(whole.shape, -1)
+        beam[whole] = np.arange(np.count_nonzero(whole))
+        strut, layer = np.nonzero(whole)
+        if not len(strut):
+            return mesh
+        beam_of = np.full(len(mesh.tets), -1)
+        beam_of[self.elements] = beam[self.strut, self.layer]
+        # Nodes of beams on the axes, by strut and level; those at joints belong to several struts.
+        axis = np.full((len(whole), count + 1), -1)
+        at = np.flatnonzero(self.on_axis & (self.level % 2 == 0))
+        axis[self.node_strut[at], self.level[at] // 2] = self.node[at]
+        first, second = axis[strut, layer], axis[strut, layer + 1]
+        own = np.unique(np.concatenate([first, second]))
+        turn = np.full(len(mesh.nodes), -1)
+        turn[own] = len(mesh.nodes) + np.arange(len(own))
+        beams = np.column_stack([first, turn[first], second, turn[second]])
+        carried = self._carried(mesh, whole, axis, turn)
+        base = np.concatenate([mesh.base, turn[np.intersect1d(mesh.base, own)]])
+        return attrs.evolve(
+            mesh,
+            nodes=np.vstack([mesh.nodes, mesh.nodes[own]]),
+            base=base,
+            beams=beams,
+            flexible=self._flexible(strut, layer, zones),
+            beam_of=beam_of,
+            carried=carried[0],
+            carriers=carried[1],
+            shares=carried[2],
+        )
+
+    def _carried(self, mesh: Mesh, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
+        """Carried nodes (c,), what carries them (c, 4) and the first one's shares (c,)."""
+        used = whole[self.strut, self.layer]
+        pairs = np.unique(self.of_element[used])
+        node, strut, level = self.node[pairs], self.node_strut[pairs], self.level[pairs]
+        _, once = np.unique(node, return_index=True)
+        node, strut, level = node[once], strut[once], level[once]
+        apart = turn[node] < 0
+        node, strut, level = node[apart], strut[apart], level[apart]
+        low, high = axis[strut, level // 2], axis[strut, (level + 1) // 2]
+        carriers = np.column_stack([low, turn[low], high, turn[high]])
+        return node, carriers, np.where(level % 2 == 0, 1.0, 0.5)
+
+    def _flexible(self, strut: Array, layer: Array, zones: Zones) -> Array:
+        """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`."""
+        lattice, ends = self.lattice, self._ends()[strut]
+        way = lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]
+        length = np.linalg.norm(way, axis=1)
+        start, stop = layer / self.count * length, (layer + 1) / self.count * length
+        middle = (start + stop) / 2
+        meeting = np.bincount(lattice.struts.ravel(), minlength=len(lattice.nodes))
+        junction = 2 * lattice.node_radii[ends]
+        flipped = lattice.struts[strut, 0] != ends[:, 0]
+        found = np.empty((len(strut), 6))
+        stretch, bend = zones.lengths(junction, meeting[ends])
+        for zone, columns in ((stretch, (0,)), (bend, (1, 2, 3, 4, 5))):
+            low = np.where(layer == 0, np.maximum(start, zone[:, 0]), start)
+            high = np.where(layer == self.count - 1, np.minimum(stop, length - zone[:, 1]), stop)
+            s, weight = _stations(low, high)
+            t = s / length[:, None]
+            radius = self._radii(strut, np.where(flipped[:, None], 1 - t, t))
+            area, inertia = np.pi * radius**2, np.pi * radius**4 / 4
+            off = s - middle[:, None]
+            integrands = (1 / area, 0.5 / inertia, 1 / inertia, off / inertia, off**2 / inertia, 1 / area)
+            for column in columns:
+                found[:, column] = (weight * integrands[column]).sum(axis=1)
+        return found
+
+    def _radii(self, strut: Array, t: Array) -> Array:
+        """Radii (e, q) in mm of struts (e,) at fractions (e, q) of the way from their own first node."""
+        return np.asarray(self.lattice.radii(t, strut))
+
+
+def _stations(low: Array, high: Array) -> tuple[Array, Array]:
+    """Places (e, q) between two ends (e,) each, and the weights (e, q) that integrate over them."""
+    x, w = _GAUSS
+    cuts = np.linspace(0.0, 1.0, _PIECES + 1)
+    half = 0.5 / _PIECES
+    at = (cuts[:-1, None] + half * (1 + x)).ravel()
+    span = (high - low)[:, None]
+    return low[:, None] + span * at, span * np.tile(w * half, _PIECES)
