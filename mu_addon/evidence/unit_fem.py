@@ -18,7 +18,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
-from ..meshing.settings import RESOLVED, MeshSettings, require_self_contact_resolvable
+from ..meshing.settings import HOMOGENISED, SOLID, MeshSettings, require_self_contact_resolvable
 from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
@@ -47,8 +47,8 @@ COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 # Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
 FINE = MeshSettings(meridian_mm=1.0)
 # A printed unit's struts need five layers each, and finer ones as much time again.
-STRUTS = MeshSettings(fidelity=RESOLVED)
-STRUTS_FINE = MeshSettings(fidelity=RESOLVED, refine=1.2)
+STRUTS = MeshSettings(fidelity=SOLID)
+STRUTS_FINE = MeshSettings(fidelity=SOLID, refine=1.2)
 # Share of the progress that walls take.
 CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
@@ -90,7 +90,7 @@ class UnitSettings:
     @classmethod
     def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
         """The settings by which a unit is simulated homogenised or resolved (`MeshSettings.fidelity`)."""
-        if fidelity == RESOLVED:
+        if fidelity != HOMOGENISED:
             return cls(mesh=STRUTS, finer=STRUTS_FINE, self_contact=self_contact)
         return cls(self_contact=self_contact)
 

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 
+def following(mesh: Mesh, u: Array) -> Array:
+    """Displacements u (n, 3) in mm with those of tied and carried nodes set to what they follow, in place."""
+    return mesh.following(Carried(mesh).follow(u) if len(mesh.carried) else u)
+
+
 class Carried:
     """The carried nodes of a mesh with beams (`Mesh.carried`).
 

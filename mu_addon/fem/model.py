@@ -257,9 +257,10 @@ class Model:
         idle[moved] = False
         turns = np.unique(mesh.beams[:, 1::2])
         clamped = fixed[turns].all(axis=1)
+        axes = mesh.beams[:, 0::2].ravel()[np.unique(mesh.beams[:, 1::2], return_index=True)[1]]
         for axis in mesh.symmetry:
             column = AXES.index(axis)
-            on = mesh.nodes[turns, column] == 0.0
+            on = mesh.nodes[axes, column] == 0.0
             # On a mirror plane a section turns about the plane's normal alone.
             fixed[turns[on]] = True
             fixed[turns[on], column] = False
@@ -296,7 +297,26 @@ class Model:
             self._carried.follow(u)
         return self.mesh.following(u)
 
+    def passed_on(self, u: Array, loads: Any) -> Any:
+        """Loads (3 n, c) on nodes passed on to what carries them about u (n, 3) in mm, and what ties them.
+
+        Of a sparse matrix, which must leave tied nodes out, comes another.
+        """
+        if self._carried is not None:
+            loads = self._carried.map(u, np.arange(len(u))).T @ loads
+        if sparse.issparse(loads):
+            return loads.tocsr()
+        return self.mesh.folded(loads.reshape(len(u), 3, -1)).reshape(loads.shape)
+
+    def passed_back(self, u: Array, changes: Array) -> Array:
+        """Changes (3 n, c) of displacements, of those of free nodes, with those of tied and carried ones."""
+        changes = self.mesh.following(changes.reshape(len(u), 3, -1)).reshape(changes.shape)
+        if self._carried is None:
+            return changes
+        return np.asarray(self._carried.map(u, np.arange(len(u))) @ changes)
+
     def _unknowns_of_beams(self, u: Array) -> Array:
+        """Unknowns (e, 12) of the beams' ends at u (n, 3)."""
         return np.asarray(u.ravel()[self._three])
 
     def _beam_tangent(self, u: Array, pressure: float, m: MaterialData, own: Array) -> Array:
@@ -591,9 +611,33 @@ class Model:
         if self._carried is not None:
             blocks = self._beam_tangent(u, pressure, m, blocks)
         values = np.asarray(blocks.ravel()[self._scalar_map])
+        if self._carried is not None and self.obstacles:
+            values = self._with_touched_beams(values, u)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
+
+    def _with_touched_beams(self, values: Array, u: Array) -> Array:
+        """The tangent's own values (nnz,) with contact of obstacles with faces of beams' elements."""
+        n = len(self.mesh.nodes)
+        three = np.arange(3)
+        for obstacle in self.obstacles:
+            pairs, added = obstacle.blocks(u)
+            keys = pairs.min(axis=1).astype(np.int64) * n + pairs.max(axis=1)
+            at = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
+            beside = self._block_keys[at] != keys
+            (a, b), blocks = pairs[beside].T.astype(np.int64), added[beside]
+            rows = np.repeat(3 * a[:, None] + three, 3, axis=1).ravel()
+            columns = np.tile(3 * b[:, None] + three, 3).ravel()
+            off = np.repeat(a != b, 9)
+            entries = [(rows, columns, blocks.ravel()), (columns[off], rows[off], blocks.ravel()[off])]
+            row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+            h = self._uncarried(sparse.coo_matrix((value, (row, column)), shape=(3 * n, 3 * n)), u)
+            row, column, value = self._lower(h.row, h.col, h.data)
+            places, has = self._own_pattern.places(row, column)
+            assert has.all()
+            np.add.at(values, places, value)
+        return values
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
         """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
@@ -659,9 +703,12 @@ class Model:
         blocks: Array = self._blocks.numpy()
         for obstacle in self.obstacles:
             pairs, added = obstacle.blocks(u)
-            # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
+            # Nodes of a face share an element, so each pair has its block unless that is part of a beam; it
+            # is symmetric, as the pair is.
             keys = pairs.min(axis=1).astype(np.int64) * len(self.mesh.nodes) + pairs.max(axis=1)
-            np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
+            at = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
+            own = self._block_keys[at] == keys
+            np.add.at(blocks, at[own], added[own])
         if self._folding is not None:
             blocks = self._folding(blocks)
         return blocks

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 _CUT_AWAY = 1e-6
+# Poisson's ratio of struts where their resin is not known.
+_INCOMPRESSIBLE = 0.5
 
 
 def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] = ()) -> tuple[Array, Array]:
@@ -30,7 +32,10 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
     history: what each law with one remembers of this state, as `MaterialData.kept` gives it. Raises
     InputError where it is missing: such a law's stress is not that of the state alone.
     """
-    F, _ = deformation_gradients(mesh, u, np.arange(len(mesh.tets)))
+    everywhere = np.arange(len(mesh.tets))
+    F, _ = deformation_gradients(mesh, u, everywhere)
+    if len(mesh.beams):
+        F = narrowed(mesh, F, everywhere, materials.small_strain(len(mesh.tets))[1])
     P = np.zeros_like(F)
     points = F.shape[1]
     remembered = iter(history)
@@ -48,6 +53,25 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
         found = stress(layer.law, F[layer.elements].reshape(-1, 3, 3), rows).reshape(-1, points, 3, 3)
         P[layer.elements] += layer.weight[:, None, None, None] * found
     return P @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None], F
+
+
+def narrowed(mesh: Mesh, F: Array, elements: Array, poisson: Array) -> Array:
+    """F (e, q, 3, 3) of elements (e,) with the lateral strain that sections of beams have and do not show.
+
+    Sections of beams stay as wide as drawn; a strut that is stretched by l along its axis is narrower by
+    l^-nu. poisson (e,): nu.
+    """
+    rows = np.flatnonzero(~mesh.solid[elements])
+    if not len(rows):
+        return F
+    ends = mesh.nodes[mesh.beams[mesh.beam_of[elements[rows]]][:, [0, 2]]]
+    axis = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    along = axis[:, :, None] * axis[:, None, :]
+    stretch = np.linalg.norm(np.einsum("eqij,ej->eqi", F[rows], axis), axis=2)
+    lateral = stretch[..., None, None] ** -poisson[rows, None, None, None]
+    found = F.copy()
+    found[rows] = F[rows] @ (along[:, None] + lateral * (np.eye(3) - along)[:, None])
+    return found
 
 
 def von_mises(sigma: Array) -> Array:
@@ -82,6 +106,8 @@ def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
     """
     elements = np.flatnonzero(mesh.region == region)
     F, volumes = deformation_gradients(mesh, u, elements)
+    if len(mesh.beams):
+        F = narrowed(mesh, F, elements, np.full(len(elements), _INCOMPRESSIBLE))
     largest = stretches(F)[..., 2]
     if mesh.resolved:
         share = mesh.filled[elements]

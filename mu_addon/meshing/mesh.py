@@ -150,8 +150,7 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
     MeshingError where the plane is not a mirror plane of the mesh.
     """
     column = AXES.index(axis)
-    on_plane = np.zeros(len(mesh.nodes), bool)
-    on_plane[mesh.symmetry_nodes(axis)] = True
+    on_plane = _on_plane(mesh, axis)
     side = np.sign(mesh.nodes[~on_plane, column])
     if len(np.unique(side)) > 1:
         raise MeshingError("a mesh must lie on one side of its mirror plane", f"plane {axis} = 0")
@@ -172,7 +171,33 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
         # Each quadrature point is nearest to one corner, and two corners change places.
         filled=np.vstack([mesh.filled, mesh.filled[:, FLIPPED_TET[: mesh.filled.shape[1]]]]),
         **_mirrored_ties(mesh, image),
+        **_mirrored_beams(mesh, image),
     )
+
+
+def _on_plane(mesh: Mesh, axis: str) -> Array:
+    """Whether each node (n,) lies in a mirror plane, rotation vectors of sections there included."""
+    found = np.zeros(len(mesh.nodes), bool)
+    found[mesh.symmetry_nodes(axis)] = True
+    for end in (0, 2):
+        found[mesh.beams[:, end + 1]] |= found[mesh.beams[:, end]]
+    return found
+
+
+def _mirrored_beams(mesh: Mesh, image: Array) -> dict[str, Array]:
+    """Beams of a mesh and of its image, where image (n,) numbers each node's own."""
+    if not len(mesh.beams):
+        return {}
+    off = image[mesh.carried] != mesh.carried
+    beam_of = np.where(mesh.beam_of < 0, -1, mesh.beam_of + len(mesh.beams))
+    return {
+        "beams": np.vstack([mesh.beams, image[mesh.beams]]),
+        "flexible": np.vstack([mesh.flexible, mesh.flexible]),
+        "beam_of": np.concatenate([mesh.beam_of, beam_of]),
+        "carried": np.concatenate([mesh.carried, image[mesh.carried[off]]]),
+        "carriers": np.vstack([mesh.carriers, image[mesh.carriers[off]]]),
+        "shares": np.concatenate([mesh.shares, mesh.shares[off]]),
+    }
 
 
 def _mirrored_ties(mesh: Mesh, image: Array) -> dict[str, Array]:
@@ -190,11 +215,11 @@ def mirror_displacement(mesh: Mesh, u: Array, axis: str) -> Array:
 
     Raises MeshingError where the axis has no mirror plane in the mesh.
     """
-    off = np.ones(len(mesh.nodes), bool)
-    off[mesh.symmetry_nodes(axis)] = False
-    image = u[off].copy()
+    image = u.copy()
     image[:, AXES.index(axis)] *= -1
-    return np.vstack([u, image])
+    # A rotation vector is mirrored the other way: what turns about the plane's normal stays.
+    image[mesh.beams[:, 1::2].ravel()] *= -1
+    return np.vstack([u, image[~_on_plane(mesh, axis)]])
 
 
 def oriented(nodes: Array, tets: Array) -> Array:

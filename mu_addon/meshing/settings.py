@@ -9,7 +9,7 @@ import attrs
 from ..errors import InputError
 
 FRACTIONS = ("half", "quarter", "full")
-FIDELITIES = RESOLVED, HOMOGENISED = ("resolved", "homogenised")
+FIDELITIES = RESOLVED, SOLID, HOMOGENISED = ("resolved", "solid", "homogenised")
 CELL_MM = 12.5
 """The cell, in mm, that the element sizes are given for."""
 
@@ -41,8 +41,9 @@ class MeshSettings:
     or 2; linear elements lock in thin walls. refine: divides every size and multiplies through_wall. Sizes
     in mm for a cell of 12.5 mm: along the membrane's meridian and around its apex, at the line of anchors
     and at the lattice's envelope. through_wall: elements across the membrane. fidelity: "homogenised", the
-    lattice as a continuum, or "resolved", its struts as printed, for which order 2, fraction and refine alone
-    count. Raises InputError for a value that is not offered or out of bounds.
+    lattice as a continuum; "resolved", its struts as printed, as beams wherever they are whole; or "solid",
+    all of every strut meshed, which "resolved" is checked against. For both order 2, fraction and refine
+    alone count. Raises InputError for a value that is not offered or out of bounds.
 
     >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
     (2, 'half')
@@ -61,7 +62,12 @@ class MeshSettings:
     @property
     def resolved(self) -> bool:
         """Whether struts are meshed as printed."""
-        return self.fidelity == RESOLVED
+        return self.fidelity != HOMOGENISED
+
+    @property
+    def without_beams(self) -> MeshSettings:
+        """The same with every strut solid, for what beams do not serve yet."""
+        return attrs.evolve(self, fidelity=SOLID) if self.fidelity == RESOLVED else self
 
     def table(self) -> dict[str, Any]:
         """The settings as a file of inputs has them; fidelity only where it is not homogenised."""

@@ -13,7 +13,7 @@ from ..fem.elementwise import element_forces
 from ..fem.factor import IndefiniteError
 from ..fem.kinematics import Probe
 from ..fem.materials import Materials
-from ..fem.model import Model
+from ..fem.model import MaterialData, Model
 from ..fem.state import State
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import Mesh
@@ -64,15 +64,15 @@ def parities(model: Model) -> list[Parity]:
 def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
     """Nodal loads (3n, p, c) whose work is the displacement of p monitored points along c components.
 
-    components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes, and
-    passed on where these are tied.
+    components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes;
+    `Model.passed_on` moves what acts on those that follow others.
     """
     points = len(monitor.nodes)
     loads = np.zeros((3 * len(mesh.nodes), points, len(components)))
     for i in range(points):
         for c, component in enumerate(components):
             np.add.at(loads[:, i, c], 3 * monitor.nodes[i] + component, monitor.weights[i])
-    return mesh.folded(loads.reshape(len(mesh.nodes), 3, points, -1)).reshape(loads.shape)
+    return loads
 
 
 def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[State]:
@@ -182,14 +182,36 @@ def influence_map(
         for side in sides:
             free = side.model.free
             loads = probe_loads(mesh, monitor, side.components)
+            given = loads.shape[1:]
+            loads = side.model.passed_on(state.u, loads.reshape(len(loads), -1))
             tangent = side.model.tangent(state.u, state.pressure_MPa, data)
-            solved = np.zeros((loads.shape[0], loads[0].size))
-            solved[free] = side.model.factor.factor(tangent).solve(loads[free].reshape(len(free), -1))
-            followed = mesh.following(solved.reshape(len(mesh.nodes), 3, -1))
+            solved = np.zeros_like(loads)
+            solved[free] = side.model.factor.factor(tangent).solve(loads[free])
+            followed = side.model.passed_back(state.u, solved).reshape(len(mesh.nodes), 3, -1)
             adjoint = followed[mesh.tets].reshape(*forces.shape, -1)
-            moved = np.einsum("ei,eic->ce", forces, adjoint).reshape(*loads.shape[1:], -1)
+            moved = np.einsum("ei,eic->ce", forces, adjoint)
+            moved += of_beams(model, state.u, data, followed)
+            moved = moved.reshape(*given, -1)
             found[s][:, list(side.components)] = -moved / len(sides)
     return Influence(np.array([state.pressure_MPa for state in states]), found)
+
+
+def of_beams(model: Model, u: Array, data: MaterialData, moved: Array) -> Array:
+    """Work (c, m) in mJ of the elements that beams stand for on displacements `moved` (n, 3, c) in mm.
+
+    Each has the share of its beam's that it has of its volume. u: (n, 3) in mm.
+    """
+    mesh = model.mesh
+    found = np.zeros((moved.shape[2], len(mesh.tets)))
+    if data.beams is None:
+        return found
+    forces = data.beams.forces(u[mesh.beams].reshape(len(mesh.beams), 12))
+    work = np.einsum("ei,eic->ce", forces, moved[mesh.beams].reshape(len(mesh.beams), 12, -1))
+    part = np.flatnonzero(~mesh.solid)
+    of, volume = mesh.beam_of[part], model.volumes[part]
+    share = volume / np.bincount(of, volume, len(mesh.beams))[of]
+    found[:, part] = work[:, of] * share
+    return found
 
 
 def centreline_gradient(points: Array, stations: int) -> Array:

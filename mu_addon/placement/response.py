@@ -160,10 +160,12 @@ def reduced_response(
             free = parity.model.free
             tangent = parity.model.tangent(state.u, state.pressure_MPa, data)
             solve = solver_of(parity.model, tangent)
-            loads = probe_loads(mesh, monitor, parity.components)[free]
+            loads = probe_loads(mesh, monitor, parity.components)
+            given = loads.shape[1:]
+            loads = parity.model.passed_on(state.u, loads.reshape(len(loads), -1))[free].reshape(-1, *given)
             # What lies in the mirror plane has no odd part.
             active = np.flatnonzero(np.repeat(side[kept] != 0, k)) if parity.odd else np.arange(q)
-            applied = forces[free][:, active].tocsc()
+            applied = parity.model.passed_on(state.u, forces)[free][:, active].tocsc()
             for columns in np.array_split(np.arange(len(active)), -(-len(active) // BLOCK)):
                 solved = solve(applied[:, columns].toarray().T).T / len(sides)
                 where = active[columns]

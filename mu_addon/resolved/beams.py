@@ -20,10 +20,51 @@ from .octants import SweptNodes
 
 Array = np.ndarray[Any, Any]
 
+REACH = 0.3
+"""Layers that come nearer than this share of a junction's diameter to what struts stand on stay solid."""
+
 _WHOLE = 1.0 - 1e-9
 _GAUSS = np.polynomial.legendre.leggauss(6)
 # Pieces of a layer that the flexibility is integrated over.
 _PIECES = 8
+
+
+# Rotation vectors stand at places of their own, which no other node has: this share of a beam from its end.
+_OFF = 0.3
+
+
+def without_beams(mesh: Mesh, solid: Array) -> Mesh:
+    """The mesh with some elements (m,) bool solid again, with all of their beams, and joints that these meet.
+
+    Rotation vectors that nothing turns by any more stay as nodes, for the numbers of all to stay.
+    """
+    gone = np.zeros(len(mesh.beams), bool)
+    gone[np.unique(mesh.beam_of[solid & (mesh.beam_of >= 0)])] = True
+    if not gone.any():
+        return mesh
+    # A joint's beams all begin at it, or all end at it; between layers one begins where one ends.
+    begins, stops = (np.bincount(mesh.beams[:, k], minlength=len(mesh.nodes)) > 0 for k in (0, 2))
+    joint = begins != stops
+    for end in (0, 2):
+        at = np.unique(mesh.beams[gone, end])
+        at = at[joint[at]]
+        gone |= np.isin(mesh.beams[:, 0], at) | np.isin(mesh.beams[:, 2], at)
+    number = np.where(gone, -1, np.cumsum(~gone) - 1)
+    beam_of = np.append(number, -1)[mesh.beam_of]
+    beams = mesh.beams[~gone]
+    inside = np.zeros(len(mesh.nodes), bool)
+    inside[mesh.tets[beam_of >= 0]] = True
+    inside[beams] = False
+    keep = inside[mesh.carried]
+    return attrs.evolve(
+        mesh,
+        beams=beams,
+        flexible=mesh.flexible[~gone],
+        beam_of=beam_of,
+        carried=mesh.carried[keep],
+        carriers=mesh.carriers[keep],
+        shares=mesh.shares[keep],
+    )
 
 
 def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: float) -> Mesh:
@@ -116,7 +157,7 @@ class _Layers:
         base = np.concatenate([mesh.base, turn[np.intersect1d(mesh.base, own)]])
         return attrs.evolve(
             mesh,
-            nodes=np.vstack([mesh.nodes, mesh.nodes[own]]),
+            nodes=np.vstack([mesh.nodes, mesh.nodes[own] + _OFF * self._towards(beams, own, mesh.nodes)]),
             base=base,
             beams=beams,
             flexible=self._flexible(strut, layer, zones),
@@ -125,6 +166,12 @@ class _Layers:
             carriers=carried[1],
             shares=carried[2],
         )
+
+    def _towards(self, beams: Array, own: Array, nodes: Array) -> Array:
+        """From each beam node (b,) to the other end of one of its beams, (b, 3) in mm."""
+        other = np.empty(len(nodes), int)
+        other[beams[:, 0]], other[beams[:, 2]] = beams[:, 2], beams[:, 0]
+        return np.asarray(nodes[other[own]] - nodes[own])
 
     def _carried(self, mesh: Mesh, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
         """Carried nodes (c,), what carries them (c, 4) and the first one's shares (c,)."""

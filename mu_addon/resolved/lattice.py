@@ -171,4 +171,5 @@ def support(mesh: Mesh) -> Array:
         np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))
         for v in (volumes, volumes * mesh.filled)
     )
-    return np.asarray(solid / whole)
+    # Nodes without elements are held by none.
+    return np.divide(solid, whole, out=np.ones(len(whole)), where=whole > 0)

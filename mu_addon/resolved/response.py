@@ -67,7 +67,7 @@ def bar_response(
     flexibility, drive = np.zeros((len(states), 1, q, q)), np.zeros((len(states), q))
     reach = np.zeros((len(states), len(monitor.nodes), 3, q))
     data, free = model.parameters(materials), model.free
-    monitored = probe_loads(mesh, monitor, (0, 1, 2))[free]
+    probes = probe_loads(mesh, monitor, (0, 1, 2))
     for s, state in enumerate(states):
         place, turn, loads = _moved_joints(mesh, graph.nodes, joints, state.u)
         patterns = np.zeros((6 * count, q))
@@ -78,7 +78,9 @@ def bar_response(
             forces = compatible.T @ scaled[i]
             patterns[6 * a : 6 * a + 6, own], patterns[6 * b : 6 * b + 6, own] = forces[:6], forces[6:]
         solve = solver_of(model, model.tangent(state.u, state.pressure_MPa, data))
-        applied = loads[free].tocsc()
+        applied = model.passed_on(state.u, loads)[free].tocsc()
+        monitored = model.passed_on(state.u, probes.reshape(len(probes), -1))[free]
+        monitored = monitored.reshape(len(free), -1, 3)
         compliance = np.zeros((6 * count, 6 * count))
         moved = np.zeros((len(monitor.nodes), 3, 6 * count))
         for columns in np.array_split(np.arange(6 * count), -(-6 * count // BLOCK)):
@@ -98,6 +100,7 @@ def _around(mesh: Mesh, node: Array, d: Dimensions) -> Array:
     near = np.linalg.norm(mesh.nodes - node, axis=1) < _reach(d)
     near[mesh.tied] = False
     near[mesh.tets[mesh.region != LATTICE]] = False
+    near[mesh.beams[:, 1::2]] = False
     found = np.flatnonzero(near)
     if len(found) < 4:
         x, y, z = node.round(3).tolist()

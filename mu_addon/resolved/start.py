@@ -73,7 +73,7 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
     bent = _bent(unit, path, u, own) - own
     if "x" in mesh.symmetry:
         bent[own[:, 0] == 0.0, 0] = 0.0
-    return mesh.following(np.vstack([moved, bent]))
+    return following(mesh, np.vstack([moved, bent]))
 
 
 def eased(equilibrium: Equilibrium, start: Array, u: Array) -> Array:

@@ -18,15 +18,13 @@ from ..meshing.membrane import Membrane, division
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.morph import WallGrid
 from ..meshing.quality import check_positive
-from ..meshing.settings import CELL_MM, MeshSettings
+from ..meshing.settings import CELL_MM, SOLID, MeshSettings
 from ..meshing.unit import mesh_unit
-from .beams import with_beams
+from .beams import REACH, with_beams
 from .lattice import LEAST_SUPPORT, clearance, struts, support
 from .strut import is_half_diagonal
 
 Progress = Callable[[str, float], None]
-
-REACH = 0.75
 
 TIE_MM = 0.1
 """Struts' nodes this near the wall outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
@@ -85,12 +83,12 @@ def mesh_printed(
     cache: Path | None = None,
     body: Body | None = None,
     sizes: Sizes | None = None,
-    beams: bool = True,
 ) -> Mesh:
     """The printed unit as quadratic tetrahedra: wall and caps, and struts whose nodes in the wall follow it.
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
-    the wall. The base is clamped, the inlet is left out. settings: of it the fraction ("half" or "full") and
+    the wall. Struts that are half diagonals are beams where they are whole (`with_beams`), unless the
+    settings ask for the fidelity "solid". The base is clamped, the inlet is left out. settings: of it the fraction ("half" or "full") and
     `refine` count. cache: folder for the octants of lattices other than body-centred. body: a closed surface
     that cuts the lattice in place of its box. progress: called with a stage and the share done. sizes: of
     elements before `refine` divides them. Raises InputError and MeshingError.
@@ -117,7 +115,7 @@ def mesh_printed(
     clear = clearance(d, lattice.nodes)
     mesh = tied(wall, lattice, clear - near)
     check_positive(mesh)
-    if beams and is_half_diagonal(d):
+    if s.fidelity != SOLID and is_half_diagonal(d):
         reach = REACH * d.junction_diameter
         mesh = with_beams(mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach)
     report("mesh", 1.0)

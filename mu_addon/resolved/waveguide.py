@@ -16,6 +16,7 @@ from ..design.waveguide import Bar, waveguide
 from ..errors import InputError
 from ..meshing.mesh import LATTICE, Mesh, part
 from ..meshing.quality import check_positive
+from .beams import REACH, without_beams
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
 from .lattice import LEAST_SUPPORT, Depth, clearance, cuts, filled_outside, support
 from .octants import in_replaced, is_thickening, thickened_nodes
@@ -69,10 +70,15 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     filled[struts & in_replaced(d, bar, found.nodes[found.tets].mean(axis=1))] = 0.0
     filled[filled.mean(axis=1) < _LEAST] = 0.0
     found = attrs.evolve(found, filled=filled)
-    within = np.min([away(found.nodes) for away in outside], axis=0) <= 0
-    within |= support(found) < LEAST_SUPPORT
+    away = np.min([distance(found.nodes) for distance in outside], axis=0)
+    within = (away <= 0) | (support(found) < LEAST_SUPPORT)
     within[found.tets[~struts]] = False
     within[wall_ties.nodes] = False
+    within[mesh.beams[:, 1::2]] = False
+    if len(mesh.beams):
+        touched = (filled != mesh.filled).any(axis=1) | (found.nodes != mesh.nodes).any(axis=1)[found.tets].any(axis=1)
+        touched |= (away[found.tets] < REACH * d.junction_diameter).any(axis=1)
+        found = without_beams(found, touched & struts)
 
     actuator: list[Depth] = [lambda points: clearance(d, points)]
     own = bar_mesh(bar, half, actuator)
@@ -102,6 +108,7 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
         tied=tied.nodes,
         tied_to=tied.to,
         tied_weights=tied.weights,
+        beam_of=np.append(found.beam_of, np.full(more, -1)) if len(found.beam_of) else found.beam_of,
     )
     check_positive(whole)
     return whole

@@ -29,7 +29,7 @@ from ...fem.self_contact import SelfContact
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
-from ...meshing.settings import HOMOGENISED, RESOLVED
+from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
 from .phases import Phases
 
 Array = np.ndarray[Any, Any]
@@ -103,10 +103,8 @@ class Grip:
             raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
 
 
-OF_FIDELITY: dict[str, dict[str, Any]] = {
-    HOMOGENISED: {},
-    RESOLVED: {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1},
-}
+_OF_STRUTS = {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1}
+OF_FIDELITY: dict[str, dict[str, Any]] = {HOMOGENISED: {}, RESOLVED: _OF_STRUTS, SOLID: _OF_STRUTS}
 """Values of `Grip` that go with a fidelity: struts bear on few small places, and their faces are small."""
 
 

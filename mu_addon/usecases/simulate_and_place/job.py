@@ -349,7 +349,13 @@ class Job:
         return to_obj(self.obstacles) if self.obstacles else None
 
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
-        """Settings of a mesh for these obstacles: of the whole unit where one is not its own mirror image."""
+        """Settings of a mesh for this unit and its obstacles.
+
+        Of the whole unit where one is not its own mirror image; solid where the wall has a law of its own,
+        which beams do not take.
+        """
+        if self.unit.wall.names:
+            settings = settings.without_beams
         if not self.obstacles or settings.fraction == "full":
             return settings
         return attrs.evolve(settings, fraction="half" if mirrored(self.obstacles) else "full")
