@@ -140,6 +140,8 @@ class Equilibrium:
         found: the equilibrium from a start with the bound held, and whether it is not the first. Raises
         ConvergenceError.
         """
+        if self.model.self_contact is not None:
+            self.model.self_contact.forget_candidates()
         contacts = self.model.remembering
         for contact in contacts:
             contact.lag_from_memory()

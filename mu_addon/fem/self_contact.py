@@ -31,6 +31,8 @@ _ROUND = 2.5
 _SLIVERS = 0.05
 # Relative step in which two edges' smoothing is differentiated.
 _SMALL = 1e-4
+# Gaps that a node may move before pairs are searched for anew.
+_MARGIN = 1.0
 # Slip in gaps at which friction is full.
 _SLIP = 0.1
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
@@ -149,6 +151,7 @@ class SelfContact:
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: _Pairs | None = None
+        self._kept: tuple[Array, Any] | None = None
         self._friction: SelfFriction | None = None
         if friction:
             parts = self._ipctk, self._surface, self._potential
@@ -273,7 +276,7 @@ class SelfContact:
     def without_image(self) -> SelfContact:
         """The same contact of a half body without that across its mirror planes."""
         other = copy.copy(self)
-        other._planes, other._last = [], None
+        other._planes, other._last, other._kept = [], None, None
         return other
 
     def relocated(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> SelfContact:
@@ -283,7 +286,7 @@ class SelfContact:
         """
         other = copy.copy(self)
         other.gap_mm, other.stiffness_MPa, other.friction, other._friction = gap_mm, stiffness_MPa, 0.0, None
-        other._rest, other._last = mesh.nodes, None
+        other._rest, other._last, other._kept = mesh.nodes, None, None
         other._potential, other._wider = (
             self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
         )
@@ -465,8 +468,12 @@ class SelfContact:
         u must be free of intersections. Where something would touch, the share ends before it does.
         """
         start, end = self._places(u), self._places(to)
-        candidates = self._ipctk.Candidates()
-        candidates.build(self._surface, start, end)
+        if max(self._moved_mm(start), self._moved_mm(end)) <= self._margin_mm:
+            assert self._kept is not None
+            candidates = self._kept[1]
+        else:
+            candidates = self._ipctk.Candidates()
+            candidates.build(self._surface, start, end)
         share = float(
             candidates.compute_collision_free_stepsize(self._surface, start, end, 0.0, self._detection)
         )
@@ -481,18 +488,41 @@ class SelfContact:
     def _places(self, u: Array) -> Array:
         return np.asfortranarray((self._rest + u)[self._nodes])
 
+    def forget_candidates(self) -> None:
+        """Search anew next time, so that what is found does not depend on what was looked for before."""
+        self._kept, self._last = None, None
+
+    @property
+    def _margin_mm(self) -> float:
+        """How far a node may move while the pairs found by a search stay all that can come near."""
+        return _MARGIN * self.gap_mm
+
+    def _moved_mm(self, places: Array) -> float:
+        """How far any node has moved since the search whose candidates are kept; infinite without one."""
+        return np.inf if self._kept is None else float(np.sqrt(((places - self._kept[0]) ** 2).sum(axis=1).max()))
+
+    def _candidates(self, places: Array) -> Any:
+        """ipctk's candidates among which all pairs are that are within the gap at some places (v, 3)."""
+        if self._moved_mm(places) > self._margin_mm:
+            found = self._ipctk.Candidates()
+            # Boxes are inflated on either side.
+            found.build(self._surface, places, self.gap_mm / 2 + self._margin_mm)
+            self._kept = places, found
+        assert self._kept is not None
+        return self._kept[1]
+
     def _pairs(self, u: Array) -> _Pairs:
         """The pairs within the gap at u, those of the last call where u is the same."""
         places = self._places(u)
         if self._last is not None and np.array_equal(self._last.places, places):
             return self._last
-        self._last = _Pairs(places, self._near(places, self.gap_mm))
+        self._last = _Pairs(places, self._near(places, self.gap_mm, among=self._candidates(places)))
         return self._last
 
-    def _near(self, places: Array, reach_mm: float, by_places: bool = False) -> Any:
+    def _near(self, places: Array, reach_mm: float, by_places: bool = False, among: Any = None) -> Any:
         """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm.
 
-        by_places: with what derivatives by the places as drawn need.
+        by_places: with what derivatives by the places as drawn need. among: candidates that hold them all.
         """
         near = self._ipctk.NormalCollisions()
         if by_places:
@@ -502,7 +532,10 @@ class SelfContact:
             near.enable_shape_derivatives = True
         near.use_area_weighting = True
         near.collision_set_type = self._ipctk.NormalCollisions.IMPROVED_MAX_APPROX
-        near.build(self._surface, places, reach_mm)
+        if among is None:
+            near.build(self._surface, places, reach_mm)
+        else:
+            near.build(among, self._surface, places, reach_mm)
         return near
 
     def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:
@@ -555,4 +588,12 @@ def _free_facets(mesh: Mesh) -> Array:
     """Triangles (t, 3) of a mesh's surface that can touch: not the base's, mirror planes', or buried ones."""
     faces, _ = free_boundary(mesh)
     # Of parts that overlap, what is tied lies inside another.
-    return facets_of(faces[~np.isin(faces, mesh.tied).any(axis=1)])
+    faces = faces[~np.isin(faces, mesh.tied).any(axis=1)]
+    if not len(mesh.beams):
+        return facets_of(faces)
+    # Sections of beams do not deform: of struts flat faces do, a quarter as many. Where solid struts go on
+    # their faces must end in the same edges.
+    wall = np.zeros(len(mesh.nodes), bool)
+    wall[mesh.tets[mesh.region != LATTICE]] = True
+    of_wall = wall[faces].all(axis=1)
+    return np.concatenate([facets_of(faces[of_wall]), faces[~of_wall][:, :3]])

@@ -1,27 +1,49 @@
-"""Where struts meet they are stiffer than beams: zones about a joint that do not stretch, or do not bend."""
+"""Where struts meet they are stiffer than beams: zones about a joint that do not stretch, or do not bend.
+
+In an endless lattice of half diagonals under small strain joints move with the mean strain and do not turn.
+With k_a and k_t, the stiffness of a half diagonal along and across it with ends that do not turn, and h, half
+a cell: C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell's two moduli give both, and these
+the lengths of both zones. The bulk modulus is then k_a/(3 h): what it falls short of the solid's is told.
+"""
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
+from ..design.lattices import LatticeKind
+from ..fem.beams import SHEAR_FACTOR
+from ..fem.materials import Materials
+from ..homogenize.elasticity import effective_tensor
+from .strut import strut_mesh
 
 Array = np.ndarray[Any, Any]
+
+POISSON = 0.45
+# Of the solid octant: its elastic moduli are then within 1 % of a mesh by pytetwild (docs/resolved.md).
+RINGS, LAYERS = 3, 18
+# A free joint of fewer octants bends more easily: factors of the zone in bending where 4, 2 and 1 meet, which
+# give blocks of 2 to 8 cells the stiffness that solid ones have.
+FEWER = ((4, 0.704), (2, 0.362), (1, 0.0))
 
 
 @attrs.frozen
 class Zones:
     """Rigid zones about a joint in junction diameters: in stretch, and in bending, twist and shear.
 
-    fewer: factor of the latter where a number of struts meets, 1 where none is given.
+    fewer: factor of the latter where a number of struts meets, 1 where none is given. bulk_error: of the
+    endless lattice's bulk modulus with these zones, against the solid cell's.
     """
 
     stretch: float
     bend: float
-    fewer: tuple[tuple[int, float], ...] = ()
+    fewer: tuple[tuple[int, float], ...] = FEWER
+    bulk_error: float = 0.0
 
     def lengths(self, junction_mm: Array, meeting: Array) -> tuple[Array, Array]:
         """Lengths in mm (any shape) of both zones, of junction diameters and numbers of struts there."""
@@ -32,4 +54,60 @@ class Zones:
 
 
 def zones_of(d: Dimensions) -> Zones:
-    return Zones(0.1455, 0.5028, ((4, 0.704), (2, 0.362), (1, 0.0)))
+    """The zones of a lattice of half diagonals, by its solid cell without grading; kept for the process."""
+    # Lengths in cells: a unit's scale changes nothing.
+    ratios = round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
+    return _zones(d.kind, *ratios)
+
+
+@lru_cache(maxsize=32)
+def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
+    from scipy.optimize import brentq
+
+    strut = _Strut(kind, junction, midspan)
+    mesh = strut_mesh(strut, RINGS, LAYERS)
+    count = len(mesh.tets)
+    solid = effective_tensor(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
+    half = 0.5
+    across = half * (solid.C11 - solid.C12)
+    along = 3 * (half * solid.C44 - across / 6)
+    most = 0.4 * strut.length
+    stretch = brentq(lambda zone: strut.along(zone) / along - 1, 0.0, most) / junction
+    bend = brentq(lambda zone: strut.across(zone) / across - 1, 0.0, most) / junction
+    return Zones(float(stretch), float(bend), FEWER, float(along / (3 * half) / solid.bulk - 1))
+
+
+@attrs.frozen
+class _Strut:
+    """A half diagonal of a cell of 1 mm, of a resin of 1 MPa."""
+
+    kind: LatticeKind
+    junction_diameter: float
+    midspan_diameter: float
+    cell: float = 1.0
+
+    @property
+    def length(self) -> float:
+        """From the cell's corner to its centre."""
+        return math.sqrt(3.0) / 2
+
+    def _sections(self, zone: float) -> tuple[Array, Array, Array]:
+        """Places, radii and weights along what lies between rigid zones."""
+        x, w = np.polynomial.legendre.leggauss(64)
+        span = self.length - 2 * zone
+        s = zone + span * (1 + x) / 2
+        return s, self.kind.radius(s / self.length, self.junction_diameter / 2, self.midspan_diameter / 2), span * w / 2
+
+    def along(self, zone: float) -> float:
+        """Axial stiffness in N/mm."""
+        _, r, w = self._sections(zone)
+        return float(1 / (w / (np.pi * r**2)).sum())
+
+    def across(self, zone: float) -> float:
+        """Stiffness in N/mm against an offset of the ends, which do not turn."""
+        s, r, w = self._sections(zone)
+        inertia, shear = np.pi * r**4 / 4, SHEAR_FACTOR / (2 * (1 + POISSON))
+        lever = s - self.length / 2
+        turn, mixed = (w / inertia).sum(), -(w * lever / inertia).sum()
+        offset = (w * lever**2 / inertia).sum() + (w / (shear * np.pi * r**2)).sum()
+        return float(turn / (turn * offset - mixed**2))

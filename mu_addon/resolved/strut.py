@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
-from ..design.dimensions import Dimensions
+from ..design.lattices import LatticeKind
 from ..errors import InputError
 from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
 
@@ -28,7 +29,27 @@ _ITERATIONS = 60
 _CLOSE = 1e-15
 
 
-def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
+class Struts(Protocol):
+    """What of a unit's `Dimensions` its struts' mesh depends on, in mm."""
+
+    @property
+    def cell(self) -> float:
+        """Edge of a cell."""
+
+    @property
+    def kind(self) -> LatticeKind:
+        """Where struts run, and how their radius changes along them."""
+
+    @property
+    def junction_diameter(self) -> float:
+        """Diameter where struts meet."""
+
+    @property
+    def midspan_diameter(self) -> float:
+        """Diameter half way."""
+
+
+def strut_mesh(d: Struts, rings: int, layers: int) -> Mesh:
     """Quadratic tetrahedra of one octant [0, cell/2]^3 mm of a body-centred lattice, curved as its strut is.
 
     rings: of elements from the strut's axis to its surface, six to the first; layers: along it. Nothing is
@@ -79,7 +100,7 @@ def strut_mesh(d: Dimensions, rings: int, layers: int) -> Mesh:
     return Mesh(nodes, tets, np.full(len(tets), LATTICE), nothing, tets[0, :0], tets[0, :0])
 
 
-def is_half_diagonal(d: Dimensions) -> bool:
+def is_half_diagonal(d: Struts) -> bool:
     """Whether the struts of a unit's lattice are the half diagonals of its cells."""
     return d.kind.is_half_diagonals
 
@@ -109,7 +130,7 @@ def disc(rings: int) -> tuple[Array, Array]:
     return np.vstack(points), np.vstack(triangles)
 
 
-def radius_of(d: Dimensions) -> Radius:
+def radius_of(d: Struts) -> Radius:
     """Radius of a unit's struts along them."""
     return lambda t: d.kind.radius(t, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
 
