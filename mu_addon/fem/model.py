@@ -22,6 +22,7 @@ from .conjugate_gradients import ConjugateGradients
 from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
+from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
@@ -255,9 +256,9 @@ class Model:
         moved = np.concatenate([mesh.tets[mesh.solid].ravel(), mesh.cavity.ravel(), mesh.beams.ravel()])
         idle = np.ones(len(mesh.nodes), bool)
         idle[moved] = False
-        turns = np.unique(mesh.beams[:, 1::2])
-        clamped = fixed[turns].all(axis=1)
-        axes = mesh.beams[:, 0::2].ravel()[np.unique(mesh.beams[:, 1::2], return_index=True)[1]]
+        turns, first = np.unique(mesh.beams[:, 1::2], return_index=True)
+        axes = mesh.beams[:, 0::2].ravel()[first]
+        clamped = fixed[axes].all(axis=1)
         for axis in mesh.symmetry:
             column = AXES.index(axis)
             on = mesh.nodes[axes, column] == 0.0
@@ -365,6 +366,8 @@ class Model:
         if len(self.mesh.beams):
             young, poisson = materials.small_strain(len(covered))
         solid = self.mesh.solid
+        if not solid.all():
+            self._require_neo_hookean_beams(materials)
         for layer in (one.of(solid[one.elements]) for one in materials.layers):
             law, k = layer.law, len(layer.elements)
             if self.mean_dilatation and not law.split_volume:
@@ -396,6 +399,15 @@ class Model:
             )
         least = LEAST_STRAIN * np.linalg.norm(stiffness * self.volumes ** (2 / 3))
         return MaterialData(tuple(layers), float(least), self._beams(young, poisson))
+
+    def _require_neo_hookean_beams(self, materials: Materials) -> None:
+        for layer in materials.layers:
+            if layer.law is not NeoHooke and not self.mesh.solid[layer.elements].all():
+                raise InputError(
+                    f"{layer.law.name}: struts that are beams are neo-Hookean",
+                    "a mesh of fidelity resolved",
+                    "choose fidelity solid",
+                )
 
     def _beams(self, modulus_MPa: Array, poisson: Array) -> Beams | None:
         """Beams of the mesh, of the mean modulus and Poisson's ratio (m,) of their elements, or None."""
@@ -611,33 +623,9 @@ class Model:
         if self._carried is not None:
             blocks = self._beam_tangent(u, pressure, m, blocks)
         values = np.asarray(blocks.ravel()[self._scalar_map])
-        if self._carried is not None and self.obstacles:
-            values = self._with_touched_beams(values, u)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
-
-    def _with_touched_beams(self, values: Array, u: Array) -> Array:
-        """The tangent's own values (nnz,) with contact of obstacles with faces of beams' elements."""
-        n = len(self.mesh.nodes)
-        three = np.arange(3)
-        for obstacle in self.obstacles:
-            pairs, added = obstacle.blocks(u)
-            keys = pairs.min(axis=1).astype(np.int64) * n + pairs.max(axis=1)
-            at = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
-            beside = self._block_keys[at] != keys
-            (a, b), blocks = pairs[beside].T.astype(np.int64), added[beside]
-            rows = np.repeat(3 * a[:, None] + three, 3, axis=1).ravel()
-            columns = np.tile(3 * b[:, None] + three, 3).ravel()
-            off = np.repeat(a != b, 9)
-            entries = [(rows, columns, blocks.ravel()), (columns[off], rows[off], blocks.ravel()[off])]
-            row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
-            h = self._uncarried(sparse.coo_matrix((value, (row, column)), shape=(3 * n, 3 * n)), u)
-            row, column, value = self._lower(h.row, h.col, h.data)
-            places, has = self._own_pattern.places(row, column)
-            assert has.all()
-            np.add.at(values, places, value)
-        return values
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
         """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
@@ -703,12 +691,9 @@ class Model:
         blocks: Array = self._blocks.numpy()
         for obstacle in self.obstacles:
             pairs, added = obstacle.blocks(u)
-            # Nodes of a face share an element, so each pair has its block unless that is part of a beam; it
-            # is symmetric, as the pair is.
+            # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
             keys = pairs.min(axis=1).astype(np.int64) * len(self.mesh.nodes) + pairs.max(axis=1)
-            at = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
-            own = self._block_keys[at] == keys
-            np.add.at(blocks, at[own], added[own])
+            np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
         if self._folding is not None:
             blocks = self._folding(blocks)
         return blocks

@@ -54,6 +54,9 @@ def parities(model: Model) -> list[Parity]:
         raise MeshingError("paths off the plane need a half or a whole mesh", f"mirrors: {mesh.symmetry}")
     held = np.zeros((len(mesh.nodes), 3), bool)
     held[mesh.symmetry_nodes("x"), 1:] = True
+    # Sections there turn about y and z, as they do not in an even motion.
+    ends = mesh.beams.reshape(-1, 2)
+    held[ends[mesh.nodes[ends[:, 0], 0] == 0.0, 1], 0] = True
     whole = attrs.evolve(mesh, symmetry=())
     other = Model(whole, supports=held, device=model.device, threads=model.threads)
     if model.self_contact is not None:

@@ -154,11 +154,9 @@ class _Layers:
         turn[own] = len(mesh.nodes) + np.arange(len(own))
         beams = np.column_stack([first, turn[first], second, turn[second]])
         carried = self._carried(mesh, whole, axis, turn)
-        base = np.concatenate([mesh.base, turn[np.intersect1d(mesh.base, own)]])
         return attrs.evolve(
             mesh,
             nodes=np.vstack([mesh.nodes, mesh.nodes[own] + _OFF * self._towards(beams, own, mesh.nodes)]),
-            base=base,
             beams=beams,
             flexible=self._flexible(strut, layer, zones),
             beam_of=beam_of,

@@ -18,7 +18,7 @@ from mu_addon.fem.unit import materials_of
 from mu_addon.homogenize.cell_mesh import cell_materials
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.meshing.mesh import LATTICE
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.settings import SOLID, MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.resolved.lattice import clearance
 from mu_addon.resolved.strut import strut_mesh
@@ -31,7 +31,7 @@ TIP = SMALL.dimensions.height
 
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_printed(SMALL, MeshSettings(refine=0.5))
+    return mesh_printed(SMALL, MeshSettings(refine=0.5, fidelity=SOLID))
 
 
 def beside(mesh, obstacle):

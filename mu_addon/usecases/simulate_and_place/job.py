@@ -351,10 +351,10 @@ class Job:
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
         """Settings of a mesh for this unit and its obstacles.
 
-        Of the whole unit where one is not its own mirror image; solid where the wall has a law of its own,
-        which beams do not take.
+        Of the whole unit where one is not its own mirror image; solid beside obstacles, and where the wall
+        has a law of its own, neither of which beams take.
         """
-        if self.unit.wall.names:
+        if self.unit.wall.names or self.obstacles:
             settings = settings.without_beams
         if not self.obstacles or settings.fraction == "full":
             return settings
