@@ -18,7 +18,7 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 LEAST_STRETCH = 0.2
-"""Below this stretch of its axis an element's energy is continued by a parabola: it cannot be crushed flat."""
+"""Below this stretch an element's axial energy goes on as a parabola: none can be crushed flat."""
 
 SHEAR_FACTOR = 0.9
 """Cowper's shear coefficient of a solid round section, 6 (1 + nu)/(7 + 6 nu), at Poisson's ratio 0.45."""
@@ -33,7 +33,7 @@ class Sections:
     """Stiffness of e elements: axial (N), torsional (N mm2), and of bending with shear, each (e,).
 
     bending: of the relative rotation t of both ends and the offset q of one from the other's tangent, as
-    energy 1/2 (turn t^2 + 2 mixed t q + offset q^2), in N mm, N and N/mm; the same in both planes of the axis.
+    energy 1/2 (turn t^2 + 2 mixed t q + offset q^2), in N mm, N and N/mm; alike in both planes of the axis.
     """
 
     axial: Array
@@ -85,7 +85,7 @@ class Beams:
         return _State.of(self, x).strains
 
     def section_forces(self, x: Array) -> Array:
-        """Shear forces (2), axial force in N, bending moments (2) and torque in N mm at mid-element, (e, 6)."""
+        """Shear forces (2) and axial force in N, bending moments (2) and torque in N mm, (e, 6)."""
         return np.asarray(_law(self.strains(x), self.length, self.sections)[1] / self.length[:, None])
 
 
@@ -214,7 +214,9 @@ def _law(strains: Array, length: Array, s: Sections) -> tuple[Array, Array, Arra
 
 def rotations(vectors: Array) -> Array:
     """Rotation matrices (n, 3, 3) of rotation vectors (n, 3)."""
-    return np.asarray(_turned(_quaternion(vectors), np.broadcast_to(_EYE, (len(vectors), 3, 3)))).transpose(0, 2, 1)
+    return np.asarray(_turned(_quaternion(vectors), np.broadcast_to(_EYE, (len(vectors), 3, 3)))).transpose(
+        0, 2, 1
+    )
 
 
 def frames_along(directions: Array) -> Array:
@@ -272,7 +274,9 @@ def _turned(q: Array, vectors: Array) -> Array:
     scalar, part = q[:, None, :1], np.broadcast_to(q[:, None, 1:], vectors.shape)
     along = np.einsum("eki,eki->ek", part, vectors)[..., None]
     square = np.einsum("eki,eki->ek", part, part)[..., None]
-    return np.asarray((scalar**2 - square) * vectors + 2 * along * part + 2 * scalar * np.cross(part, vectors))
+    return np.asarray(
+        (scalar**2 - square) * vectors + 2 * along * part + 2 * scalar * np.cross(part, vectors)
+    )
 
 
 def _turned_slopes(q: Array, vectors: Array) -> Array:
@@ -374,7 +378,9 @@ def _logarithm_slopes(p: Array, weights: Array) -> tuple[Array, Array]:
     found[:, 0, 1:] = -2 / rho[:, None] * weights + (4 * along / rho**2)[:, None] * w
     found[:, 1:, 0] = found[:, 0, 1:]
     mixed = weights[:, :, None] * w[:, None, :]
-    found[:, 1:, 1:] = a[:, None, None] * (mixed + mixed.transpose(0, 2, 1)) + (a * along)[:, None, None] * _EYE
+    found[:, 1:, 1:] = (
+        a[:, None, None] * (mixed + mixed.transpose(0, 2, 1)) + (a * along)[:, None, None] * _EYE
+    )
     found[:, 1:, 1:] += (b * along)[:, None, None] * w[:, :, None] * w[:, None, :]
     return slopes, found
 

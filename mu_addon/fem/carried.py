@@ -74,7 +74,7 @@ class Carried:
         return found, turns
 
     def pairs(self, rows: Array, columns: Array) -> Folding:
-        """How 3 x 3 blocks between nodes, rows (b,) >= columns (b,), act between beam nodes; see `Folding`."""
+        """How blocks between nodes, rows (b,) >= columns (b,), act between beam nodes; see `Folding`."""
         return Folding.of(self, rows, columns)
 
     def operators(self, u: Array) -> Array:
@@ -96,7 +96,9 @@ class Carried:
         held = np.flatnonzero(at >= 0)
         many = (start[1:] - start[:-1])[at[held]]
         which = np.repeat(held, many)
-        row = np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many) + np.repeat(start[at[held]], many)
+        row = (
+            np.arange(len(which)) - np.repeat(np.cumsum(many) - many, many) + np.repeat(start[at[held]], many)
+        )
         number = np.concatenate([free, which, which])
         mover = np.concatenate([nodes[free], self._node[row], self._turn[row]])
         operator = np.concatenate([np.zeros(len(free), int), 1 + row, 1 + k + row])
@@ -104,7 +106,7 @@ class Carried:
         return number[order], mover[order], operator[order]
 
     def map(self, u: Array, nodes: Array) -> sparse.csr_matrix:
-        """How displacements (3 j,) of some nodes (j,) change with those of all that are not carried, (3 n,)."""
+        """How displacements (3 j,) of some nodes (j,) change with those (3 n,) of nodes not carried."""
         number, mover, operator = self.parts_of(nodes)
         axes = np.arange(3)
         rows = np.repeat(3 * number[:, None] + axes, 3, axis=1).ravel()

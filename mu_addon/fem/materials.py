@@ -52,8 +52,10 @@ class Layer:
 
     def of(self, kept: Array) -> Layer:
         """The layer in those of its elements that are kept, (k,) bool."""
-        return self if kept.all() else Layer(
-            self.law, self.elements[kept], self.parameters[kept], self.weight[kept]
+        return (
+            self
+            if kept.all()
+            else Layer(self.law, self.elements[kept], self.parameters[kept], self.weight[kept])
         )
 
     def kept(self, rows: Array, weight: Array) -> Layer:

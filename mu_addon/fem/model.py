@@ -293,7 +293,7 @@ class Model:
         return keys
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, 3) in mm with those of tied and carried nodes set to what they follow, in place."""
+        """Displacements u (n, 3) in mm with tied and carried nodes set to what they follow, in place."""
         if self._carried is not None:
             self._carried.follow(u)
         return self.mesh.following(u)
@@ -335,7 +335,11 @@ class Model:
         folded = self._carried_blocks(own[self._carrying], self._carried.operators(u))
         np.add.at(found, of_carried, folded)
         turning, turns = self._carried.turning(u, self._forces(u, pressure, m))
-        np.add.at(found, np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)), turning)
+        np.add.at(
+            found,
+            np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)),
+            turning,
+        )
         return found
 
     @cached_property
@@ -579,7 +583,7 @@ class Model:
         return self.mesh.folded(found)
 
     def _forces(self, u: Array, pressure: float, m: MaterialData) -> Array:
-        """Internal minus external forces (n, 3) in N of solids and contact, on tied and carried nodes, too."""
+        """Internal minus external forces (n, 3) in N of solids and contact, before they are passed on."""
         self._place(u)
         self._least_force = m.least_force_N
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
@@ -669,7 +673,9 @@ class Model:
         rows, columns = self.self_contact.room(u)
         if self._carried is None:
             return rows, columns
-        found = self._uncarried(sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(3 * len(self.mesh.nodes),) * 2), u)
+        found = self._uncarried(
+            sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(3 * len(self.mesh.nodes),) * 2), u
+        )
         return found.row, found.col
 
     def forget_contact(self) -> None:

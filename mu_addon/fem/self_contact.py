@@ -499,7 +499,11 @@ class SelfContact:
 
     def _moved_mm(self, places: Array) -> float:
         """How far any node has moved since the search whose candidates are kept; infinite without one."""
-        return np.inf if self._kept is None else float(np.sqrt(((places - self._kept[0]) ** 2).sum(axis=1).max()))
+        return (
+            np.inf
+            if self._kept is None
+            else float(np.sqrt(((places - self._kept[0]) ** 2).sum(axis=1).max()))
+        )
 
     def _candidates(self, places: Array) -> Any:
         """ipctk's candidates among which all pairs are that are within the gap at some places (v, 3)."""

@@ -95,7 +95,8 @@ class UnitBody:
     def mesh(self) -> Mesh:
         """Its own mesh. Raises InputError and MeshingError."""
         m = self.mechanics
-        return mesh_of(self.printed, m.settings.without_beams, mesher=m.mesher, cache=m.cache, body=self.envelope)
+        settings = m.settings.without_beams
+        return mesh_of(self.printed, settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
 
     @property
     def envelope(self) -> Body | None:

@@ -1,8 +1,8 @@
 """Struts of a resolved mesh as beams, wherever they are whole: away from wall, waveguide and cuts.
 
-A strut's mesh is swept in layers from its cell's corner to its centre. Where a layer and the one beside it lie
-clear of all that struts stand on, it becomes one beam of `fem.beams`, whose sections carry the layer's nodes.
-Feet, cut struts and joints of any of these stay solid, so that what struts do to the wall is as it was.
+A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of all that struts stand
+on becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and the
+joints of any of these stay solid, so that what struts do to the wall is what solid ones do.
 """
 
 from __future__ import annotations

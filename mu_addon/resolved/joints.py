@@ -1,9 +1,9 @@
 """Where struts meet they are stiffer than beams: zones about a joint that do not stretch, or do not bend.
 
-In an endless lattice of half diagonals under small strain joints move with the mean strain and do not turn.
-With k_a and k_t, the stiffness of a half diagonal along and across it with ends that do not turn, and h, half
-a cell: C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell's two moduli give both, and these
-the lengths of both zones. The bulk modulus is then k_a/(3 h): what it falls short of the solid's is told.
+In an endless lattice of half diagonals under small strain, joints move with the mean strain and do not turn.
+Let k_a and k_t be the stiffness of a half diagonal along and across it, its ends not turning, and h half a
+cell. Then C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell's moduli give k_a and k_t, and
+these the lengths of both zones. The bulk modulus is then k_a/(3 h); its error is kept.
 """
 
 from __future__ import annotations
@@ -96,7 +96,11 @@ class _Strut:
         x, w = np.polynomial.legendre.leggauss(64)
         span = self.length - 2 * zone
         s = zone + span * (1 + x) / 2
-        return s, self.kind.radius(s / self.length, self.junction_diameter / 2, self.midspan_diameter / 2), span * w / 2
+        return (
+            s,
+            self.kind.radius(s / self.length, self.junction_diameter / 2, self.midspan_diameter / 2),
+            span * w / 2,
+        )
 
     def along(self, zone: float) -> float:
         """Axial stiffness in N/mm."""

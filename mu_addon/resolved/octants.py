@@ -68,7 +68,7 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
 
 
 class Places(NamedTuple):
-    """Nodes (p,) and struts (p,) that they belong to, and where in these they lie, as `strut.placed` has it."""
+    """Nodes (p,), struts (p,) that they belong to, and where in these they lie (`strut.placed`)."""
 
     node: Array
     strut: Array

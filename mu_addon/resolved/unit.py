@@ -88,8 +88,10 @@ def mesh_printed(
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
     the wall. Struts that are half diagonals are beams where they are whole (`with_beams`), unless the
-    settings ask for the fidelity "solid". The base is clamped, the inlet is left out. settings: of it the fraction ("half" or "full") and
-    `refine` count. cache: folder for the octants of lattices other than body-centred. body: a closed surface
+    settings ask for the fidelity "solid". The base is clamped, the inlet is left out.
+
+    settings: of it fidelity, fraction ("half" or "full") and `refine` count. cache: folder for the octants
+    of lattices other than body-centred. body: a closed surface
     that cuts the lattice in place of its box. progress: called with a stage and the share done. sizes: of
     elements before `refine` divides them. Raises InputError and MeshingError.
     """
@@ -117,7 +119,9 @@ def mesh_printed(
     check_positive(mesh)
     if s.fidelity != SOLID and is_half_diagonal(d):
         reach = REACH * d.junction_diameter
-        mesh = with_beams(mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach)
+        mesh = with_beams(
+            mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach
+        )
     report("mesh", 1.0)
     return mesh
 

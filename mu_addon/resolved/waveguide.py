@@ -16,8 +16,8 @@ from ..design.waveguide import Bar, waveguide
 from ..errors import InputError
 from ..meshing.mesh import LATTICE, Mesh, part
 from ..meshing.quality import check_positive
-from .beams import REACH, without_beams
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
+from .beams import REACH, without_beams
 from .lattice import LEAST_SUPPORT, Depth, clearance, cuts, filled_outside, support
 from .octants import in_replaced, is_thickening, thickened_nodes
 from .strut import is_half_diagonal
@@ -76,7 +76,9 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     within[wall_ties.nodes] = False
     within[mesh.beams[:, 1::2]] = False
     if len(mesh.beams):
-        touched = (filled != mesh.filled).any(axis=1) | (found.nodes != mesh.nodes).any(axis=1)[found.tets].any(axis=1)
+        touched = (filled != mesh.filled).any(axis=1) | (found.nodes != mesh.nodes).any(axis=1)[
+            found.tets
+        ].any(axis=1)
         touched |= (away[found.tets] < REACH * d.junction_diameter).any(axis=1)
         found = without_beams(found, touched & struts)
 

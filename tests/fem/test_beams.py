@@ -72,7 +72,9 @@ def test_forces_are_the_slope_of_the_energy_and_stiffness_that_of_the_forces(siz
     np.testing.assert_allclose(stiffness, stiffness.transpose(0, 2, 1), atol=1e-12 * np.abs(stiffness).max())
 
 
-@given(st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3), st.lists(st.floats(-9, 9), min_size=3, max_size=3))
+@given(
+    st.lists(st.floats(-1.5, 1.5), min_size=3, max_size=3), st.lists(st.floats(-9, 9), min_size=3, max_size=3)
+)
 def test_a_rigid_motion_changes_no_energy(turn, shift):
     beams = some()
     x = 0.4 * RNG.normal(size=(6, 12))
@@ -116,8 +118,8 @@ def test_the_elastica(load, across, along_it):
 
 def test_a_bent_cantilever_leaves_its_plane_as_bathe_and_bolourchi_have_it():
     # 45 degrees of a circle of radius 100, section 1 x 1, E 1e7, no lateral strain, 600 at the tip: Int. J.
-    # Numer. Methods Eng. 14 (1979) 961: 15.9, 47.2, 53.4. Simo and Vu-Quoc (1986): 15.79, 47.23, 53.37; Crisfield
-    # (1990): 15.61, 46.84, 53.71.
+    # Numer. Methods Eng. 14 (1979) 961: 15.9, 47.2, 53.4. Simo and Vu-Quoc (1986): 15.79, 47.23, 53.37;
+    # Crisfield (1990): 15.61, 46.84, 53.71.
     angle = np.linspace(0, np.pi / 4, 17)
     points = 100 * np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle])
     beams = along(points, area=1.0, inertia=1 / 12, torsion=0.1406, young=1e7, shear=5 / 6)

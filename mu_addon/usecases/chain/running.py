@@ -112,7 +112,8 @@ class Running:
         pressures = job.joint.pressures(*span)
         with progress.stage(f"mesh of unit {number}"), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            mesh = mesh_of(unit, job.mesh.without_beams, lambda _, share: progress.update(share), cache=self.cache.folder)
+            settings = job.mesh.without_beams
+            mesh = mesh_of(unit, settings, lambda _, share: progress.update(share), cache=self.cache.folder)
         for warning in caught:
             if issubclass(warning.category, MeshingWarning):
                 self.warn(str(warning.message))
