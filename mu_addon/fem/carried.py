@@ -36,6 +36,7 @@ class Carried:
         self.count = len(mesh.nodes)
         self.nodes = mesh.carried
         self._own, self._node, self._turn = own, node[own, side], turn[own, side]
+        self._turns, self._of = np.unique(self._turn, return_inverse=True)
         self._share = shares[own, side]
         self._arm = mesh.nodes[mesh.carried[own]] - mesh.nodes[self._node]
 
@@ -44,34 +45,43 @@ class Carried:
 
     def follow(self, u: Array) -> Array:
         """Displacements u (n, 3) in mm with those of carried nodes set, in place."""
-        moved = np.einsum("kij,kj->ki", rotations(u[self._turn]), self._arm) - self._arm + u[self._node]
+        turned = rotations(u[self._turns])[self._of]
+        moved = np.einsum("kij,kj->ki", turned, self._arm) - self._arm + u[self._node]
         for axis in range(3):
             u[self.nodes, axis] = np.bincount(self._own, self._share * moved[:, axis], len(self.nodes))
         return u
 
     def slopes(self, u: Array) -> Array:
         """Slopes (k, 3, 3) of each carried node's displacement by a rotation vector, its share included."""
-        return self._share[:, None, None] * turned_slopes(u[self._turn], self._arm)
+        by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
+        return np.einsum("kiaj,ka->kij", by_axis[self._of], self._share[:, None] * self._arm)
+
+    def _axes(self) -> Array:
+        """The three axes as arms of each turning section, (3, t, 3)."""
+        return np.broadcast_to(np.eye(3)[:, None], (3, len(self._turns), 3))
 
     def fold(self, u: Array, forces: Array) -> Array:
         """Forces (n, 3) in N with those on carried nodes passed on to beams, in place; couples in N mm."""
         acting = forces[self.nodes[self._own]]
-        np.add.at(forces, self._node, self._share[:, None] * acting)
-        np.add.at(forces, self._turn, np.einsum("kji,kj->ki", self.slopes(u), acting))
+        couples = np.einsum("kji,kj->ki", self.slopes(u), acting)
+        for rows, values in ((self._node, self._share[:, None] * acting), (self._turn, couples)):
+            for axis in range(3):
+                forces[:, axis] += np.bincount(rows, values[:, axis], len(forces))
         forces[self.nodes] = 0.0
         return forces
 
     def turning(self, u: Array, forces: Array) -> tuple[Array, Array]:
-        """Stiffness (b, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
+        """Stiffness (t, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
 
-        And the nodes (b,) that hold them: what forces that keep their direction do as their arms turn.
+        And the nodes (t,) that hold them: what forces that keep their direction do as their arms turn.
         """
         acting = self._share[:, None] * forces[self.nodes[self._own]]
-        blocks = turned_curvature(u[self._turn], self._arm, acting)
-        turns, of = np.unique(self._turn, return_inverse=True)
-        found = np.zeros((len(turns), 3, 3))
-        np.add.at(found, of, blocks)
-        return found, turns
+        found = np.zeros((len(self._turns), 3, 3))
+        for axis, arm in enumerate(self._axes()):
+            lever = self._arm[:, axis]
+            total = [np.bincount(self._of, acting[:, i] * lever, len(self._turns)) for i in range(3)]
+            found += turned_curvature(u[self._turns], arm, np.column_stack(total))
+        return found, self._turns
 
     def pairs(self, rows: Array, columns: Array) -> Folding:
         """How blocks between nodes, rows (b,) >= columns (b,), act between beam nodes; see `Folding`."""

@@ -146,6 +146,8 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
         self._least_force = self._beam_forces = 0.0
+        # Where forces were found last, and they: they turn with the sections that they act on.
+        self._seen: tuple[Array, float, MaterialData, Array] | None = None
         self.reference = Reference(mesh, device)
         # Now, since it raises MeshingError.
         _ = self.reference.at
@@ -334,7 +336,10 @@ class Model:
         np.add.at(found, of_beams, blocks)
         folded = self._carried_blocks(own[self._carrying], self._carried.operators(u))
         np.add.at(found, of_carried, folded)
-        turning, turns = self._carried.turning(u, self._forces(u, pressure, m))
+        seen = self._seen
+        if seen is None or seen[1] != pressure or seen[2] is not m or not np.array_equal(seen[0], u):
+            seen = u, pressure, m, self._forces(u, pressure, m)
+        turning, turns = self._carried.turning(u, seen[3])
         np.add.at(
             found,
             np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)),
@@ -575,6 +580,7 @@ class Model:
         """
         found = self._forces(u, pressure, m)
         if self._carried is not None:
+            self._seen = u.copy(), pressure, m, found.copy()
             self._carried.fold(u, found)
             assert m.beams is not None
             forces = m.beams.forces(self._unknowns_of_beams(u))
