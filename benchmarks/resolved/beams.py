@@ -55,7 +55,7 @@ def bodies():
         "struts x 1.3": struts(1.3),
         "graded, 0.8 to 1.2": attrs.evolve(base, grading=attrs.evolve(base.grading, base=0.8, tip=1.2)),
         "scale 0.75": attrs.evolve(small, chambers=attrs.evolve(small.chambers, count=3)),
-        "two chambers": attrs.evolve(base, chambers=attrs.evolve(base.chambers, count=2)),
+        "four chambers": attrs.evolve(base, chambers=attrs.evolve(base.chambers, count=4)),
     }
 
 
