@@ -86,7 +86,9 @@ def main() -> None:
     parser.add_argument("--refine", type=float, default=1.0)
     parser.add_argument("--solid-refine", type=float, default=1.4)
     options = parser.parse_args()
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True).stdout.strip()
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
+    ).stdout.strip()
     print(f"{time.strftime('%Y-%m-%d')}, commit {commit}: angle in degrees, off by / tip's way off by")
     print("| body | struts | unknowns | s | " + " | ".join(f"{p:g} kPa" for p in PRESSURES_KPA) + " |")
     print("| --- | --- | --- | --- |" + " --- |" * len(PRESSURES_KPA))
@@ -107,7 +109,9 @@ def main() -> None:
                     words += f" {off[0]:+.1f} / {off[1]:+.1f} %"
                 cells.append(words)
             label = f"{fidelity}, refine {refine:g}"
-            print(f"| {name} | {label} | {unknowns} | {seconds:.0f} | " + " | ".join(cells) + " |", flush=True)
+            print(
+                f"| {name} | {label} | {unknowns} | {seconds:.0f} | " + " | ".join(cells) + " |", flush=True
+            )
 
 
 if __name__ == "__main__":
