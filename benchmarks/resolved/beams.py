@@ -2,8 +2,8 @@
 
     python -m benchmarks.resolved.beams [--body NAME ...] [--refine 1] [--solid-refine 1.4]
 
-Each body, three chambers of mu-1.0x changed in one thing, without contact: its tip's angle and how far its tip
-moves, with beams, and with solid struts on the mesh of `--solid-refine`; unknowns and seconds of processor time.
+Each body is three chambers of mu-1.0x changed in one thing, without contact. A row gives its tip's angle and
+how far its tip moves, with beams or with solid struts on a finer mesh, unknowns and processor seconds.
 """
 
 from __future__ import annotations

@@ -177,7 +177,8 @@ def add_fidelity(command: argparse.ArgumentParser) -> None:
         "--fidelity",
         choices=FIDELITIES,
         default=HOMOGENISED,
-        help="Model of the lattice: every strut as printed, or a continuum (default: homogenised).",
+        help="Model of the lattice: every strut as printed (resolved; solid checks it), or a continuum "
+        "(default: homogenised).",
     )
     command.add_argument(
         "--self-contact",
@@ -195,8 +196,9 @@ def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--fidelity",
         choices=FIDELITIES,
-        help="Model of the lattice: every strut as printed, or a continuum for a quick look (default: "
-        "resolved; homogenised with --lattice, --rule, --mesher or --order 1, which need it).",
+        help="Model of the lattice: every strut as printed (resolved: beams where they are whole; solid, to "
+        "check them), or a continuum for a quick look (default: resolved; homogenised with --lattice, --rule, "
+        "--mesher or --order 1, which need it).",
     )
     command.add_argument(
         "--self-contact",

@@ -2,7 +2,7 @@
 
 In an endless lattice of half diagonals under small strain, joints move with the mean strain and do not turn.
 Let k_a and k_t be the stiffness of a half diagonal along and across it, its ends not turning, and h half a
-cell. Then C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell's moduli give k_a and k_t, these
+cell. Then C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell gives k_a and k_t, and these
 the lengths of both zones. The bulk modulus is then k_a/(3 h); its error is kept.
 """
 

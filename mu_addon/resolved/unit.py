@@ -104,7 +104,11 @@ def mesh_printed(
             'choose fraction "half" or "full" and order 2, or fidelity "homogenised"',
         )
     d = unit.printed
+    beams = s.fidelity != SOLID and is_half_diagonal(d)
     sizes = (sizes or Sizes()).refined(s.refine)
+    if beams:
+        # Beams cost little: a coarser mesh is one of the wall.
+        sizes = attrs.evolve(sizes, layers=max(sizes.layers, Sizes().layers))
     report("mesh of the wall", 0.0)
     full = body is not None or s.fraction == "full"
     wall = wall_mesh(d, sizes)
@@ -117,7 +121,7 @@ def mesh_printed(
     clear = clearance(d, lattice.nodes)
     mesh = tied(wall, lattice, clear - near)
     check_positive(mesh)
-    if s.fidelity != SOLID and is_half_diagonal(d):
+    if beams:
         reach = REACH * d.junction_diameter
         mesh = with_beams(
             mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach
