@@ -26,6 +26,9 @@ from .waveguide import bar_of, with_waveguide
 
 Array = np.ndarray[Any, Any]
 
+EASED_CELLS = 1.0
+"""How far from a waveguide, in cells, a candidate's start gives way to it."""
+
 MaterialsOf = Callable[[Mesh], Materials]
 ModelOf = Callable[[Mesh], Model]
 
@@ -59,7 +62,8 @@ class PrintedWaveguides:
         """
         path, last = self.paths[number], way[-1]
         equilibrium = self._equilibrium(path)
-        start = eased(equilibrium, started(self.mesh, equilibrium.model.mesh, path, last.u), last.u)
+        bent = started(self.mesh, equilibrium.model.mesh, path, last.u)
+        start = eased(equilibrium, bent, last.u, EASED_CELLS * self.unit.printed.cell)
         near = _near(equilibrium, start, last.pressure_MPa)
         if near is not None:
             return [near]

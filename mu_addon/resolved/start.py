@@ -77,14 +77,17 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
     return following(mesh, np.vstack([moved, bent]))
 
 
-def eased(equilibrium: Equilibrium, start: Array, u: Array) -> Array:
+def eased(equilibrium: Equilibrium, start: Array, u: Array, reach_mm: float = np.inf) -> Array:
     """A start (m, 3) in mm of `started` whose struts give way to the waveguide that they hang on.
 
     equilibrium: of the unit with its waveguide; u (n, 3): the unit's own state in mm. Struts' nodes that
     follow bar or seats have left what is around them, by tenths of a millimetre where the unit is bent
     far, and elements there may be inverted. The rest of the unit moves as it would, were it linear and
-    undeformed, with the waveguide held where it is.
+    undeformed, with the waveguide held where it is, and all that is farther from it than reach_mm as drawn:
+    walls and struts that touch there would cross.
     """
+    from scipy.spatial import cKDTree
+
     model, own = equilibrium.model, len(u)
     left = np.zeros_like(start)
     left[:own] = start[:own] - u
@@ -96,7 +99,10 @@ def eased(equilibrium: Equilibrium, start: Array, u: Array) -> Array:
     pulled = model.residual(small * left, 0.0, equilibrium.parameters) - still
     tangent = equilibrium.rest_tangent.copy()
     # The first entry of a column of the lower triangle is the diagonal's.
-    diagonal = model.pattern.indptr[:-1][model.free // 3 >= own]
+    held = np.arange(len(start)) >= own
+    if np.isfinite(reach_mm):
+        held |= cKDTree(model.mesh.nodes[own:]).query(model.mesh.nodes)[0] > reach_mm
+    diagonal = model.pattern.indptr[:-1][held[model.free // 3]]
     tangent[diagonal] *= _HELD
     model.factor.factor(tangent)
     return model.moved(start, -model.factor.solve(pulled.ravel()[model.free] / small))

@@ -204,6 +204,20 @@ def test_a_block_on_another_passes_on_its_pressure(order):
     assert not touch.pressure_kPa[mesh.base].any()
 
 
+def test_what_is_kept_of_a_search_finds_what_a_new_one_does():
+    """Pairs and free steps of a surface that moves on a little, and then far, against those of a new search."""
+    mesh = fork(2)
+    contact, random = SelfContact(mesh, D, K), np.random.default_rng(1)
+    u = lean(mesh, 0.46)
+    for size in (0.2 * D, 0.4 * D, 0.4 * D, 3.0 * D):
+        to = u + size / 2 * random.uniform(-1, 1, mesh.nodes.shape)
+        new = SelfContact(mesh, D, K)
+        assert contact.free_share(u, to) == pytest.approx(new.free_share(u, to), rel=1e-9)
+        u = u + 0.5 * contact.free_share(u, to) * (to - u)
+        assert contact.count(u) == new.count(u)
+        assert contact.energy_mJ(u) == pytest.approx(new.energy_mJ(u), rel=1e-12)
+
+
 def test_a_plate_presses_a_block_on_another_without_a_touch():
     """Self-contact and an obstacle in one model: what the plate presses with arrives at the base."""
     mesh = plates(4, 5)

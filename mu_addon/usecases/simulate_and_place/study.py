@@ -208,7 +208,8 @@ class Study:
             self.quality = mesh_quality(self.mesh, self.job.unit, self.job.body, struts)
             modulus, _ = self.job.materials(self.mesh).small_strain(len(self.mesh.tets))
             write_mesh(self.folder / "mesh.vtu", self.mesh, modulus)
-        self.context.summary["mesh"] = {**attrs.asdict(self.quality), "hash": self.mesh.hash()}
+        own = {"beams": len(self.mesh.beams), "hash": self.mesh.hash()}
+        self.context.summary["mesh"] = {**attrs.asdict(self.quality), **own}
         return self.mesh
 
     def _mesh(self, settings: MeshSettings) -> Mesh:
