@@ -197,8 +197,8 @@ def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
         "--fidelity",
         choices=FIDELITIES,
         help="Model of the lattice: every strut as printed (resolved: beams where they are whole; solid, to "
-        "check them), or a continuum for a quick look (default: resolved; homogenised with --lattice, --rule, "
-        "--mesher or --order 1, which need it).",
+        "check these), or a continuum for a quick look (default: resolved; homogenised with --lattice, "
+        "--rule, --mesher or --order 1, which need it).",
     )
     command.add_argument(
         "--self-contact",

@@ -205,7 +205,7 @@ def test_a_block_on_another_passes_on_its_pressure(order):
 
 
 def test_what_is_kept_of_a_search_finds_what_a_new_one_does():
-    """Pairs and free steps of a surface that moves on a little, and then far, against those of a new search."""
+    """Pairs and free steps of a surface that moves on a little, then far, against a new search."""
     mesh = fork(2)
     contact, random = SelfContact(mesh, D, K), np.random.default_rng(1)
     u = lean(mesh, 0.46)
