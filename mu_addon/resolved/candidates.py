@@ -56,18 +56,25 @@ class PrintedWaveguides:
         """A candidate's state, on its own mesh, at the pressure of the last of some states of Model A.
 
         way: Model A's states on one side of rest, in order of pressure. Where no start near the last one
-        leads to a state the candidate is followed from rest, and there is a state for each of `way`. The
-        mesh of a candidate begins with the nodes of the unit's. Raises ConvergenceError, and InputError for a
-        candidate that cannot be printed.
+        leads to a state the candidate is followed from the nearest one before where one does, or from rest,
+        and there is a state for each of `way` from there on. The mesh of a candidate begins with the nodes of
+        the unit's. Raises ConvergenceError, and InputError for a candidate that cannot be printed.
         """
-        path, last = self.paths[number], way[-1]
+        path = self.paths[number]
         equilibrium = self._equilibrium(path)
-        bent = started(self.mesh, equilibrium.model.mesh, path, last.u)
-        start = eased(equilibrium, bent, last.u, EASED_CELLS * self.unit.printed.cell)
-        near = _near(equilibrium, start, last.pressure_MPa)
-        if near is not None:
-            return [near]
+        for begin in range(len(way) - 1, -1, -1):
+            found = self._near(equilibrium, path, way[begin])
+            if found is not None:
+                on = [state.pressure_MPa for state in way[begin + 1 :]]
+                with contextlib.suppress(ConvergenceError):
+                    return [found, *equilibrium.path(on, found)]
         return equilibrium.path([state.pressure_MPa for state in way], equilibrium.at_zero_pressure())
+
+    def _near(self, equilibrium: Equilibrium, path: Array, state: State) -> State | None:
+        """A candidate's state near one of Model A, or None where there is none to be found."""
+        bent = started(self.mesh, equilibrium.model.mesh, path, state.u)
+        start = eased(equilibrium, bent, state.u, EASED_CELLS * self.unit.printed.cell)
+        return _near(equilibrium, start, state.pressure_MPa)
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm of one candidate along its whole path through pressures (s,), from rest.
