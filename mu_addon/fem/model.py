@@ -629,13 +629,16 @@ class Model:
             inputs = [part_MPa, self._x, faces, *self._face_rule]
             inputs += [self._element_blocks + first * per_face, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
-        blocks = self._gathered(u)
-        if self._carried is not None:
-            blocks = self._beam_tangent(u, pressure, m, blocks)
-        values = np.asarray(blocks.ravel()[self._scalar_map])
+        values = self._values(self._gathered(u), u, pressure, m)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
+
+    def _values(self, blocks: Array, u: Array, pressure: float, m: MaterialData) -> Array:
+        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with those of beams added."""
+        if self._carried is not None:
+            blocks = self._beam_tangent(u, pressure, m, blocks)
+        return np.asarray(blocks.ravel()[self._scalar_map])
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
         """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""

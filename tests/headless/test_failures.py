@@ -103,7 +103,7 @@ def test_impossible_geometry_names_the_largest_wall(tmp_path):
     )
     done = here("design", "--unit", file, "--out", tmp_path / "out")
     # a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm
-    assert_clear_failure(done, 2, "wall", "1.87", "curvature")
+    assert_clear_failure(done, 2, "wall", "1.87", "cavity")
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_an_unknown_path_is_refused_before_any_work(tmp_path):
 def test_json_messages_end_with_one_terminal_message(tmp_path):
     good = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--json", "--no-report")
     messages = [json.loads(line) for line in good.stdout.splitlines()]
-    assert {m["type"] for m in messages[:-1]} == {"progress"}
+    assert {m["type"] for m in messages[:-1]} == {"plan", "progress"}
     assert messages[-1]["type"] == "result"
     bad = run("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
     assert json.loads(bad.stdout.splitlines()[-1])["type"] == "error"
