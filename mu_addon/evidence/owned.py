@@ -200,7 +200,9 @@ def coinciding(
     """
     chosen = found.chosen
     scales = [e for e in fitter.simulator.effects if e.name == "force_scale"]
-    owned = [e for e in owned_effects(scales, fitter.record.experiments) if set(e.kinds) & set(MACHINE)]
+    # A standard deviation that is stated has in it by how much specimens differ.
+    single = [e for e in fitter.record.experiments if "stress_sd_kPa" not in e.columns]
+    owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
     if not owned or not found.causes or found.left or found.doubted:
         return found
     causes = []

@@ -74,9 +74,11 @@ def test_the_file_says_what_the_design_asks(lagging):
         "remaining_structure",
         "gain",
         "residual_table",
+        "nearest",
         "next_experiment",
         "identifiability",
     }
+    assert set(written["nearest"]) == {"effect", "share"}
     assert written["partly_explained_by"] == []
     cause = written["causes"][0]
     assert set(cause) == {"effect", "mechanism", "parameters", "p_value", "rivals", "share", "of", "among"}
