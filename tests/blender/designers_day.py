@@ -79,7 +79,7 @@ watch(child)
 assert child.state == child_module.DONE, child.error
 assert not any("gmsh" in warning for warning in child.warnings), child.warnings
 found = studies.findings(root)
-assert (found.status, found.stale, found.quick) == ("complete", False, True)
+assert (found.summary["status"], found.stale, found.quick) == ("complete", False, True)
 assert len(found.ranking) == 10
 for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
     assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}

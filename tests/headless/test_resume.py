@@ -91,7 +91,7 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
     os.kill(worker, signal.SIGSTOP)  # it holds its lock however long the second takes to start
     second = run("design", "--preset", "mu-0.75x", "--out", tmp_path)
     assert first.poll() is None
-    assert_clear_failure(second, 2, "another run uses this folder", f"process {worker} ", "what to do")
+    assert_clear_failure(second, 2, "another run uses this folder", f"process {first.pid} ", "what to do")
     assert not (tmp_path / "stale").exists()
     first.kill()
     first.wait()

@@ -46,7 +46,7 @@ def test_panels_tell_what_a_child_says():
     child = launch(root, "hang")
     watch(lambda: child.progress)
     # Three seconds, counted down since the child said so.
-    assert re.search(r"0\.50 Model A, [0-3](\.\d)? s left", drawn()), drawn()
+    assert re.search(r"0\.50 50%, Model A, [0-3](\.\d)? s left", drawn()), drawn()
     assert "mu.cancel" in drawn()
     assert not bpy.ops.mu.simulate.poll()
     assert bpy.ops.mu.cancel() == {"FINISHED"}
@@ -183,7 +183,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     assert child.state == "done", child.error
     assert len(set(fractions)) > 3
     found = studies.findings(root)
-    assert found.status == "complete"
+    assert found.summary["status"] == "complete"
     assert not found.stale
     assert found.angles[0][0] < 0 < found.angles[-1][0]
     assert found.angles[0][1] < 0 < found.angles[-1][1]
