@@ -54,9 +54,8 @@ def _swapped(rng: Rng, tests: Sequence[Trial], sd: float) -> list[Trial]:
     found = []
     for number, t in enumerate(tests):
         scaled = t.columns[t.channel] * (1.1 if number % 2 else 1.0)
-        found.append(
-            attrs.evolve(_with(t, t.channel, scaled), fields={**t.fields, "specimen": "AB"[number // 3]})
-        )
+        label = "A" if 2 * number < len(tests) else "B"
+        found.append(attrs.evolve(_with(t, t.channel, scaled), fields={**t.fields, "specimen": label}))
     return found
 
 

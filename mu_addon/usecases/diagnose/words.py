@@ -24,7 +24,7 @@ _INSTEAD = {
     "a longer hold, and the same in a rigid chamber of that volume": "a hold ten times as long",
 }
 # Share of a misfit from which on what takes it is worth a sentence.
-WORTH_TELLING = 0.1
+LEAST_SHARE = 0.1
 
 
 def readable(name: str) -> str:
@@ -162,7 +162,7 @@ def _far(verdict: Verdict) -> str:
 
 def _near(verdict: Verdict) -> str:
     """What comes nearest to an explanation, and its share of the misfit, in words."""
-    if verdict.nearest is None or verdict.nearest[1] < WORTH_TELLING:
+    if verdict.nearest is None or verdict.nearest[1] < LEAST_SHARE:
         return "No single effect takes a tenth of the misfit."
     title, share = verdict.nearest
     return f"The nearest single effect, {readable(title)}, takes {100 * share:.3g} % of the misfit (of χ²)."
