@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import traceback
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -123,7 +124,15 @@ class RunContext:
                 report.unlink()
         self.folder = folder
         self._write_running()
-        self.progress.sinks.append(self._keep_found)
+        # Without a circle of references the lock goes with the context.
+        own = weakref.WeakMethod(self._keep_found)
+
+        def keep(message: Message) -> None:
+            found = own()
+            if found is not None:
+                found(message)
+
+        self.progress.sinks.append(keep)
         return folder
 
     def _write_running(self) -> None:
