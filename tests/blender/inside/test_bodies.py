@@ -121,7 +121,9 @@ def test_flaws_are_marked_in_their_places():
     assert drawing.beside(root, drawing.FLAWS) is None
 
     choose(barrel(width=0.01875, tall=0.025, low=0.0, high=0.08), root)
-    assert "seems to be in metres" in refused(bpy.ops.mu.body)
+    told = refused(bpy.ops.mu.body)
+    assert "seems to be in" in told
+    assert "metres" in told
     for other in bpy.context.selected_objects:
         other.select_set(False)
     assert "no mesh is selected" in refused(bpy.ops.mu.body)
