@@ -176,7 +176,7 @@ def select_owned(
         table = tuple(strict_table(fitter, best))
         # An effect of the last experiment alone is like something that broke before it.
         margin = 0.0 if best.names[-1] == STEP else RIVAL_DELTA_CHI2
-        if structure(table) or sudden(found.table_base, found.base, best, margin):
+        if sudden(found.table_base, found.base, best, margin):
             continue
         tried = [f.effects[-1] for f in pool[:MOST_FITS]]
         level = [f for f in [*pool, *rivals] if len(f.effects) == 1]
@@ -185,6 +185,11 @@ def select_owned(
         chosen = attrs.evolve(
             found, chosen=best, causes=causes, table=table, singles=singles, doubted="", p_best=p
         )
+        if chosen.left:
+            # It may be the same of one more specimen; of several it is what differs among them, see `pooled`.
+            chosen = further_owners(fitter, chosen, progress)
+            if chosen.left or len(chosen.chosen.effects) > len(best.effects) + 1:
+                continue
         return chosen, every
     return attrs.evolve(found, wider=tuple(wider)), list(seen)
 
@@ -241,7 +246,7 @@ def further_owners(
     from scipy.stats import chi2
 
     chosen = found.chosen
-    if not chosen.effects or found.left or found.doubted:
+    if not chosen.effects or found.doubted:
         return found
     first = chosen.effects[-1]
     kind, _, _ = first.whose.partition(" ")
@@ -264,10 +269,11 @@ def further_owners(
         if p >= FALSE_ALARM_RATE or size_at_bound(best) or loss(fitter, chosen, best) <= 0.0:
             break
         table = tuple(strict_table(fitter, best))
-        if structure(table):
-            break
         causes.append(Cause(best.effects[-1], p, chosen.chi2 - best.chi2, ()))
-        found = attrs.evolve(found, chosen=best, causes=tuple(causes), table=table)
+        if not structure(table):
+            found = attrs.evolve(found, chosen=best, causes=tuple(causes), table=table)
+        elif not found.left:
+            break
         chosen = best
         others.remove(_owner(best))
     return found

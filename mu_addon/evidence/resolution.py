@@ -25,6 +25,7 @@ WRONG = 8.0
 # Of a record so few readings may stand alone: what happens more often is no accident, as corners of a fast
 # cycle are none. Beside a prediction, which has such corners, more may be wrong.
 MOST_ALONE, MOST_WRONG = 0.02, 0.1
+MANY = 100
 FEWEST = 9
 # Readings around one of which the median is what it should be off by; a change is as fast as another one from
 # this share of it on, and so many times more readings of such changes must be right.
@@ -261,7 +262,9 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
         alike = fast >= ALIKE * fast[i]
         if np.count_nonzero(alike & ~alone) < TIMES_MORE * np.count_nonzero(alike & alone):
             return found
-    if np.count_nonzero(alone) <= max(1, MOST_WRONG * len(off)):
+    # Of a short record so many are no accident beside a prediction either.
+    most = MOST_WRONG if len(off) >= MANY else MOST_ALONE
+    if np.count_nonzero(alone) <= max(1, most * len(off)):
         found[known[alone]] = True
     return found
 

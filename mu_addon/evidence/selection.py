@@ -393,7 +393,8 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     best, base = pool[0], found.base
     left = max(1.0 - share_taken(fitter, base, best), 1e-6)
     sure = left <= 1.0 - MAINLY
-    if left > 1.0 - GRADED:
+    if left > 1.0 - GRADED or (not sure and base.chi2 < 2.0 * len(fitter.record)):
+        # Of a misfit that is less than the noise shares say nothing.
         return None
     others: dict[str, float] = {}
     for f in [*found.singles, *found.wider]:

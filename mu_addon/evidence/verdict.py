@@ -294,7 +294,11 @@ def diagnose(
     if chosen.left or chosen.doubted:
         # They were not all that was wrong.
         experiments, set_aside, fitter, base, seen, chosen = before
-    if _kind(fitter, chosen) == "unexplained":
+    most = None
+    if _kind(fitter, chosen) == "unexplained" and not _of_no_size(fitter, chosen):
+        # Where a cause takes most of a misfit, fast errors of its law would pass for bursts.
+        most = mainly(fitter, chosen)
+    if _kind(fitter, chosen) == "unexplained" and most is None:
         left = fitter.record.values - fitter.predict(chosen.chosen.values)
         measured, bursts = with_bursts(fitter.record, left)
         if bursts:
@@ -313,7 +317,7 @@ def diagnose(
     if kind == "none" and not chosen.excused and (words := too_far(fitter, chosen.base)):
         chosen = attrs.evolve(chosen, doubted=words)
         kind = _kind(fitter, chosen)
-    if kind == "unexplained" and (most := mainly(fitter, chosen)) is not None:
+    if kind == "unexplained" and (most := most or mainly(fitter, chosen)) is not None:
         chosen = most
         kind = "ambiguous" if any(c.rivals for c in chosen.causes) else "named"
     progress("gain")
