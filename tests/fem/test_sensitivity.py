@@ -20,7 +20,7 @@ PRESSURE = 0.01
 def printed():
     unit = load_preset("mu-1.0x")
     small = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
-    return mesh_printed(small, MeshSettings(refine=0.2, fidelity="resolved"))
+    return mesh_printed(small, MeshSettings(refine=0.2, fidelity="solid"))
 
 
 def materials(mesh, weight=1.0):
