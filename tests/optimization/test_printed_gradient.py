@@ -18,7 +18,7 @@ from mu_addon.optimization.unit_body import Mechanics, UnitBody
 
 MADE = load_preset("mu-1.0x")
 UNIT = attrs.evolve(MADE, chambers=attrs.evolve(MADE.chambers, count=3))
-SETTINGS = MeshSettings(refine=0.3, fidelity="resolved")
+SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
 FREE = [
     Freedom("chambers.wall_mm", 0.6, 1.4),
     Freedom("chambers.neck_diameter_mm", 9.0, 15.0),

@@ -12,7 +12,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.morph import PrintedMorph
 from mu_addon.resolved.unit import mesh_printed
 
-SETTINGS = MeshSettings(refine=0.3, fidelity="resolved")
+SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
 
 
 def unit(scale=1.0, **values):
