@@ -158,7 +158,7 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
 
     child = fake(grasps.GRASP, root, "hang")
     watch(lambda: child.progress)
-    assert "0.50 Model A" in drawn()
+    assert "50%, Model A" in drawn()
     assert "mu.grasp_cancel" in drawn()
     assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
     assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
@@ -221,10 +221,10 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     left, right, cube = grasp_motion.parts(root)
     assert scene.frame_end == 21
     for frame, way, height, expected in (
-        (1, 0.0, 98.0, "i, opening: 0.00 N"),
+        (1, 0.0, 98.0, "Opening: 0.00 N"),
         (6, 2.5, 88.0, "0.25 N"),
-        (11, 5.0, 78.0, "ii, closing: 0.50 N"),
-        (21, 0.0, 79.0, "v, rel"),
+        (11, 5.0, 78.0, "Closing: 0.50 N"),
+        (21, 0.0, 79.0, "Rel"),
     ):
         scene.frame_set(frame)
         graph = bpy.context.evaluated_depsgraph_get()
