@@ -205,7 +205,10 @@ def _true(name: str, title: str):
     def write(freedom, value: float) -> None:
         setattr(freedom, name, value / scale_of(freedom))
 
-    return FloatProperty(name=title, get=read, set=write, precision=3, options={"SKIP_SAVE"})
+    words = f"{title}, at the unit's scale"
+    return FloatProperty(
+        name=title, description=words, get=read, set=write, precision=3, options={"SKIP_SAVE"}
+    )
 
 
 class MU_PG_freedom(bpy.types.PropertyGroup):
