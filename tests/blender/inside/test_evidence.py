@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -130,7 +131,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
         assert expected not in drawn()
     child = start("hang")
     watch(lambda: child.progress)
-    assert "50%, Model A" in drawn()
+    assert "0.50 50%, Model A" in drawn()
     assert "mu.evidence_cancel" in drawn()
     assert not bpy.ops.mu.evidence_diagnose.poll()
     # The unit's own simulation is another one.
@@ -407,7 +408,7 @@ def test_files_of_a_machine_are_imported_and_asked_about_in_the_panel(tmp_path):
     refused(bpy.ops.mu.import_files, files=[], directory=str(tmp_path))
     assert bpy.ops.mu.import_files(directory=str(tmp_path), files=[{"name": "pull.txt"}]) == {"FINISHED"}
     texts = drawn()
-    assert "Kraft" in texts, texts
+    assert re.search(r"the unit of 'Kraft'[^\n]* is not given", texts), texts
     assert "was it a coupon" in texts
     answers = {one.key: one for one in root.mu_import.answers}
     assert answers["unit.Kraft"].value == "N"

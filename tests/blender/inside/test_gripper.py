@@ -158,7 +158,7 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
 
     child = fake(grasps.GRASP, root, "hang")
     watch(lambda: child.progress)
-    assert "50%, Model A" in drawn()
+    assert "0.50 50%, Model A" in drawn()
     assert "mu.grasp_cancel" in drawn()
     assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
     assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
