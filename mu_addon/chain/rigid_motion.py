@@ -13,30 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from ..fem.rotations import rotation as rotation
+from ..fem.rotations import skew as skew
+
 Array = np.ndarray[Any, Any]
 
 # Of the series of a motion's exponential and of its slope: rotations stay below pi, and pi^30/30! is 3e-18.
 _TERMS = 30
 # Below this angle in radians, a rotation's logarithm is its skew part.
 _SMALL = 1e-8
-
-
-def skew(w: Array) -> Array:
-    """Matrices (..., 3, 3) of the cross product by vectors w (..., 3)."""
-    w = np.asarray(w, float)
-    zero = np.zeros(w.shape[:-1])
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def rotation(w: Array) -> Array:
-    """Rotations (..., 3, 3) by rotation vectors w (..., 3) in radians, by Rodrigues' formula."""
-    w = np.asarray(w, float)
-    angle = np.linalg.norm(w, axis=-1)[..., None, None]
-    hat = skew(w)
-    half = np.sinc(angle / (2 * np.pi))
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * hat + half**2 / 2 * (hat @ hat))
 
 
 def rotation_vector(r: Array) -> Array:

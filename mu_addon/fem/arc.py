@@ -198,7 +198,7 @@ class Arc:
     def _displacement(self, z: Array) -> Array:
         u = self._start.u.copy()
         u.ravel()[self.model.free] = z[:-1]
-        return self.model.mesh.following(u)
+        return self.model.following(u)
 
     def _check_way(self, z: Array, to: Array) -> None:
         """Refuse a step in which the surface would meet itself: what lies beyond is no state."""

@@ -3,7 +3,7 @@
 A beam node has a displacement and a rotation vector, measured from the undeformed body. Between two nodes the
 section turns about one axis (Crisfield and Jelenic, Proc. R. Soc. A 455 (1999) 1125): strains are taken in
 the frame midway between both, so a rigid motion strains nothing. In linear theory an element is exact for any
-taper, since its stiffness comes from the integrated flexibility of the strut (`flexibility`).
+taper, since its stiffness comes from the integrated flexibility of the strut (`sections_of`).
 
 Unknowns of an element, (12,): displacement and rotation vector of its first node, then of its second.
 """
@@ -14,6 +14,8 @@ from typing import Any
 
 import attrs
 import numpy as np
+
+from .rotations import skew
 
 Array = np.ndarray[Any, Any]
 
@@ -41,9 +43,6 @@ class Sections:
     turn: Array
     mixed: Array
     offset: Array
-
-    def __getitem__(self, rows: Any) -> Sections:
-        return Sections(*(getattr(self, f.name)[rows] for f in attrs.fields(Sections)))
 
 
 @attrs.frozen(eq=False)
@@ -84,14 +83,13 @@ class Beams:
         """Shears (2), stretch, curvatures (2) and twist in 1/mm, (e, 6), along and about the frame's axes."""
         return _State.of(self, x).strains
 
-    def section_forces(self, x: Array) -> Array:
-        """Shear forces (2) and axial force in N, bending moments (2) and torque in N mm, (e, 6)."""
-        return np.asarray(_law(self.strains(x), self.length, self.sections)[1] / self.length[:, None])
-
 
 @attrs.frozen(eq=False)
 class _State:
-    """Strains (e, 6) of elements at their unknowns, their slopes (e, 6, 12) and what second slopes take."""
+    """Strains (e, 6) of elements at their unknowns, their slopes (e, 6, 12) and what second slopes take.
+
+    sign (e, 1): of the second node's quaternion, which is turned to the side of the first one's.
+    """
 
     strains: Array
     slopes: Array
@@ -101,6 +99,7 @@ class _State:
     second: tuple[Array, Array, Array]
     middle: Array
     relative: Array
+    sign: Array
 
     @classmethod
     def of(cls, beams: Beams, x: Array) -> _State:
@@ -126,9 +125,8 @@ class _State:
         slopes[:, 3:, 3:6] = by_relative @ (_right(qb) @ ta)
         slopes[:, 3:, 9:12] = by_relative @ (_left(qa) @ tb)
         strains = np.concatenate([stretch, turn], axis=1) / length[:, 0]
-        # Rotation vectors of the second node have the sign of its quaternion in them.
-        own = (qa, ta, x[:, 3:6]), (qb, tb, x[:, 9:12])
-        return cls(strains, slopes / length, beams, span, own[0], own[1], middle, relative)
+        first, second = (qa, ta, x[:, 3:6]), (qb, tb, x[:, 9:12])
+        return cls(strains, slopes / length, beams, span, first, second, middle, relative, sign)
 
     def curvature(self, stress: Array) -> Array:
         """Stresses (e, 6) times the second slopes of the strains, (e, 12, 12)."""
@@ -156,10 +154,9 @@ class _State:
         ab = mm + right.transpose(0, 2, 1) @ pp @ left + _between(by_p)
         ga = by_m + np.einsum("eji,ej->ei", right, by_p)
         gb = by_m + np.einsum("eji,ej->ei", left, by_p)
-        sign = np.where(np.einsum("ei,ei->e", qb, _quaternion(vb)) < 0, -1.0, 1.0)[:, None]
         found = np.zeros((len(m), 12, 12))
         found[:, 3:6, 3:6] = ta.transpose(0, 2, 1) @ aa @ ta + _quaternion_slopes(va, ga)
-        found[:, 9:12, 9:12] = tb.transpose(0, 2, 1) @ bb @ tb + _quaternion_slopes(vb, sign * gb)
+        found[:, 9:12, 9:12] = tb.transpose(0, 2, 1) @ bb @ tb + _quaternion_slopes(vb, self.sign * gb)
         found[:, 3:6, 9:12] = ta.transpose(0, 2, 1) @ ab @ tb
         found[:, 6:9, 3:6], found[:, 6:9, 9:12] = dm @ ta, dm @ tb
         found[:, 0:3, 3:6], found[:, 0:3, 9:12] = -found[:, 6:9, 3:6], -found[:, 6:9, 9:12]
@@ -212,13 +209,6 @@ def _law(strains: Array, length: Array, s: Sections) -> tuple[Array, Array, Arra
     return energy, stress, moduli
 
 
-def rotations(vectors: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3)."""
-    return np.asarray(_turned(_quaternion(vectors), np.broadcast_to(_EYE, (len(vectors), 3, 3)))).transpose(
-        0, 2, 1
-    )
-
-
 def frames_along(directions: Array) -> Array:
     """Frames (e, 3, 3) whose third row is a direction (e, 3), the others any two across it."""
     along = directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -240,11 +230,6 @@ def _sines(vectors: Array) -> tuple[Array, Array, Array, Array]:
     first = np.where(small, -1 / 48 + x / 1920 - x**2 / 215040 + x**3 / 46448640, first)
     second = (-np.sin(t / 2) / t / 8 - 3 * first) / (2 * safe)
     return cosine, s, first, np.where(small, 1 / 1920 - x / 107520 + x**2 / 15482880, second)
-
-
-def _quaternion(vectors: Array) -> Array:
-    cosine, s, _, _ = _sines(vectors)
-    return np.concatenate([cosine[:, None], s[:, None] * vectors], axis=1)
 
 
 def quaternions(vectors: Array) -> tuple[Array, Array]:
@@ -286,7 +271,7 @@ def _turned_slopes(q: Array, vectors: Array) -> Array:
     found[:, :, 0] = 2 * scalar * vectors + 2 * np.cross(part, vectors)
     found[:, :, 1:] = 2 * (part[:, :, None] * vectors[:, None, :] - vectors[:, :, None] * part[:, None, :])
     found[:, :, 1:] += 2 * np.einsum("ei,ei->e", part, vectors)[:, None, None] * _EYE
-    found[:, :, 1:] -= 2 * scalar[:, :, None] * _cross(vectors)
+    found[:, :, 1:] -= 2 * scalar[:, :, None] * skew(vectors)
     return found
 
 
@@ -302,18 +287,11 @@ def _forms(vectors: Array, spans: Array) -> Array:
     return found
 
 
-def _cross(vectors: Array) -> Array:
-    """Matrices (e, 3, 3) of the cross product with vectors (e, 3)."""
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-
-
 def _left(q: Array) -> Array:
     """Matrices (e, 4, 4) of conj(q) p as a function of p."""
     found = np.empty((len(q), 4, 4))
     found[:, 0], found[:, 1:, 0] = q, -q[:, 1:]
-    found[:, 1:, 1:] = q[:, :1, None] * _EYE - _cross(q[:, 1:])
+    found[:, 1:, 1:] = q[:, :1, None] * _EYE - skew(q[:, 1:])
     return found
 
 
@@ -321,7 +299,7 @@ def _right(p: Array) -> Array:
     """Matrices (e, 4, 4) of conj(q) p as a function of q."""
     found = np.empty((len(p), 4, 4))
     found[:, 0], found[:, 1:, 0] = p, p[:, 1:]
-    found[:, 1:, 1:] = -p[:, :1, None] * _EYE + _cross(p[:, 1:])
+    found[:, 1:, 1:] = -p[:, :1, None] * _EYE + skew(p[:, 1:])
     return found
 
 
@@ -329,7 +307,7 @@ def _between(weights: Array) -> Array:
     """Second slopes (e, 4, 4) of weights (e, 4) times conj(q) p, by q and by p."""
     found = np.empty((len(weights), 4, 4))
     found[:, 0], found[:, 1:, 0] = weights, -weights[:, 1:]
-    found[:, 1:, 1:] = weights[:, :1, None] * _EYE + _cross(weights[:, 1:])
+    found[:, 1:, 1:] = weights[:, :1, None] * _EYE + skew(weights[:, 1:])
     return found
 
 

@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 from scipy import sparse
 
-from .beams import rotations, turned_curvature, turned_slopes
+from .beams import turned_curvature, turned_slopes
+from .rotations import rotation
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
@@ -40,12 +41,9 @@ class Carried:
         self._share = shares[own, side]
         self._arm = mesh.nodes[mesh.carried[own]] - mesh.nodes[self._node]
 
-    def __len__(self) -> int:
-        return len(self.nodes)
-
     def follow(self, u: Array) -> Array:
         """Displacements u (n, 3) in mm with those of carried nodes set, in place."""
-        turned = rotations(u[self._turns])[self._of]
+        turned = rotation(u[self._turns])[self._of]
         moved = np.einsum("kij,kj->ki", turned, self._arm) - self._arm + u[self._node]
         for axis in range(3):
             u[self.nodes, axis] = np.bincount(self._own, self._share * moved[:, axis], len(self.nodes))
@@ -82,10 +80,6 @@ class Carried:
             total = [np.bincount(self._of, acting[:, i] * lever, len(self._turns)) for i in range(3)]
             found += turned_curvature(u[self._turns], arm, np.column_stack(total))
         return found, self._turns
-
-    def pairs(self, rows: Array, columns: Array) -> Folding:
-        """How blocks between nodes, rows (b,) >= columns (b,), act between beam nodes; see `Folding`."""
-        return Folding.of(self, rows, columns)
 
     def operators(self, u: Array) -> Array:
         """By what each node's displacement changes, (1 + 2 k, 3, 3): with itself; with what carries it.
@@ -144,7 +138,7 @@ class Folding:
 
     @classmethod
     def of(cls, carried: Carried, rows: Array, columns: Array) -> Folding:
-        """See `Carried.pairs`."""
+        """How blocks between nodes, rows (b,) >= columns (b,), act between beam nodes."""
         nodes, number = np.unique(np.concatenate([rows, columns]), return_inverse=True)
         at, mover, operator = carried.parts_of(nodes)
         start = np.searchsorted(at, np.arange(len(nodes) + 1))

@@ -273,7 +273,8 @@ class Equilibrium:
         """Start at another pressure: along the tangent from one state, by extrapolation from several."""
         last = history[-1]
         if len(history) > 1:
-            return extrapolate(history, pressure)
+            # A polynomial of turning sections leaves what they carry behind.
+            return self.model.following(extrapolate(history, pressure))
         if not self._factorise(last.u, last.pressure_MPa)[0]:
             raise ConvergenceError("the state to start from is unstable")
         with_, without = (

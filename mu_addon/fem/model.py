@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import kernels
 from .beams import Beams, frames_along, sections_of
-from .carried import Carried
+from .carried import Carried, Folding
 from .conjugate_gradients import ConjugateGradients
 from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
@@ -279,7 +279,7 @@ class Model:
         is_carried[mesh.carried] = True
         rows, columns = own % n, own // n
         self._carrying = np.flatnonzero(is_carried[rows] | is_carried[columns])
-        self._carried_blocks = self._carried.pairs(rows[self._carrying], columns[self._carrying])
+        self._carried_blocks = Folding.of(self._carried, rows[self._carrying], columns[self._carrying])
         ends = mesh.beams
         a, b = np.tril_indices(4)
         first, second = ends[:, a].ravel().astype(np.int64), ends[:, b].ravel().astype(np.int64)

@@ -27,8 +27,6 @@ _WHOLE = 1.0 - 1e-9
 _GAUSS = np.polynomial.legendre.leggauss(6)
 # Pieces of a layer that the flexibility is integrated over.
 _PIECES = 8
-
-
 # Rotation vectors stand at places of their own, which no other node has: this share of a beam from its end.
 _OFF = 0.3
 
@@ -99,12 +97,15 @@ class _Layers:
         self.node, self.node_strut = rows[pairs.node[keep]], pairs.strut[keep]
         self.level = np.rint(2 * layers * pairs.at[keep, 2]).astype(int)
         self.on_axis = (np.abs(pairs.at[keep, :2]) < 1e-6).all(axis=1)
-        self._key = np.argsort(self.node_strut.astype(np.int64) * len(mesh.nodes) + self.node)
+        # The pair of each node of each element with the element's strut, (k, 10).
+        keys = self.node_strut.astype(np.int64) * len(mesh.nodes) + self.node
         wanted = self.strut.astype(np.int64)[:, None] * len(mesh.nodes) + mesh.tets[self.elements]
-        ordered = (self.node_strut.astype(np.int64) * len(mesh.nodes) + self.node)[self._key]
-        at = self._key[np.searchsorted(ordered, wanted)]
-        self.layer = self.level[at].min(axis=1) // 2
-        self.of_element = at
+        order = np.argsort(keys)
+        self.of_element = order[np.searchsorted(keys[order], wanted)]
+        self.layer = self.level[self.of_element].min(axis=1) // 2
+        # Joints (s, 2) of the struts, the cell's corner first.
+        ends = lattice.struts
+        self.ends = np.where(lattice.is_corner[ends[:, 0]][:, None], ends, ends[:, ::-1])
 
     def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
         """Whether each layer of each strut (struts, layers) can be a beam."""
@@ -120,7 +121,7 @@ class _Layers:
         np.add.at(spoilt, (self.strut, self.layer), bad)
         found = (there == there.max()) & (spoilt == 0)
         # A joint is one of beams if all struts that are there are beams at it.
-        ends = self._ends()
+        ends = self.ends
         present = (there > 0).any(axis=1)
         free = np.ones(len(self.lattice.nodes), bool)
         for end, layer in ((0, 0), (1, self.count - 1)):
@@ -128,11 +129,6 @@ class _Layers:
         for end, layer in ((0, 0), (1, self.count - 1)):
             found[~free[ends[:, end]], layer] = False
         return np.asarray(found)
-
-    def _ends(self) -> Array:
-        """Joints (s, 2) of the struts, the cell's corner first."""
-        struts = self.lattice.struts
-        return np.where(self.lattice.is_corner[struts[:, 0]][:, None], struts, struts[:, ::-1])
 
     def replaced(self, mesh: Mesh, whole: Array, zones: Zones) -> Mesh:
         """The mesh with beams in place of the whole layers (struts, layers)."""
@@ -186,7 +182,7 @@ class _Layers:
 
     def _flexible(self, strut: Array, layer: Array, zones: Zones) -> Array:
         """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`."""
-        lattice, ends = self.lattice, self._ends()[strut]
+        lattice, ends = self.lattice, self.ends[strut]
         way = lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]
         length = np.linalg.norm(way, axis=1)
         start, stop = layer / self.count * length, (layer + 1) / self.count * length
@@ -201,17 +197,13 @@ class _Layers:
             high = np.where(layer == self.count - 1, np.minimum(stop, length - zone[:, 1]), stop)
             s, weight = _stations(low, high)
             t = s / length[:, None]
-            radius = self._radii(strut, np.where(flipped[:, None], 1 - t, t))
+            radius = lattice.radii(np.where(flipped[:, None], 1 - t, t), strut)
             area, inertia = np.pi * radius**2, np.pi * radius**4 / 4
             off = s - middle[:, None]
             integrands = (1 / area, 0.5 / inertia, 1 / inertia, off / inertia, off**2 / inertia, 1 / area)
             for column in columns:
                 found[:, column] = (weight * integrands[column]).sum(axis=1)
         return found
-
-    def _radii(self, strut: Array, t: Array) -> Array:
-        """Radii (e, q) in mm of struts (e,) at fractions (e, q) of the way from their own first node."""
-        return np.asarray(self.lattice.radii(t, strut))
 
 
 def _stations(low: Array, high: Array) -> tuple[Array, Array]:

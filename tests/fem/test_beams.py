@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mu_addon.fem.beams import Beams, Sections, frames_along, rotations, sections_of
+from mu_addon.fem.beams import Beams, Sections, frames_along, sections_of
+from mu_addon.fem.rotations import rotation
 
 RNG = np.random.default_rng(5)
 
@@ -89,7 +90,7 @@ def test_a_rigid_motion_changes_no_energy(turn, shift):
 
 def test_rotation_vectors_turn_as_scipy_turns():
     vectors = RNG.normal(size=(30, 3)) * np.logspace(-9, 0.4, 30)[:, None]
-    np.testing.assert_allclose(rotations(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(rotation(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-14)
 
 
 def test_an_end_moment_rolls_a_cantilever_into_half_a_circle():
