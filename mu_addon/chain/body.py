@@ -31,7 +31,6 @@ _FREE = 1e-7
 _MOST_STEPS = 25
 # Of one step of the search for the free state, in radians and unit lengths.
 _LONGEST_STEP = 0.15
-KG_PER_TONNE = 1e3
 
 
 @attrs.frozen(eq=False)

@@ -105,16 +105,6 @@ class Joint:
     mass_g: float
     error: Array = attrs.field(factory=lambda: np.zeros((6, 6)))
 
-    def arrays(self) -> dict[str, Array]:
-        """Everything but the name, as arrays for a cache."""
-        return {f.name: np.asarray(getattr(self, f.name)) for f in attrs.fields(Joint) if f.name != "name"}
-
-    @classmethod
-    def of_arrays(cls, name: str, arrays: dict[str, Array]) -> Joint:
-        """The joint of `arrays`."""
-        values: dict[str, Any] = {f.name: arrays[f.name] for f in attrs.fields(Joint) if f.name != "name"}
-        return cls(name, **{**values, "mass_g": float(values["mass_g"])})
-
     @cached_property
     def _packed(self) -> Any:
         from scipy.interpolate import CubicSpline, make_interp_spline

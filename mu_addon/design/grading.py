@@ -166,26 +166,6 @@ class Field:
                 found *= weights @ np.array(values)
         return found * self._of_cells(p) if g.entries else found
 
-    def derivatives(self, points: ArrayLike) -> dict[str, Array]:
-        """Derivative (n,) of the factor at points (n, 3) in mm by each parameter but `cells`, by its name."""
-        p = np.asarray(points, float)
-        whole, found = self.at(p), {}
-        for names, weights, values in zip(_NAMES, self._weights(p), self._values, strict=True):
-            own = weights @ np.array(values)
-            for name, column in zip(names, weights.T, strict=True):
-                if name:
-                    found[name] = whole / own * column
-        return found
-
-    def cell_share(self, points: ArrayLike, i: int | None, j: int | None, k: int | None) -> Array:
-        """Weight (n,), 0 to 1, of the cells of an entry at points (n, 3) in mm; indices as `CellFactor` has.
-
-        The derivative of the factor by such an entry's, where the cells have no other.
-        """
-        table = np.zeros((self.half_x + 1, self.y_minus + self.y_plus + 1, self.count))
-        table[self._cells_of(i, j, k)] = 1.0
-        return self._interpolated(table, np.asarray(points, float))
-
     @property
     def _values(self) -> tuple[tuple[float, ...], ...]:
         g = self.grading
@@ -270,9 +250,6 @@ class Field:
             if not inside:
                 return cells_text([entry])
         return ""
-
-
-_NAMES = (ALONG_Z, ("minus_y", "", "plus_y"), ("", "beside_x"))
 
 
 def _hats(places: Array, at: Array) -> Array:

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import write_bytes
 from ..reading import file_text
 from . import shapes, toml_text
 from .anchors import window
@@ -338,14 +337,6 @@ def read_gripper(path: str | Path) -> Gripper:
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
     return from_toml(text, str(path), path.parent)
-
-
-def write_gripper(gripper: Gripper, path: str | Path, unit: str) -> None:
-    """Write the gripper as commented TOML; the file is replaced only once it is complete. Raises OutputError.
-
-    unit: as in `to_toml`.
-    """
-    write_bytes(Path(path), to_toml(gripper, unit).encode())
 
 
 def gripper_names() -> list[str]:

@@ -121,23 +121,6 @@ def relative_moduli(d: Dimensions, factors: Array) -> Moduli:
     return Moduli(*(np.exp((graded - nominal) @ c) for c in _COEFFICIENTS))
 
 
-def relative_slopes(d: Dimensions, factors: Array) -> Moduli:
-    """Derivatives (n,) of `relative_moduli` by the factor."""
-    f = np.asarray(factors, float)
-    shares = _shares(d, f)
-    x, y = _logarithms(*shares)
-    # Diameters are linear in the factor.
-    dx, dxy = (
-        (more - one) / share
-        for more, one, share in zip(_shares(d, np.full(1, 2.0)), _shares(d, np.ones(1)), shares, strict=True)
-    )
-    dy = dxy - dx
-    by_x = np.stack([i * x ** max(i - 1, 0) * y**j for i, j in _powers()], axis=-1)
-    by_y = np.stack([j * x**i * y ** max(j - 1, 0) for i, j in _powers()], axis=-1)
-    steps = by_x * dx[:, None] + by_y * dy[:, None]
-    return Moduli(*(m * (steps @ c) for m, c in zip(relative_moduli(d, f), _COEFFICIENTS, strict=True)))
-
-
 def element_factors(d: Dimensions, mesh: Mesh) -> Array:
     """Factors (m,) of a grading at the middles of a mesh's lattice elements, 1 in all others."""
     found = np.ones(len(mesh.tets))
@@ -161,13 +144,6 @@ def law_weight(law: Any, moduli: Moduli) -> Array:
         DiagonalStretch: moduli.C12,
         NeoHooke: np.sqrt(moduli.E100 * moduli.C44),
     }[law]
-
-
-def modulus_slope(d: Dimensions, factors: Array) -> Array:
-    """Derivative (n,) by the factor of what the isotropic modulus is multiplied with, see `law_weight`."""
-    value, slope = relative_moduli(d, factors), relative_slopes(d, factors)
-    mean = law_weight(NeoHooke, value)
-    return mean * (slope.E100 / value.E100 + slope.C44 / value.C44) / 2.0
 
 
 def _powers() -> list[tuple[int, int]]:

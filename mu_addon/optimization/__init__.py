@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from .evaluation import evaluate as evaluate
     from .freedoms import Freedom as Freedom
     from .freedoms import changed_unit as changed_unit
-    from .gradient import by_element as by_element
     from .gradient import gradients as gradients
     from .quantities import Angle as Angle
     from .quantities import RestStiffness as RestStiffness
@@ -36,7 +35,7 @@ else:
         {
             "evaluation": "Evaluated Evaluator evaluate",
             "freedoms": "Freedom changed_unit",
-            "gradient": "by_element gradients",
+            "gradient": "gradients",
             "quantities": "Angle RestStiffness Stretch",
             "structure": "Condition Structure solve",
             "targets": "Target",

@@ -116,21 +116,6 @@ def _changes(
     return found
 
 
-def by_element(
-    structure: Structure, states: States, quantities: Sequence[Quantity], solved: Adjoint | None = None
-) -> Array:
-    """Derivatives (q, m) of quantities with a `slope` by the logarithm of each element's stiffness.
-
-    As many freedoms as elements for one pass a condition.
-    """
-    solved = solved or adjoint(structure, states, quantities)
-    found = np.zeros((len(quantities), len(structure.model.mesh.tets)))
-    for numbers, change in _changes(structure, states, solved).values():
-        for number, one in zip(numbers, change.sensitivities, strict=True):
-            found[number] -= one.stiffness
-    return found
-
-
 def _everywhere(structure: Structure, free: Array) -> Array:
     """A vector (free,) as one at the nodes (n, 3)."""
     model = structure.model

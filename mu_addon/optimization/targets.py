@@ -73,11 +73,6 @@ class Target:
     goal: Goal | None = None
     line: str = ""
 
-    @property
-    def is_bound(self) -> bool:
-        """True if it can be missed, as an objective cannot."""
-        return self.goal is None
-
     def misfit(self, found: float) -> float:
         """Distance of a value from the target, in tolerances, with its sign; 0 where a bound is kept.
 

@@ -92,7 +92,7 @@ class Recorder:
         self._row = 0
         self._rejects: IO[bytes] | None = None
         self._rejects_left = _MOST_REJECTS
-        self._synced = self._indexed = -np.inf
+        self._indexed = -np.inf
         try:
             self._index = (folder / INDEX).open("ab", buffering=0)
         except OSError as error:

@@ -1,7 +1,6 @@
 """A joint's polynomial: derivatives, and a fit that finds a potential from its gradients and stiffness."""
 
 import numpy as np
-import pytest
 
 from mu_addon.chain.body import MIRROR, PlateState
 from mu_addon.chain.joint import EXPONENTS, Joint, fitted
@@ -63,11 +62,3 @@ def test_a_fit_finds_the_potential_its_states_came_from():
     np.testing.assert_allclose(found[seen], coefficients[seen], atol=2e-4)
     np.testing.assert_allclose(learned.hessian(ETA0), at.hessian(ETA0), rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(learned.gradient(ETA0), 0.0, atol=1e-12)
-
-
-def test_a_joint_goes_through_a_cache_unchanged():
-    joint = joint_of(symmetric_coefficients())
-    again = Joint.of_arrays("polynomial", joint.arrays())
-    eta = ETA0 + 0.5 * SIZE
-    assert again.mass_g == joint.mass_g
-    assert again.at(4.0).potential(eta)[0] == pytest.approx(joint.at(4.0).potential(eta)[0], rel=1e-14)

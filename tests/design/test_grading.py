@@ -81,24 +81,6 @@ def test_values_hold_where_they_are_said_to():
     )
 
 
-@given(gradings(), POINTS)
-@settings(max_examples=30)
-def test_derivatives_are_differences(grading, points):
-    field, h = field_of(grading), 1e-6
-    for name, found in field.derivatives(points).items():
-        value = getattr(grading, name)
-        up, down = (field_of(attrs.evolve(grading, **{name: value + s * h})).at(points) for s in (1.0, -1.0))
-        assert found == pytest.approx((up - down) / (2 * h), abs=1e-8)
-
-
-def test_an_entrys_share_is_its_derivative():
-    points = np.random.default_rng(0).uniform([-18, -18, 0], [18, 31, 75], (50, 3))
-    share = field_of(Grading()).cell_share(points, 1, None, 2)
-    entry = field_of(Grading(cells="1 * 2: 1.5")).at(points)
-    assert entry == pytest.approx(1.0 + 0.5 * share, rel=1e-12)
-    assert 0.0 <= share.min() < share.max() <= 1.0
-
-
 @pytest.mark.parametrize(
     ("text", "what"),
     [

@@ -19,7 +19,6 @@ from mu_addon.design.gripper import (
     load_gripper,
     read_gripper,
     to_toml,
-    write_gripper,
 )
 from mu_addon.design.parameters import Waveguide, load_preset, preset_names, write_unit
 from mu_addon.design.printing.printer import load_printer
@@ -60,7 +59,7 @@ def test_a_gripper_survives_its_file(tmp_path):
         unit, "tight", "alpha7", Fingers(gap_mm=21.5), Plate(thickness_mm=8.0, hole_diameter_mm=0.0)
     )
     write_unit(unit, tmp_path / "finger.toml")
-    write_gripper(gripper, tmp_path / "gripper.toml", "finger.toml")
+    (tmp_path / "gripper.toml").write_text(to_toml(gripper, "finger.toml"), encoding="utf-8")
     assert read_gripper(tmp_path / "gripper.toml") == gripper
 
 

@@ -1,4 +1,4 @@
-"""Homogenised stiffness of graded struts: slender limits, slopes, and what the materials make of it."""
+"""Homogenised stiffness of graded struts: slender limits, and what the materials make of it."""
 
 import attrs
 import numpy as np
@@ -10,12 +10,7 @@ from mu_addon.design.grading import Grading
 from mu_addon.design.lattices import LatticeKind, constant, sin_squared
 from mu_addon.design.parameters import Envelope, load_preset
 from mu_addon.errors import InputError
-from mu_addon.fem.graded_lattice import (
-    element_factors,
-    modulus_slope,
-    relative_moduli,
-    relative_slopes,
-)
+from mu_addon.fem.graded_lattice import element_factors, relative_moduli
 from mu_addon.fem.lattice_law import LatticeLaw
 from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam, NeoHooke
 from mu_addon.fem.unit import materials_of
@@ -43,19 +38,13 @@ def test_factor_one_changes_nothing():
 
 
 @given(st.floats(0.5, 1.9), st.sampled_from([0.0, 0.3]))
-def test_slopes_are_differences_and_thicker_is_stiffer(factor, growth):
+def test_thicker_is_stiffer(factor, growth):
     d = attrs.evolve(D, junction_diameter=1.5 + growth, midspan_diameter=2.0 + growth, strut_growth=growth)
     h = 1e-5
     factor = min(factor, (4.0 - growth) / 2.0 - 2 * h)
-    up, down, slope = (
-        f(d, np.array([x]))
-        for f, x in ((relative_moduli, factor + h), (relative_moduli, factor - h), (relative_slopes, factor))
-    )
-    for a, b, s in zip(up, down, slope, strict=True):
-        assert s == pytest.approx((a - b) / (2 * h), rel=1e-5)
-        assert s > 0
-    mean = [np.sqrt(m.E100 * m.C44) for m in (up, down)]
-    assert modulus_slope(d, np.array([factor])) == pytest.approx((mean[0] - mean[1]) / (2 * h), rel=1e-5)
+    up, down = (relative_moduli(d, np.array([x])) for x in (factor + h, factor - h))
+    for a, b in zip(up, down, strict=True):
+        assert a > b
 
 
 def test_slender_struts_bend_along_an_axis_and_stretch_in_shear():

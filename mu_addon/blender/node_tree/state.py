@@ -44,7 +44,6 @@ _kept = Kept()
 _records: FileCache[dict[str, Record]] = FileCache()
 _pending: set[int] = set()
 _refreshed: dict[int, float] = {}
-_seconds: dict[int, float] = {}
 _written: dict[int, int] = {}
 _states: dict[int, dict[str, State]] = {}
 
@@ -82,7 +81,6 @@ RUN = JobKind("graph", uuid_of, folder_of, outlives=True)
 
 def refresh(tree: Any) -> dict[str, State]:
     """Evaluate a tree as far as that takes milliseconds; mark its links, show states, update followers."""
-    start = time.perf_counter()
     conversion.sync_groups(tree)
     try:
         core = conversion.to_tree(tree)
@@ -103,13 +101,7 @@ def refresh(tree: Any) -> dict[str, State]:
     _states[tree.session_uid] = found
     _follow(tree, evaluation)
     _keep_reachable(tree)
-    _seconds[tree.session_uid] = time.perf_counter() - start
     return found
-
-
-def seconds_of(tree: Any) -> float:
-    """How long the latest refresh of a tree took, in s."""
-    return _seconds.get(tree.session_uid, 0.0)
 
 
 def _of_groups(tree: Any, found: dict[str, State]) -> dict[str, State]:

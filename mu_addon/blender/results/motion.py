@@ -3,7 +3,8 @@
 The first one is seen in the unit's own place, in place of its design, the others beside it. Positions come
 from point caches in the study folder, which Blender plays by itself; the fields of the frame are written
 before it is drawn. An object is a child of the unit's root and knows what it shows by the custom property
-`mu_motion_part`: "NAME|BODY", NAME a path or model_a, BODY one of `BODIES`; and by `mu_run`, of which run.
+`mu_motion_part`: "NAME|BODY", NAME a path or model_a, BODY one of `REGIONS` or `PRINT`; and by `mu_run`, of
+which run.
 """
 
 from __future__ import annotations
@@ -38,7 +39,6 @@ from . import field_colours, run_motions
 from .run_motions import motion_of
 
 PRINT = "print"
-BODIES = (*REGIONS, PRINT)
 MESH = "mesh"
 """The analysis mesh: both its regions."""
 DISPLACEMENT, DEVIATION = "displacement_mm", "deviation_mm"

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 WEIGHT = "gravity"
 """The effect that depends on the direction of gravity."""
-INPUTS = ("orientation_deg", "effects")
-"""What study.toml has of them, in its table of the simulation."""
 
 
 def keep(root: Any, text: str) -> None:
@@ -58,7 +56,7 @@ def lines(root: Any) -> list[str]:
 
 
 def inputs(root: Any) -> dict[str, Any]:
-    """What a study of the unit would have in study.toml, see `INPUTS`; nothing where there is no effect."""
+    """What a study of the unit would have in study.toml: effects and orientation_deg, or nothing."""
     effects = {
         name: {p: float(table["value"]) for p, table in parameters.items()}
         for name, parameters in _tables(root).items()

@@ -35,7 +35,7 @@ def crossings(vertices: Vertices, triangles: Triangles) -> Points:
     normals, depth = _planes(vertices[triangles])
     level = np.einsum("mj,mj->m", normals, vertices[triangles[:, 0]])
     found = [NOWHERE]
-    for part in _gathered(_near(vertices[triangles])):
+    for part in _gathered(near_pairs(vertices[triangles])):
         for one, other in (part.T, part[:, ::-1].T):
             # Most pairs touch and go no farther: the one lies on one side of the other's plane.
             low, high = _heights(vertices, triangles, one, normals[other], level[other])
@@ -82,16 +82,12 @@ def _heights(
     return low, high
 
 
-def near_pairs(corners: NDArray[np.float64]) -> NDArray[np.int64]:
+def near_pairs(corners: NDArray[np.float64]) -> Iterator[NDArray[np.int64]]:
     """Pairs (p, 2) of numbers of triangles, corners (m, 3, 3) in mm, whose bounding boxes overlap, each once.
 
-    Found by hashing the boxes into cells of a grid, and those far larger than most into coarser grids.
+    Some at a time. Found by hashing the boxes into cells of a grid, and those far larger than most into
+    coarser grids.
     """
-    return np.concatenate([np.empty((0, 2), np.int64), *_near(corners)])
-
-
-def _near(corners: NDArray[np.float64]) -> Iterator[NDArray[np.int64]]:
-    """`near_pairs`, some at a time."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     if not len(corners):
         return

@@ -332,7 +332,7 @@ def test_near_pairs_are_those_whose_boxes_overlap(seed):
     low, high = corners.min(axis=1), corners.max(axis=1)
     meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
     expected = {(a, b) for a, b in np.argwhere(meet).tolist() if a < b}
-    found = [tuple(sorted(pair)) for pair in near_pairs(corners).tolist()]
+    found = [tuple(sorted(pair)) for pairs in near_pairs(corners) for pair in pairs.tolist()]
     assert len(found) == len(set(found))
     assert set(found) == expected
 
@@ -348,7 +348,7 @@ def test_near_pairs_among_triangles_of_all_sizes(seed):
     )
     low, high = corners.min(axis=1), corners.max(axis=1)
     meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
-    found = [tuple(sorted(pair)) for pair in near_pairs(corners).tolist()]
+    found = [tuple(sorted(pair)) for pairs in near_pairs(corners) for pair in pairs.tolist()]
     assert sorted(found) == [(a, b) for a, b in np.argwhere(meet).tolist() if a < b]
 
 
