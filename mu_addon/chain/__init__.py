@@ -1,8 +1,8 @@
 """Units in series: each reduced to an elastic joint that its pressure drives, and their chain in equilibrium.
 
 `learn` makes a `Joint` of a unit from its own finite element model; `Chain` finds equilibria of several under
-pressures, weight and a load at the tip, `reach_point` the pressures that bring the tip to a point, and
-`full_model` is the same body without the reduction. Units: mm, N, g, kPa.
+pressures, weight and a load at the tip, `reach_point` the pressures that bring the tip to a point. Units: mm,
+N, g, kPa.
 
     >>> from mu_addon.chain import Loads
     >>> Loads(tip_mass_g=20.0).times(0.5).tip_mass_g
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from .chain import Loads as Loads
     from .inverse import Reach as Reach
     from .inverse import reach_point as reach_point
-    from .joined import FullModel as FullModel
-    from .joined import full_model as full_model
     from .joint import Joint as Joint
     from .learning import Learned as Learned
     from .learning import Sampling as Sampling
@@ -31,7 +29,6 @@ else:
         __name__,
         {
             "chain": "Chain ChainState Link Loads",
-            "joined": "FullModel full_model",
             "inverse": "Reach reach_point",
             "joint": "Joint",
             "learning": "Learned Sampling learn",

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mu_addon.chain import Chain, Link, Loads, Sampling, full_model, learn
+from mu_addon.chain import Chain, Link, Loads, Sampling, learn
 from mu_addon.chain.body import PlateBody
 from mu_addon.chain.rigid_motion import rotation_vector
 from mu_addon.design.parameters import load_preset
@@ -14,6 +14,8 @@ from mu_addon.fem import Equilibrium, Model, materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.cache import Cache
+
+from .joined import full_model
 
 DENSITY = 1.01
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from ..errors import InputError
-from ..meshing.mesh import Mesh
-from . import kernels
-from .model import Model
+from mu_addon.errors import InputError
+from mu_addon.fem import kernels
+from mu_addon.fem.model import Model
+from mu_addon.meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
 

@@ -8,23 +8,24 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ..design.strut_cell import relative_density, strut_cell
-from ..errors import InputError
+from mu_addon.chain.body import frame, tip_nodes
+from mu_addon.chain.chain import GRAVITY_N_PER_G, Loads
+from mu_addon.chain.rigid_motion import motion
+from mu_addon.design.strut_cell import relative_density, strut_cell
+from mu_addon.errors import InputError
+from mu_addon.fem.embedding import embed
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.laws import NeoHooke
+from mu_addon.fem.loads import gravity
+from mu_addon.fem.materials import Layer, Materials
+from mu_addon.fem.state import State
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.mesh import LATTICE, TET_EDGES, Mesh
+
 from ..fem.cavities import CavitiesModel
-from ..fem.embedding import embed
-from ..fem.equilibrium import Equilibrium
-from ..fem.laws import NeoHooke
-from ..fem.loads import gravity
-from ..fem.materials import Layer, Materials
-from ..fem.state import State
-from ..fem.unit import materials_of
-from ..meshing.mesh import LATTICE, TET_EDGES, Mesh
-from .body import frame, tip_nodes
-from .chain import GRAVITY_N_PER_G, Loads
-from .rigid_motion import motion
 
 if TYPE_CHECKING:
-    from ..design.parameters import Unit
+    from mu_addon.design.parameters import Unit
 
 Array = np.ndarray[Any, Any]
 
