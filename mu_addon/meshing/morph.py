@@ -51,7 +51,7 @@ class WallGrid:
 
 
 class Morph:
-    """Moves the half or quarter mesh that gmsh made of a unit under some settings to other units.
+    """Moves the half mesh that gmsh made of a unit under some settings to other units.
 
     What depends on the mesh alone is done once, so that many units near to it cost little.
     """
@@ -61,12 +61,11 @@ class Morph:
         a = drawn.printed
         self.mesh, self.drawn, self._settings = mesh, drawn, settings
         size = a.cell / CELL_MM / settings.refine
-        quarters = 1 if settings.fraction == "quarter" else 2
         self._grid = WallGrid(
             a,
             settings.meridian_mm * size,
-            quarters * math.pi / 2,
-            quarters * division(a.R * math.pi / 2, settings.hoop_mm * size),
+            math.pi,
+            2 * division(a.R * math.pi / 2, settings.hoop_mm * size),
             max(1, int(settings.through_wall * settings.refine + 0.5)),
             division(a.r, settings.hoop_mm * size),
         )
@@ -118,7 +117,7 @@ class Morph:
 
 
 def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mesh:
-    """The half or quarter mesh that gmsh made of `drawn` under `settings`, moved to the unit `other`.
+    """The half mesh that gmsh made of `drawn` under `settings`, moved to the unit `other`.
 
     See `Morph.to`. Raises MeshingError where that cannot be done.
     """

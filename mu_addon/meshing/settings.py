@@ -8,7 +8,7 @@ import attrs
 
 from ..errors import InputError
 
-FRACTIONS = ("half", "quarter", "full")
+FRACTIONS = ("half", "full")
 FIDELITIES = RESOLVED, SOLID, HOMOGENISED = ("resolved", "solid", "homogenised")
 CELL_MM = 12.5
 """The cell, in mm, that the element sizes are given for."""
@@ -37,13 +37,13 @@ def _between(low: float, high: float) -> Any:
 class MeshSettings:
     """Element order, mirror fraction and element sizes of an analysis mesh.
 
-    fraction: "half" (x >= 0), "quarter" (also y >= 0) or "full" (the half and its mirror image). order: 1
-    or 2; linear elements lock in thin walls. refine: divides every size and multiplies through_wall. Sizes
-    in mm for a cell of 12.5 mm: along the membrane's meridian and around its apex, at the line of anchors
-    and at the lattice's envelope. through_wall: elements across the membrane. fidelity: "homogenised", the
-    lattice as a continuum; "resolved", its struts as printed, as beams wherever they are whole; or "solid",
-    all of every strut meshed, which "resolved" is checked against. For both order 2, fraction and refine
-    alone count. Raises InputError for a value that is not offered or out of bounds.
+    fraction: "half" (x >= 0) or "full" (the half and its mirror image). order: 1 or 2; linear elements lock
+    in thin walls. refine: divides every size and multiplies through_wall. Sizes in mm for a cell of 12.5 mm:
+    along the membrane's meridian and around its apex, at the line of anchors and at the lattice's envelope.
+    through_wall: elements across the membrane. fidelity: "homogenised", the lattice as a continuum;
+    "resolved", its struts as printed, as beams wherever they are whole; or "solid", all of every strut
+    meshed, which "resolved" is checked against. For both order 2, fraction and refine alone count. Raises
+    InputError for a value that is not offered or out of bounds.
 
     >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
     (2, 'half')

@@ -72,15 +72,7 @@ def mesh_unit(
     d = unit.printed
     if body is not None:
         return _within(body, d, settings, report, mesher, cache)
-    _, (y0, y1), _ = d.bounds
-    if settings.fraction == "quarter" and y0 != -y1:
-        raise InputError(
-            "a quarter needs an envelope that is symmetric in y",
-            f"y from {y0:g} to {y1:g} mm",
-            'use fraction "half"',
-        )
-    quarter = settings.fraction == "quarter"
-    part = (math.pi / 2, ("x", "y")) if quarter else (math.pi, ("x",))
+    part = (math.pi, ("x",))
     if mesher == "pytetwild":
         mesh = _from_surfaces(d, settings, report, cache, *part)
     else:
@@ -104,18 +96,16 @@ def mesh_unit(
 
 
 def _structured(d: Dimensions, settings: MeshSettings, report: Progress) -> Mesh:
-    """Half or quarter mesh: a revolved membrane in a lattice region filled by gmsh."""
+    """Half mesh: a revolved membrane in a lattice region filled by gmsh."""
     size = d.cell / CELL_MM / settings.refine
-    quarter = settings.fraction == "quarter"
-    quarters, symmetry = (1, ("x", "y")) if quarter else (2, ("x",))
     meridian = Meridian.of(d)
     report("mesh of the membrane", 0.0)
     membrane = membrane_mesh(
         meridian,
-        turn=quarters * math.pi / 2,
+        turn=math.pi,
         p=stations(meridian, settings.meridian_mm * size),
         # Alternating diagonals mirror each other about y = 0 only if both quarters have as many sectors.
-        sectors=quarters * division(d.R * math.pi / 2, settings.hoop_mm * size),
+        sectors=2 * division(d.R * math.pi / 2, settings.hoop_mm * size),
         layers=max(1, int(settings.through_wall * settings.refine + 0.5)),
         rings=division(d.r, settings.hoop_mm * size),
     )
@@ -126,13 +116,13 @@ def _structured(d: Dimensions, settings: MeshSettings, report: Progress) -> Mesh
         for plane in (0.0, *planes):
             nodes[np.abs(nodes[:, column] - plane) < 1e-7 * d.cell, column] = plane
     report("mesh of the lattice", 0.9)
-    mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, symmetry, settings.order)
+    mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, settings.order)
     for _ in range(3):
         chords = _flattening_chords(mesh, membrane.outside)
         if not len(chords):
             break
         nodes, tets = bisected(nodes, tets, chords)
-        mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, symmetry, settings.order)
+        mesh = _joined(membrane, nodes, oriented(nodes, tets), d.height, settings.order)
     return relieved(mesh, d.bounds)
 
 
@@ -142,8 +132,7 @@ def _lattice(d: Dimensions, settings: MeshSettings, membrane: Membrane) -> tuple
     # same mesh at every scale, so that scales compare without its noise.
     to_cell = CELL_MM / d.cell
     (_, x1), (y0, y1), (_, height) = np.round(np.array(d.bounds) * to_cell, 9).tolist()
-    quarter = settings.fraction == "quarter"
-    plan = np.array([[0.0, y1], [x1, y1]] + ([[x1, 0.0]] if quarter else [[x1, y0], [0.0, y0]]))
+    plan = np.array([[0.0, y1], [x1, y1], [x1, y0], [0.0, y0]])
     sizes = Sizes(
         envelope=settings.envelope_mm / settings.refine,
         anchor=settings.anchor_mm / settings.refine,
@@ -156,9 +145,7 @@ def _lattice(d: Dimensions, settings: MeshSettings, membrane: Membrane) -> tuple
     return added / to_cell, tets
 
 
-def _joined(
-    membrane: Membrane, nodes: Array, lattice: Array, height: float, symmetry: tuple[str, ...], order: int
-) -> Mesh:
+def _joined(membrane: Membrane, nodes: Array, lattice: Array, height: float, order: int) -> Mesh:
     """One mesh from the membrane and the linear lattice tets around it, curved where they meet."""
     region = np.repeat([MEMBRANE, LATTICE], [len(membrane.tets), len(lattice)])
     tets, cavity = np.vstack([membrane.tets, lattice]), membrane.cavity
@@ -170,7 +157,7 @@ def _joined(
         middles[rows] = membrane.middles
         nodes, tets, cavity = second_order(nodes, tets, cavity, middles)
     base, tip = (np.flatnonzero(nodes[:, 2] == z) for z in (0.0, height))
-    return Mesh(nodes, tets, region, cavity, base, tip, symmetry)
+    return Mesh(nodes, tets, region, cavity, base, tip, ("x",))
 
 
 def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
@@ -201,11 +188,9 @@ def _within(
     body: Body, d: Dimensions, settings: MeshSettings, report: Progress, mesher: str, cache: Path | None
 ) -> Mesh:
     """Mesh of a unit with a body for its envelope."""
-    if mesher == "gmsh" or settings.fraction == "quarter":
+    if mesher == "gmsh":
         raise InputError(
-            "a user-defined body is meshed by pytetwild, as a half or a whole",
-            "mesher, fraction",
-            'choose mesher "auto" or "pytetwild" and fraction "half" or "full"',
+            "a user-defined body is meshed by pytetwild", "mesher", 'choose mesher "auto" or "pytetwild"'
         )
     right = half(body)
     envelope = body if right is None else right

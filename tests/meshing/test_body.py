@@ -84,9 +84,7 @@ def test_bodies_bend_as_their_shape_says(tmp_path):
     assert abs(of_body(cylinder(22.0, 22.0, 0.0, -1.0, d.height + 1.0))) < 0.5 * wide
 
 
-def test_meshers_that_cannot_take_a_body_are_refused():
+def test_a_mesher_that_cannot_take_a_body_is_refused():
     body = envelope(cylinder(18.75, 25.0, 6.25, -1.0, 80.0), UNIT.dimensions)
     with pytest.raises(InputError, match="meshed by pytetwild"):
         mesh_unit(UNIT, COARSE, mesher="gmsh", body=body)
-    with pytest.raises(InputError, match="meshed by pytetwild"):
-        mesh_unit(UNIT, attrs.evolve(COARSE, fraction="quarter"), body=body)

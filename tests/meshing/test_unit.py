@@ -219,32 +219,13 @@ def test_full_is_the_mirrored_half(coarse: Mesh, unit: Unit) -> None:
     assert full.hash() == mirror(coarse, "x").hash()
 
 
-def test_quarter_of_a_symmetric_unit(unit: Unit) -> None:
-    sides = attrs.evolve(unit.lattice, cells_y_minus=2, cells_y_plus=2, allow_symmetric=True)
-    symmetric = attrs.evolve(unit, lattice=sides)
-    quarter = mesh_unit(symmetric, MeshSettings(fraction="quarter", refine=0.75))
-    assert quarter.symmetry == ("x", "y")
-    assert quarter.nodes[:, :2].min() == 0
-    report = mesh_quality(quarter, symmetric)
-    assert abs(report.membrane_volume_error) < 2e-3
-    assert abs(report.lattice_volume_error) < 1e-3
-    half = mirror(quarter, "y")
-    assert half.symmetry == ("x",)
-    assert mesh_quality(half, symmetric).inverted == 0
-
-
-def test_a_quarter_needs_symmetry(unit: Unit) -> None:
-    with pytest.raises(InputError, match="symmetric in y"):
-        mesh_unit(unit, MeshSettings(fraction="quarter"))
-
-
 def test_a_mirror_must_exist(half: Mesh) -> None:
     with pytest.raises(MeshingError, match="no mirror plane y"):
         mirror(half, "y")
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("order", 3), ("fraction", "third"), ("refine", 0.0), ("hoop_mm", -1.0)]
+    ("field", "value"), [("order", 3), ("fraction", "quarter"), ("refine", 0.0), ("hoop_mm", -1.0)]
 )
 def test_settings_are_refused_in_words(field: str, value: object) -> None:
     with pytest.raises(InputError, match=field):

@@ -356,9 +356,9 @@ class Job:
         """
         if self.unit.wall.names or self.obstacles:
             settings = settings.without_beams
-        if not self.obstacles or settings.fraction == "full":
+        if not self.obstacles or mirrored(self.obstacles):
             return settings
-        return attrs.evolve(settings, fraction="half" if mirrored(self.obstacles) else "full")
+        return attrs.evolve(settings, fraction="full")
 
     def unit_text(self) -> str:
         """unit.toml: the unit's parameters with units, meaning and source."""

@@ -802,7 +802,7 @@ def _earlier(folder: Path) -> dict[str, Any]:
 
 def _expected_nodes(job: Job) -> int:
     """How many nodes a mesh will have, from those of mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
-    share = {"quarter": 0.5, "half": 1.0, "full": 2.0}[job.mesh.fraction]
+    share = {"half": 1.0, "full": 2.0}[job.mesh.fraction]
     of_order = {1: 0.15, 2: 1.0}[job.mesh.order]
     units = job.unit.dimensions.count / 6
     return int(share * of_order * units * (4_000 + 17_000 * job.mesh.refine**2.3))
