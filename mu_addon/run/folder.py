@@ -33,19 +33,17 @@ class FolderLayout:
     """What a folder of one kind of run holds.
 
     inputs: its first file of inputs; header: the first line of that, by which the folder is known; results:
-    files and folders by name or pattern; optional: further inputs that a run may do without; older_headers:
-    what the first line of an older version's begins with.
+    files and folders by name or pattern; optional: further inputs that a run may do without.
     """
 
     inputs: str
     header: str
     results: tuple[str, ...]
     optional: tuple[str, ...] = ()
-    older_headers: tuple[str, ...] = ()
 
     def is_of(self, folder: Path) -> bool:
         """Whether a folder is of such a run."""
-        return _read(folder / self.inputs).startswith((self.header, *self.older_headers))
+        return _read(folder / self.inputs).startswith(self.header)
 
 
 def begin(context: RunContext, folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:

@@ -102,9 +102,6 @@ def test_the_same_folder_serves_again_and_describes_its_run(
     # Another dark level is another input.
     assert run(*words, "--dark", 0.05) == 0
     assert (out / "stale" / "calibration.toml").read_text() == before
-    # A folder of the version that wrote no header.
-    (out / "calibrate.toml").write_text("data = ['bench']\nchannel = 'light_V'\ndark = 0\n")
-    assert run(*words) == 0, capsys.readouterr().err
     # A recording that goes on is the same, other samples at the angles are not.
     assert run(*words) == 0
     recording = tmp_path / "bench" / "recording-000.csv"

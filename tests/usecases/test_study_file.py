@@ -1,10 +1,7 @@
-"""study.toml: what it says comes back, older formats are understood, and hostile ones change nothing."""
+"""study.toml: what it says comes back, and hostile ones change nothing."""
 
-import shutil
 import subprocess
 import sys
-import tomllib
-from pathlib import Path
 
 import attrs
 import numpy as np
@@ -18,11 +15,10 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
-from mu_addon.usecases.simulate_and_place.study_file import FORMAT, STAGES, compose, parse, read
+from mu_addon.usecases.simulate_and_place.study_file import STAGES, compose, parse, read
 
 from ..homogenize.lattice_laws import body_centred
 
-FORMAT_1 = Path(__file__).parents[1] / "data" / "studies" / "format-1"
 JOB = Job(
     unit=load_preset("mu-0.75x"),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
@@ -53,37 +49,6 @@ def test_a_job_comes_back_from_its_folder(tmp_path, stages):
     assert same(found, job)
     if stages == STAGES:
         assert attrs.evolve(found, protocol=job.protocol, workers=job.workers) == job
-
-
-def test_a_study_of_format_1_is_understood_and_brought_up_to_date(tmp_path):
-    """The fixture was written by the last version that knew format 1 only."""
-    folder = shutil.copytree(FORMAT_1, tmp_path / "study")
-    old = tomllib.loads((folder / "study.toml").read_text())
-    assert old["format"] == 1
-    job = read_job(folder)
-    assert job.stages == ("design", "simulate"), "it has an angle.csv and no deviation.csv"
-    assert (job.times, job.mesher, job.quality) == (old["times"], old["mesher"], old["quality"])
-    assert job.mesh.table() == old["mesh"]
-    new = tomllib.loads((folder / "study.toml").read_text())
-    assert new["format"] == FORMAT
-    assert same(read_job(folder), job)
-    # Its protocol is known by its digest from now on.
-    (folder / "protocol.csv").write_text("time_s,pressure_kPa\n0,0\n1,5\n")
-    with pytest.raises(InputError, match="has changed since this study was made"):
-        read_job(folder)
-
-
-def test_a_search_of_format_1_keeps_its_limits(tmp_path):
-    text = (FORMAT_1 / "study.toml").read_text().replace('paths = "windows"', 'paths = "graph"')
-    text += (
-        "\n[search]\nshortest_cells = 3.0\nlongest_cells = inf\nsharpest_bend_deg = 60.0\nmost_checks = 7\n"
-    )
-    folder = shutil.copytree(FORMAT_1, tmp_path / "study")
-    (folder / "study.toml").write_text(text)
-    (folder / "deviation.csv").write_text("path\n")
-    job = read_job(folder)
-    assert job.stages == STAGES
-    assert (job.paths, job.limits, job.most_checks) == ("graph", Limits(3.0, np.inf, 60.0), 7)
 
 
 def test_a_smaller_job_keeps_the_inputs_of_further_stages(tmp_path):
@@ -134,6 +99,7 @@ GOOD = compose(JOB.tables())
         ("a = " + "[" * 50_000, "not TOML"),
         ("# x\n" * 100_000, "100000 characters"),
         ("format = 3\n[design]\n", "format 3"),
+        ("format = 1\n[design]\n", "format 1, and this version knows 2"),
         ("format = true\n[design]\n", "format True"),
         ("format = 2\n", "are not those of a study"),
         ("format = 2\n[simulate]\n", "are not those of a study"),
@@ -173,8 +139,7 @@ def test_a_folder_without_a_study_is_none(tmp_path):
 
 def test_what_is_composed_is_parsed(tmp_path):
     tables = JOB.tables()
-    found, outdated = parse(compose(tables), tmp_path)
-    assert (found, outdated) == (tables, False)
+    assert parse(compose(tables), tmp_path) == tables
 
 
 def test_the_solver_is_no_part_of_a_studys_inputs():

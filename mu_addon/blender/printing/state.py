@@ -311,9 +311,7 @@ def exported(root: Any) -> Exported | None:
 
     def read() -> dict[str, Any]:
         manifest = parse_json(file_bytes(path), path.name)
-        # An older manifest has none.
-        vents = {"vents": manifest.get("vents")}
-        return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused")} | vents
+        return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused", "vents")}
 
     found = _exports.read([path], read)
     if found is None:

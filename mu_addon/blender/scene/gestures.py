@@ -20,7 +20,6 @@ from ..preview.nodes import unit as unit_group
 from ..shared import displays, handlers, scene_units, updates
 from ..unit import broken, drawing, live_update
 from ..unit import object as unit_object
-from . import older_files
 
 _holders: dict[str, int] = {}
 """By UUID: the object, by the number that it keeps through undo, which had it before any duplicate did."""
@@ -200,7 +199,6 @@ def _after_load(*_: Any) -> None:
     for kept in (_holders, _given, _hidden):
         kept.clear()
     broken.forget()
-    older_files.renew()
     look()
 
 
@@ -217,7 +215,6 @@ def _after_import(imported: Any) -> None:
             if obj.mu_unit.uuid and obj.type == "MESH":
                 # Blender may reuse a mesh that it brought in before.
                 unit_object.separate(obj)
-    older_files.renew()
     look()
     live_update.catch_up()
 

@@ -64,8 +64,7 @@ def _after_undo_or_load(*_):
 def catch_up() -> None:
     """Have every preview rebuilt that is behind its parameters or its study."""
     for root in unit_object.roots():
-        # A unit of an older file is an Empty until `scene.older_files` has renewed it.
-        if root.type == "MESH" and unit_object.behind(root):
+        if unit_object.behind(root):
             schedule(root)
 
 

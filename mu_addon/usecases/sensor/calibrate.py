@@ -35,7 +35,6 @@ LAYOUT = FolderLayout(
     "calibrate.toml",
     "# The inputs of this calibration; its samples, angles and volts, are known by their SHA-256.",
     results=("calibration.toml", "calibration.csv", "report.html"),
-    older_headers=("data = [",),
 )
 # After the mark "angle 30" the sensor is held there for that long.
 _HOLD_S = 1.0

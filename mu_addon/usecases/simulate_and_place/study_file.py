@@ -1,4 +1,4 @@
-"""study.toml: the inputs of a study, a table a stage; read in this format and in older ones."""
+"""study.toml: the inputs of a study, a table a stage."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
-from ...files import write_text
 from ...reading import file_bytes, parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import digest
@@ -68,16 +67,12 @@ def compose(tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any] = Ma
 def read(folder: Path) -> Tables | None:
     """The tables of a folder's study.toml by stage, or None where there is none.
 
-    A file of an older format is understood, and replaced by one of the present format. Raises InputError for
-    one that cannot be used, or that a newer version of this program wrote, and OutputError.
+    Raises InputError for one that cannot be used, or that another version of this program wrote.
     """
     path = folder / NAME
     if not path.is_file():
         return None
-    tables, outdated = parse(_text(path), folder)
-    if outdated:
-        write_text(path, compose(tables))
-    return tables
+    return parse(_text(path), folder)
 
 
 def read_run(folder: Path) -> dict[str, Any]:
@@ -107,21 +102,16 @@ def _text(path: Path) -> str:
     return text
 
 
-def parse(text: str, folder: Path) -> tuple[Tables, bool]:
-    """Tables of study.toml's text by stage, and whether it is of an older format; raises InputError.
-
-    folder: where the files lie that it names; a format without their digests is given them.
-    """
+def parse(text: str, folder: Path) -> Tables:
+    """Tables of the text of a folder's study.toml by stage; raises InputError."""
     where = str(folder / NAME)
     document = parse_toml(text, where, "choose another folder")
     found = document.pop("format", None)
     document.pop(RUN, None)
-    if found == 1 and not isinstance(found, bool):
-        return _from_format_1(document, folder), True
     if found != FORMAT or isinstance(found, bool):
         newer = isinstance(found, int) and not isinstance(found, bool) and found > FORMAT
         raise InputError(
-            f"study.toml is of format {found!r}, and this version knows 1 and {FORMAT}",
+            f"study.toml is of format {found!r}, and this version knows {FORMAT}",
             where,
             "use the newer version that wrote it" if newer else "choose another folder",
         )
@@ -141,30 +131,7 @@ def parse(text: str, folder: Path) -> tuple[Tables, bool]:
                 raise InputError(
                     f"{key} = {document[stage][key]!r} is not in the folder", where, f'write "{FILES[key]}"'
                 )
-    return {stage: document[stage] for stage in stages}, False
-
-
-def _from_format_1(document: dict[str, Any], folder: Path) -> Tables:
-    """Format 1 was flat, wrote every stage's inputs whether it was run or not, and no digest but one."""
-
-    def taken(*keys: str) -> dict[str, Any]:
-        return {key: document[key] for key in keys if key in document}
-
-    def with_digest(key: str) -> dict[str, Any]:
-        try:
-            text = file_bytes(folder / FILES[key]).decode("utf-8")
-        except (OSError, UnicodeDecodeError):
-            text = ""
-        return {key: FILES[key], f"{key}_sha256": digest(text)}
-
-    tables: Tables = {"design": with_digest("unit") | taken("quality")}
-    simulate = with_digest("protocol") | taken("times", "mesher", "lattice", "lattice_sha256", "mesh")
-    place = taken("stations", "rules", "mesh_check", "paths", "search")
-    if (folder / "angle.csv").is_file():
-        tables["simulate"] = simulate
-        if (folder / "deviation.csv").is_file():
-            tables["place"] = place
-    return tables
+    return {stage: document[stage] for stage in stages}
 
 
 def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, str] | None:

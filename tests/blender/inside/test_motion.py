@@ -9,7 +9,6 @@ from mu_addon.blender.results import field_colours as fields
 from mu_addon.blender.results import legend_object, run_motions
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
-from mu_addon.blender.shared import displays
 from mu_addon.blender.shared.compat import modifier_input
 from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import live_update as live
@@ -254,24 +253,6 @@ def test_undo_save_and_reload(study):
     assert len(motion_parts.parts(root)) == 3
     assert bpy.ops.mu.delete() == {"FINISHED"}
     assert not [o for o in bpy.data.objects if o.get(motion_parts.MOTION)]
-
-
-def test_a_motion_of_an_older_file_goes_on(study, tmp_path):
-    root = started(study)
-    show(name="model_a")
-    for part in motion_parts.parts(root):
-        value = part[displays.MOTION]
-        del part[displays.MOTION]
-        part[displays.OLDER_MOTION] = value
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-    (root,) = unit_object.roots()
-    bpy.context.scene.frame_set(193)
-    assert len(motion_parts.parts(root)) == 2
-    for part in motion_parts.parts(root):
-        assert moved(part).max() > 1.0
-        assert np.allclose(moved(part), values(part.data, "displacement_mm"), atol=1e-4)
 
 
 def test_what_is_missing_is_said(study):
