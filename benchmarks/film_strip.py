@@ -1,9 +1,9 @@
 """The picture at the top of the README: a unit cut open at five pressures, with its bending angles.
 
-    python benchmarks/film_strip.py out/mu-1.0x docs/pictures/film-strip.png
+    python benchmarks/film_strip.py out/mu-1.0x docs/pictures/film-strip.png --path alpha4
 
-Takes the folder of a finished `place`. The printable solid is carried by the simulated motion of Model A; the
-chosen path is drawn in orange.
+Takes the folder of a finished `simulate` or `place`. The printable solid is carried by the simulated motion
+of Model A; a sensor path, by default the one that `place` chose, is drawn in orange.
 """
 
 from __future__ import annotations
@@ -35,19 +35,21 @@ INK, FAINT, ACCENT = (28, 33, 43), (120, 128, 140), tuple(round(255 * c) for c i
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", type=Path, help="Folder of a finished `place`.")
+    parser.add_argument("run", type=Path, help="Folder of a finished `simulate` or `place`.")
     parser.add_argument("out", type=Path, help="PNG file to write.")
+    parser.add_argument("--path", help="Name of the sensor path; by default the one that `place` chose.")
     options = parser.parse_args()
-    frames, angles = pictures(options.run)
+    frames, angles = pictures(options.run, options.path)
     strip(frames, angles).save(options.out, optimize=True)
 
 
-def pictures(run: Path) -> tuple[list[np.ndarray], list[float]]:
+def pictures(run: Path, name: str | None = None) -> tuple[list[np.ndarray], list[float]]:
     """A picture (h, w, 4) and the bending angle in degrees at each of the pressures."""
     unit = read_unit(run / "unit.toml")
-    chosen = next(iter(json.loads((run / "summary.json").read_text())["chosen"].values()))
+    chosen = name or next(iter(json.loads((run / "summary.json").read_text())["chosen"].values()))
     line = anchor_points(unit)[list(window(unit, chosen).indices)]
-    path = np.concatenate([np.linspace(a, b, 12) for a, b in pairwise(line)])
+    # A joint belongs to two of its pieces: it comes once.
+    path = np.vstack([line[:1], *(np.linspace(a, b, 12)[1:] for a, b in pairwise(line))])
     vertices, triangles = stl_surface((run / "unit.stl").read_bytes())
     parts = unit_parts(unit.dimensions, vertices, triangles)
     with tempfile.TemporaryDirectory() as copy:  # an embedding is kept beside the motion it is of

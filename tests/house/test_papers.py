@@ -17,7 +17,7 @@ MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="ut
 VENV = "python3.11 -m venv .venv && .venv/bin/pip install -e "
 MAIN = (
     VENV
-    + ". && .venv/bin/python headless/run.py place --preset mu-1.0x --fidelity homogenised --out out/mu-1.0x"
+    + ". && .venv/bin/python headless/run.py simulate --preset mu-1.0x --out out/mu-1.0x"
 )
 TESTS = VENV + "'.[blender,dev]' && .venv/bin/python -m pytest"
 
