@@ -97,11 +97,11 @@ def mesh_printed(
     """
     s = settings or MeshSettings()
     report = progress or (lambda stage, share: None)
-    if s.fraction == "quarter" or s.order != 2:
+    if s.order != 2:
         raise InputError(
-            "the printed body is meshed by quadratic elements, as a half or a whole",
-            "fraction, order",
-            'choose fraction "half" or "full" and order 2, or fidelity "homogenised"',
+            "the printed body is meshed by quadratic elements",
+            "order",
+            'choose order 2, or fidelity "homogenised"',
         )
     d = unit.printed
     beams = s.fidelity != SOLID and is_half_diagonal(d)

@@ -57,7 +57,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     if findings is None or findings.stale:
         found.append("stale: belongs to other parameters")
     elif findings.quick:
-        found.append("quick look: linear elements lock")
+        found.append("quick look: homogenised, coarse mesh")
     return found
 
 

@@ -43,7 +43,11 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if not found.run.complete:
             wrapped(layout, found.run.state.capitalize(), "INFO")
         if found.quick:
-            wrapped(layout, "Quick look: linear elements lock, so the angles are too small", "ERROR")
+            wrapped(
+                layout,
+                "Quick look: the lattice is homogenised, so vacuum bends half as far as printed struts",
+                "ERROR",
+            )
         column = layout.column(align=True)
         column.active = not found.stale
         for pressure, angle in found.angles:

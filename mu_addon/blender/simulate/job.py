@@ -76,8 +76,8 @@ def job_of(root: Any) -> Job:
     if settings.command == "place":
         extra["paths"] = settings.paths
     if settings.detail == "quick":
-        # Linear elements on a mesh of half the fineness, one rule, no second mesh.
-        extra["mesh"] = MeshSettings(order=1, refine=0.5)
+        # The homogenised unit on a mesh of half the fineness, one rule, no second mesh.
+        extra["mesh"] = MeshSettings(refine=0.5)
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     elif settings.detail == "resolved":

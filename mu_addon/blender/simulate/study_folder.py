@@ -38,7 +38,7 @@ class Findings:
 
     @property
     def quick(self) -> bool:
-        """Whether it was computed with linear elements, which lock in thin walls."""
+        """Whether it is a quick look: a homogenised lattice on a coarse mesh."""
         return self.run.detail == "quick"
 
     @property
