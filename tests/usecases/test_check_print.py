@@ -68,6 +68,10 @@ def test_a_limit_that_was_measured_decides(tmp_path):
         assert sum(map(len, limits.values())) == len(MEANING)
     words = console_summary(json.loads((out / "summary.json").read_text()))
     assert "measured limits: drain_diameter_mm" in words
+    # Terminal and report count the same.
+    share = f"{len(limits['assumed'])} of {len(MEANING)}"
+    assert f"assumed limits: {share}, see report.html" in words
+    assert f"{share} limits are assumed" in (out / "report.html").read_text()
     assert read_printer(out / "printer.toml").limits["drain_diameter_mm"].measured
 
 

@@ -79,11 +79,11 @@ def report(
     ]
     if mended is not None:
         sections.insert(0, ("repair", "Repair", _repair(mended)))
-    assumed = sum(f.assumed for f in found.findings if f.limit is not None)
+    assumed = sum(limit.standing == "assumed" for limit in job.printer.limits.values())
     notes = [
         (
-            f"{assumed} of these limits are assumed, because no published values were found for this resin. "
-            "Print the parts of `specimens` named limit-..., and give what they show by --limits."
+            f"{assumed} of {len(MEANING)} limits are assumed, because no published values were found for this "
+            "resin. Print the parts of `specimens` named limit-..., and give what they show by --limits."
         )
     ]
     measured = [MEANING[name] for name, limit in job.printer.limits.items() if limit.measured]
