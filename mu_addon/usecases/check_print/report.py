@@ -82,8 +82,8 @@ def report(
     assumed = sum(limit.standing == "assumed" for limit in job.printer.limits.values())
     notes = [
         (
-            f"{assumed} of {len(MEANING)} limits are assumed, because no published values were found for this "
-            "resin. Print the parts of `specimens` named limit-..., and give what they show by --limits."
+            f"{assumed} of {len(MEANING)} limits are assumed, because no published values were found for "
+            "this resin. Print the parts of `specimens` named limit-..., and give what they show by --limits."
         )
     ]
     measured = [MEANING[name] for name, limit in job.printer.limits.items() if limit.measured]
