@@ -15,9 +15,10 @@ from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ..fem.rotations import skew
 from ..fem.unit import materials_of
 from ..meshing.mesh import LATTICE, Mesh
-from .rigid_motion import exponential, inverse, logarithm, motion, skew, slope
+from .rigid_motion import exponential, inverse, logarithm, motion, slope
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit

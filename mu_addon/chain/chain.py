@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
+from ..fem.rotations import rotation, skew
 from .body import frame, relative
 from .joint import MOST_RANGE, Joint, JointAt
-from .rigid_motion import exponential, inverse, motion, rotation, rotation_vector, skew, slope
+from .rigid_motion import exponential, inverse, motion, rotation_vector, slope
 
 Array = np.ndarray[Any, Any]
 

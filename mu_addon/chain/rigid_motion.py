@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fem.rotations import rotation as rotation
-from ..fem.rotations import skew as skew
+from ..fem.rotations import rotation, skew
 
 Array = np.ndarray[Any, Any]
 

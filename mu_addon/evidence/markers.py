@@ -78,7 +78,7 @@ def _again(e: Experiment) -> dict[int, tuple[str, Array, str]]:
 def nearest(mesh: Mesh, place: Array) -> Array:
     """The point (3,) in mm of an undeformed body nearest to `place` (3,) in mm, itself if it is inside.
 
-    The surface is taken flat between corners of elements. Half and quarter meshes count as the whole body.
+    The surface is taken flat between corners of elements. Half meshes count as the whole body.
     """
     turned = np.array(
         [-1.0 if a in mesh.symmetry and x < 0 else 1.0 for a, x in zip(AXES, place, strict=True)]

@@ -89,7 +89,7 @@ def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfInt
 def crossings(mesh: Mesh, u: Array) -> tuple[Crossing, ...]:
     """Where the surface of a mesh cuts itself when displaced by u (n, 3) in mm, cavity and outside together.
 
-    Mirror images of half and quarter meshes count. The cut of most facets comes first. Facets that share a
+    Mirror images of half meshes count. The cut of most facets comes first. Facets that share a
     node are not tested against each other.
     """
     return _Boundary(mesh).crossings(u)

@@ -58,7 +58,7 @@ def mesh_quality(
 ) -> Quality:
     """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
 
-    Half and quarter meshes count as the whole body they stand for. body: the closed surface that took the
+    Half meshes count as the whole body they stand for. body: the closed surface that took the
     place of the envelope's box, if one did. struts_mm3: volume of the struts outside the actuator, with which
     the lattice of a resolved mesh is compared. See `Quality` for units.
     """

@@ -78,6 +78,10 @@ class MeshSettings:
         return found
 
 
+QUICK = MeshSettings(refine=0.5)
+"""The mesh of a quick look in Blender."""
+
+
 def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
     """Raise InputError where self-contact is asked for without walls and struts."""
     if self_contact and not mesh.resolved:

@@ -72,9 +72,8 @@ def mesh_unit(
     d = unit.printed
     if body is not None:
         return _within(body, d, settings, report, mesher, cache)
-    part = (math.pi, ("x",))
     if mesher == "pytetwild":
-        mesh = _from_surfaces(d, settings, report, cache, *part)
+        mesh = _from_surfaces(d, settings, report, cache)
     else:
         try:
             mesh = _structured(d, settings, report)
@@ -87,7 +86,7 @@ def mesh_unit(
                 MeshingWarning,
                 stacklevel=2,
             )
-            mesh = _from_surfaces(d, settings, report, cache, *part)
+            mesh = _from_surfaces(d, settings, report, cache)
     check_positive(mesh)
     if settings.fraction == "full":
         mesh = mirror(mesh, "x")
@@ -195,10 +194,9 @@ def _within(
     right = half(body)
     envelope = body if right is None else right
     surface = Surface(envelope.vertices, envelope.triangles.astype(np.int32), LATTICE)
-    turn, symmetry = (2.0 * math.pi, ()) if right is None else (math.pi, ("x",))
-    mesh = _from_surfaces(d, settings, report, cache, turn, symmetry, surface)
+    mesh = _from_surfaces(d, settings, report, cache, surface, whole=right is None)
     check_positive(mesh)
-    if settings.fraction == "full" and symmetry:
+    if settings.fraction == "full" and mesh.symmetry:
         mesh = mirror(mesh, "x")
     report("mesh", 1.0)
     return mesh
@@ -209,13 +207,12 @@ def _from_surfaces(
     settings: MeshSettings,
     report: Progress,
     cache: Path | None,
-    turn: float,
-    symmetry: tuple[str, ...],
     envelope: Surface | None = None,
+    whole: bool = False,
 ) -> Mesh:
-    """Part of a unit between angles 0 and `turn` by pytetwild, tagged by the exact profile."""
+    """A unit's half at x >= 0, or all of it, by pytetwild, tagged by the exact profile."""
     size = d.cell / CELL_MM / settings.refine
-    box, profile, cavity = unit_surfaces(d, turn, settings.meridian_mm * size)
+    box, profile, cavity = unit_surfaces(d, (2 if whole else 1) * math.pi, settings.meridian_mm * size)
     envelope = envelope or box
     report("mesh by pytetwild", 0.0)
     mesh = mesh_surface(
@@ -226,7 +223,7 @@ def _from_surfaces(
         classify=lambda points: region_at(d, points),
         epsilon_mm=d.thinnest_wall / 5,
         order=settings.order,
-        symmetry=symmetry,
+        symmetry=() if whole else ("x",),
         cache=cache,
     )
     if set(np.unique(mesh.region)) != {MEMBRANE, LATTICE}:

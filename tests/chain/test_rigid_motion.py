@@ -9,11 +9,10 @@ from mu_addon.chain.rigid_motion import (
     exponential,
     inverse,
     logarithm,
-    rotation,
     rotation_vector,
-    skew,
     slope,
 )
+from mu_addon.fem.rotations import rotation, skew
 
 RNG = np.random.default_rng(5)
 ETA = RNG.normal(size=(20, 6)) * [0.8, 0.8, 0.8, 40, 40, 40]

@@ -8,6 +8,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.meshing import settings
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
 from mu_addon.usecases.simulate_and_place import history
@@ -42,6 +43,20 @@ def ran(home, job, summary, at_s):
 
 def design_of(job):
     return history.design_key(job.unit, "", [], {})
+
+
+@pytest.mark.parametrize(
+    ("mesh", "detail"),
+    [
+        (MeshSettings(), "full"),
+        (settings.QUICK, "quick"),
+        (MeshSettings(order=1), "quick"),
+        (MeshSettings(fidelity="resolved"), "resolved"),
+        (MeshSettings(fidelity="solid", refine=0.5), "resolved"),
+    ],
+)
+def test_a_run_knows_its_detail(tmp_path, mesh, detail):
+    assert ran(tmp_path, attrs.evolve(MOTION, mesh=mesh), SHORT, 100).detail == detail
 
 
 def test_every_run_is_kept_and_a_small_one_replaces_no_large_one(tmp_path):

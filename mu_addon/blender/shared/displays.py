@@ -16,7 +16,6 @@ PART = "mu_part"
 MOTION = "mu_motion_part"
 """Marks the objects that show a study's motion, see `results.motion`. Not the name of a property group: up
 to Blender 4.5 those are among an object's custom properties."""
-"""The same mark in files of extensions up to 0.1."""
 EVIDENCE = "mu_evidence_part"
 """Marks the objects that show measured motion, see `evidence.motion`."""
 CHECK = "mu_check"

@@ -63,7 +63,7 @@ def job_of(root: Any) -> Job:
     # Only now: they bring in the solver's packages, which a Blender may lack.
     try:
         from ...fem.solver import SolverChoice
-        from ...meshing.settings import RESOLVED, MeshSettings
+        from ...meshing.settings import QUICK, RESOLVED, MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
@@ -77,7 +77,7 @@ def job_of(root: Any) -> Job:
         extra["paths"] = settings.paths
     if settings.detail == "quick":
         # The homogenised unit on a mesh of half the fineness, one rule, no second mesh.
-        extra["mesh"] = MeshSettings(refine=0.5)
+        extra["mesh"] = QUICK
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}
     elif settings.detail == "resolved":

@@ -24,6 +24,7 @@ from ...design.parameters import Unit, read_unit
 from ...design.rigid_body import read_rigid_bodies
 from ...errors import InputError, MuError
 from ...files import make_folder, output_error, write_text
+from ...meshing.settings import HOMOGENISED, QUICK
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.cache import key
 from ...run.folder import ALWAYS, OWN
@@ -111,11 +112,12 @@ class Run:
 
     @property
     def detail(self) -> str:
-        """`full`, `resolved` or `quick`: what was simulated, and whether by elements that lock."""
+        """`resolved`, struts as printed, `full`, homogenised, or `quick`, homogenised on a coarse mesh."""
         mesh = self.tables.get("simulate", {}).get("mesh") or {}
-        if mesh.get("fidelity") == "resolved":
+        if mesh.get("fidelity", HOMOGENISED) != HOMOGENISED:
             return "resolved"
-        return "quick" if mesh.get("order") == 1 else "full"
+        coarse = mesh.get("order") == 1 or mesh.get("refine", 1.0) <= QUICK.refine
+        return "quick" if coarse else "full"
 
     @property
     def job(self) -> str:
