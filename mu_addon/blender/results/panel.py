@@ -45,7 +45,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if found.quick:
             wrapped(
                 layout,
-                "Quick look: the lattice is homogenised, so vacuum bends half as far as printed struts",
+                "Quick look: a homogenised lattice. Under vacuum it bends half as far as printed struts",
                 "ERROR",
             )
         column = layout.column(align=True)
