@@ -15,7 +15,7 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_path"
     bl_label = "Sensor Paths"
-    place = "path"
+    place = ("path",)
 
     def show(self, layout, context, root):
         props = root.mu_unit

@@ -9,7 +9,7 @@ import bpy
 
 from ...run.child import FAILED
 from ..jobs.panel import job_state
-from ..shared.panels import UnitPanel, alert, large_button, parameters, wrapped
+from ..shared.panels import UnitPanel, alert, folded_place, large_button, wrapped
 from ..unit import object as unit_object
 from . import layer, marks
 from . import state as printing
@@ -28,7 +28,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_print"
     bl_label = "Print"
-    place = "print"
+    place = ("print",)
 
     def show(self, layout, context, root):
         large_button(layout, "mu.solid", "MESH_DATA")
@@ -265,6 +265,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
     bl_idname = "MU_PT_print_files"
     bl_label = "Files"
     bl_options = set()
+    place = ("print",)
 
     def show(self, layout, context, root):
         settings, found = root.mu_print, printing.checked(root)
@@ -296,10 +297,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
         row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
-        header, body = layout.panel("MU_printing", default_closed=True)
-        header.label(text="Print Offsets")
-        if body:
-            parameters(body, root, "print")
+        folded_place(layout, root, "print", "Print Offsets")
 
 
 def _check_state(layout, found) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
@@ -67,17 +67,25 @@ class UnitPanel(RootPanel):
     bl_parent_id = "MU_PT_unit"
     bl_options = {"DEFAULT_CLOSED"}
     find_root = staticmethod(active_root)
-    place: str | tuple[str, ...] = ""
+    place: tuple[str, ...] = ()
     """Places of `PLACES` whose parameters the panel shows."""
 
     def draw_header(self, context):
         """A mark where one of the panel's parameters breaks a rule, also while it is closed."""
         root = active_root(context)
-        found = broken(root) if self.place and root is not None else None
-        if found is not None:
-            own = [s.section for s in SECTIONS if PLACES.get(s.section, "design") in self.place]
-            if found.blames(own):
-                self.layout.label(text="", icon="ERROR")
+        if self.place and root is not None and _blamed(root, _sections(self.place)):
+            self.layout.label(text="", icon="ERROR")
+
+
+def _sections(places: Collection[str]) -> list[str]:
+    """Sections whose parameters are shown at these places."""
+    return [s.section for s in SECTIONS if PLACES.get(s.section, "design") in places]
+
+
+def _blamed(root, sections: Collection[str]) -> bool:
+    """Whether a parameter of these sections breaks a rule."""
+    found = broken(root)
+    return found is not None and found.blames(sections)
 
 
 def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
@@ -152,15 +160,27 @@ def parameters(layout, root, place: str) -> None:
         _folded(layout, root, place, folded)
 
 
+def _fold(layout, name: str, title: str, wrong: bool):
+    """A fold whose head is red where something in it is wrong; its layout, or None while it is closed."""
+    header, body = layout.panel(name, default_closed=True)
+    header.alert = wrong
+    header.label(text=title, icon="ERROR" if wrong else "NONE")
+    return body
+
+
+def folded_place(layout, root, place: str, title: str) -> None:
+    """A fold with the fields of every section that belongs to a place."""
+    body = _fold(layout, f"MU_fold_{place}", title, _blamed(root, _sections([place])))
+    if body:
+        parameters(body, root, place)
+
+
 def folded_section(layout, root, section: str, title: str, hint: str):
     """A fold with a section that has a place of its own; its head is red while one of its fields is.
 
     Returns the fold's layout, or None while it is closed.
     """
-    header, body = layout.panel(f"MU_{section}", default_closed=True)
-    found = broken(root)
-    header.alert = found is not None and any(place[0] == section for place in found.fits)
-    header.label(text=title, icon="ERROR" if header.alert else "NONE")
+    body = _fold(layout, f"MU_{section}", title, _blamed(root, [section]))
     if body:
         wrapped(body, hint, "INFO")
         parameters(body, root, section)
@@ -169,10 +189,9 @@ def folded_section(layout, root, section: str, title: str, hint: str):
 
 def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
     """A fold with fields; its head is red while one of them breaks a rule."""
-    header, body = layout.panel(f"MU_more_{place}", default_closed=True)
     found = broken(root)
-    header.alert = found is not None and any((section, d.name) in found.fits for section, d in fields)
-    header.label(text="More", icon="ERROR" if header.alert else "NONE")
+    wrong = found is not None and any((section, d.name) in found.fits for section, d in fields)
+    body = _fold(layout, f"MU_more_{place}", "More", wrong)
     if body:
         column = body.column(align=True)
         for section, d in fields:

@@ -7,7 +7,7 @@ import bpy
 from ...meshing.gmsh_libraries import install_libraries, missing_libraries
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button
-from ..shared.panels import UnitPanel, parameters, wrapped
+from ..shared.panels import UnitPanel, folded_place, wrapped
 from . import effects
 from .job import SIMULATION, announced
 
@@ -17,7 +17,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_simulate"
     bl_label = "Simulate"
-    place = "simulate"
+    place = ("simulate",)
 
     def show(self, layout, context, root):
         missing = start_child.missing()
@@ -53,10 +53,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         others = [key for key in start_child.running() if key != SIMULATION.key(root)]
         if others:
             wrapped(layout, f"{len(others)} other job(s) running", "INFO")
-        header, body = layout.panel("MU_material", default_closed=True)
-        header.label(text="Material")
-        if body:
-            parameters(body, root, "simulate")
+        folded_place(layout, root, "simulate", "Material")
         header, body = layout.panel("MU_computing", default_closed=True)
         header.label(text="Solver and Folder")
         if body:

@@ -84,7 +84,8 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
     try:
         to_unit(props)
     except InputError as error:
-        places = dict.fromkeys(_places(error.where))
+        named = _places(error.where)
+        places = dict.fromkeys(named)
         good = _good.get(props.uuid)
         if good is not None:
             for section, own in values.items():
@@ -97,6 +98,8 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
             return Broken(words(error), places)
         scale = exact(props.scale)
         fits = {place: nearest_fit(sections, scale, *place) for place in places}
+        # What was changed and could mend nothing is not to blame: its field would be red for no reason.
+        fits = {place: value for place, value in fits.items() if value is not None or place in named}
         mending = repairs(sections, scale)
         # A field's own button sets what the one in the panel's head does.
         fits |= {(r.section, r.name): r.value for r in mending if (r.section, r.name) in fits}

@@ -13,6 +13,7 @@ from ...reading import parse_json
 from ...run.progress import spell
 from ..printing import state as printing
 from ..shared.file_cache import UNREADABLE
+from ..shared.texts import sentence
 from ..steps import state as stack
 from . import object as unit_object
 from .broken import broken
@@ -35,9 +36,8 @@ def lines(root: Any, width: int) -> tuple[list[str], bool]:
 def _rule(paragraphs: list[str], width: int) -> list[str]:
     """A broken rule and, whole, its remedy: where both are too long, it is the rule that is cut."""
     # The rule's name helps nobody here; the tooltip has it.
-    what = textwrap.wrap(re.sub(r" \(rule: [^)]*\)", "", paragraphs[0]), width)
-    remedy = textwrap.wrap(paragraphs[-1], width) if len(paragraphs) > 1 else []
-    remedy = [line[:1].upper() + line[1:] if not k else line for k, line in enumerate(remedy)][: LINES - 1]
+    what = textwrap.wrap(sentence(re.sub(r" \(rule: [^)]*\)", "", paragraphs[0])), width)
+    remedy = textwrap.wrap(sentence(paragraphs[-1]), width)[: LINES - 1] if len(paragraphs) > 1 else []
     if len(what) + len(remedy) > LINES:
         what = what[: LINES - len(remedy)]
         what[-1] = textwrap.shorten(f"{what[-1]} {'x' * width}", width, placeholder=" ...")

@@ -26,10 +26,6 @@ from .broken import broken
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
 
 
-FIXES = 2
-"""Broken rules that have a button of their own: more have no room beside each other."""
-
-
 class MU_PT_unit(TabPanel, bpy.types.Panel):
     """The unit that is worked on"""
 
@@ -87,9 +83,9 @@ def _untrue_size(root, scene) -> str:
 def _head(layout, root) -> None:
     """What the unit comes to or, in red, the rule that it breaks and buttons that mend it.
 
-    It is as high either way.
+    It is as high either way, but for rows of buttons where several rules are broken.
     """
-    lines, wrong = figures.lines(root, CHARACTERS + 2)
+    lines, wrong = figures.lines(root, CHARACTERS)
     found = broken(root) if wrong else None
     box = layout.box()
     box.alert = wrong
@@ -98,15 +94,16 @@ def _head(layout, root) -> None:
     for number, line in enumerate(lines):
         icon = ("ERROR" if wrong else "DRIVER_DISTANCE") if number == 0 else "BLANK1"
         column.label(text=line, icon=icon)
-    row = box.row(align=True)
-    row.alert = False
     mending = [] if found is None else [r for r in found.repairs if r.value is not None]
-    for repair in mending[:FIXES]:
-        fix_button(row, root, repair.section, repair.name, repair.value, found.text)
+    # Beside each other two have room for their words.
+    grid = box.grid_flow(columns=2 if len(mending) > 1 else 1, align=True, row_major=True, even_columns=True)
+    grid.alert = False
+    for repair in mending:
+        fix_button(grid, root, repair.section, repair.name, repair.value, found.text)
     if len(mending) > 1:
-        row.operator("mu.fit_all", text=f"Fix All {len(mending)}")
+        grid.operator("mu.fit_all", text=f"Fix All {len(mending)}")
     if not mending:
-        next_step.draw(row, root)
+        next_step.draw(grid.row(align=True), root)
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -115,7 +112,7 @@ class MU_PT_design(UnitPanel, bpy.types.Panel):
     bl_idname = "MU_PT_design"
     bl_label = "Design"
     bl_options = set()
-    place = "design"
+    place = ("design",)
 
     def show(self, layout, context, root):
         layout.prop(root.mu_unit, "scale")

@@ -1,14 +1,16 @@
 """Every action of a designer's, called as a script would, and what it leaves in the file."""
 
 import json
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 
+from mu_addon.blender.shared import panels
 from mu_addon.blender.unit import figures
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import panel as unit_panel
-from mu_addon.blender.unit.broken import broken
+from mu_addon.blender.unit.broken import broken, description
 from mu_addon.blender.unit.fields import field, shown_value
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import window
@@ -141,7 +143,7 @@ def test_a_broken_rule_stands_in_its_field_with_a_value_that_fits():
     root = add()
     chambers = root.mu_unit.chambers
     assert broken(root) is None
-    for scale, shown in ((1.0, "a wall of 3 mm"), (2.0, "a wall of 6 mm")):
+    for scale, shown in ((1.0, "wall of 3 mm"), (2.0, "wall of 6 mm")):
         root.mu_unit.scale = scale
         chambers.wall_mm = 3.0
         found = broken(root)
@@ -183,6 +185,41 @@ def test_several_faults_have_a_button_each_that_says_what_it_sets_and_one_for_al
     assert root.mu_unit.trouble == ""
     assert (root.mu_unit.chambers.neck_diameter_mm, root.mu_unit.lattice.cells_x) == (24.0, 3)
     assert "no rule is broken" in refused(bpy.ops.mu.fit_all)
+
+
+def test_three_faults_have_three_buttons_and_what_mends_nothing_is_not_red():
+    root = add()
+    root.mu_unit.lattice.junction_diameter_mm = 1.6
+    root.mu_unit.waveguide.well_pitch_mm = 0.5
+    assert ("lattice", "junction_diameter_mm") not in broken(root).fits, "the struts break no rule"
+    root.mu_unit.lattice.cells_x = 4
+    root.mu_unit.chambers.neck_diameter_mm = 30.0
+    words = drawn(unit_panel.CLASSES)
+    assert "Neck Ø 24 mm Cells X 3" in words
+    for repair in broken(root).repairs:
+        d = description(repair.section, repair.name)
+        assert shown_value(root.mu_unit.chambers, d, repair.value) in words
+    assert f"Fix All {len(broken(root).repairs)}" in words
+    assert len(broken(root).repairs) == 3
+    assert figures.lines(root, 36)[0][0][0].isupper()
+
+
+def test_a_closed_fold_with_a_fault_is_red():
+    root = add()
+    heads = {}
+
+    def panel(name, default_closed):
+        heads[name] = MagicMock()
+        return heads[name], None
+
+    layout = MagicMock()
+    layout.panel.side_effect = panel
+    for pitch, red in ((4.0, False), (0.5, True)):
+        root.mu_unit.waveguide.well_pitch_mm = pitch
+        panels.folded_place(layout, root, "path", "Waveguide")
+        panels.folded_place(layout, root, "simulate", "Material")
+        assert heads["MU_fold_path"].alert is red
+        assert heads["MU_fold_simulate"].alert is False
 
 
 def test_the_head_says_what_a_unit_comes_to():
