@@ -54,6 +54,10 @@ LIBRARY = {
         "the force is scaled: load cell, section as typed, clamping or specimen",
         "a dead weight on the load cell, the section measured, the specimen clamped anew",
     ),
+    "force_nonlinearity": (
+        "the load cell's reading is not proportional to the force, by at most 5 % of its largest",
+        "dead weights hung from the load cell, in steps up to the largest force",
+    ),
     "force_drift": (
         "the zero of the load cell drifts while it records",
         "the load cell read for as long without a specimen",

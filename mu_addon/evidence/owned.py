@@ -38,6 +38,7 @@ OF_THE_BENCH = CAMERA.union(
         "pressure_gain",
         "pressure_drift",
         "force_scale",
+        "force_nonlinearity",
         "force_drift",
         "force_lag",
         "line_lag",

@@ -12,9 +12,9 @@ import benchmarks.evidence.second_code as second_code
 from benchmarks.evidence.second_code import __main__ as program
 from benchmarks.evidence.second_code.battery import ROUNDS, shuffled
 from benchmarks.evidence.second_code.coverage import LAWS
-from benchmarks.evidence.second_code.judging import judged, simulator_of
+from benchmarks.evidence.second_code.judging import added_to, judged, simulator_of
 from benchmarks.evidence.second_code.recording import Instrument, Trial, read, slowly, write
-from benchmarks.evidence.second_code.sets import BENCHES, CLASSES, SINGLE, Order, made, order
+from benchmarks.evidence.second_code.sets import BENCHES, CLASSES, SINGLE, Order, made, noise_of, order
 from benchmarks.evidence.second_code.tables import blames_physics, report
 from mu_addon.errors import InputError
 from mu_addon.evidence.effect import LIBRARY
@@ -114,6 +114,31 @@ def test_a_leak_through_a_hole_is_named_and_a_clean_hold_is_not():
     assert (clean["verdict"], clean["outcome"]) == ("none", "none")
     leak = judged(Order("single", "pressure_hold", {"leak": {"orifice": 1e-3}}, "white", 0.002, 11))
     assert leak["outcome"] in ("exact", "in_set")
+
+
+@pytest.mark.parametrize("kind", ["coupon", "lattice_compression", "pressure_hold"])
+def test_noise_that_was_added_is_known_in_the_unit_that_is_predicted(tmp_path, kind):
+    of = Order("clean", kind, {}, "white", 0.003, 4)
+    write(tmp_path / "noisy", made(of))
+    write(tmp_path / "exact", BENCHES[kind](np.random.default_rng(of.seed), {}, "white"))
+    pairs = [read_folder(tmp_path / label).experiments for label in ("noisy", "exact")]
+    for noisy, exact in zip(*pairs, strict=True):
+        (channel,) = simulator_of([noisy]).channels(noisy)
+        found = float(np.std(noisy[channel] - exact[channel]))
+        assert added_to(noise_of(of), noisy, channel) == pytest.approx(found, rel=0.25)
+
+
+def test_mishaps_of_a_laboratory_are_counted():
+    row = {"part": "lab", "kind": "coupon", "noise": "white", "names": [], "ambiguity": []}
+    rows = [
+        {**row, "faults": {"slip": {}}, "verdict": "none", "outcome": "none", "error_over_noise": 6.0},
+        {**row, "faults": {"slip": {}}, "verdict": "unexplained", "outcome": "unexplained"},
+        {**row, "faults": {"bursts": {}}, "verdict": "none", "outcome": "none", "error_over_noise": 2.0},
+    ]
+    words = report(rows)
+    assert "| none, where the error is above 5 times the noise | 1/1" in words
+    assert "| lab, mishap: right, in the set, or open | 1/2" in words
+    assert "| lab, model right: any verdict but none | 0/1" in words
 
 
 def test_rates_and_wrong_names_are_counted(tmp_path, monkeypatch, capsys):

@@ -185,8 +185,15 @@ def filtered(t, force, time_s=0.4):
         (lambda t, force: force + 5e-4 * t, "force_drift"),
         (lambda t, force: force - 0.02 * np.log(1.0 + t / 10.0), "force_drift"),
         (filtered, "force_lag"),
+        (lambda t, force: force * (1.1 - 0.1 * force / 17.0), "force_nonlinearity"),
     ],
-    ids=["without a fault", "a zero that drifts", "a zero that settles", "a slow filter"],
+    ids=[
+        "without a fault",
+        "a zero that drifts",
+        "a zero that settles",
+        "a slow filter",
+        "a cell off straight",
+    ],
 )
 def test_a_load_cell_s_fault_is_told_or_a_rival(fault, name):
     found = judged(coupons(fault))

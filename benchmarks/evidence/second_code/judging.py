@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,10 @@ PRESSURES = np.linspace(-25.0, 50.0, 61)
 # Faults of what measures and holds: naming one of them blames no part of the unit or its resin.
 INSTRUMENTS = frozenset(
     (
-        "pressure_offset", "pressure_gain", "pressure_drift", "force_scale", "force_drift", "force_lag",
-        "angle_offset", "angle_drift", "camera_scale", "camera_tilt", "camera_perspective", "lens_distortion",
-        "clock_offset", "line_lag", "led_drift", "ambient_light", "seating", "frame_compliance",
-        "marker_slip",
+        "pressure_offset", "pressure_gain", "pressure_drift", "force_scale", "force_nonlinearity",
+        "force_drift", "force_lag", "angle_offset", "angle_drift", "camera_scale", "camera_tilt",
+        "camera_perspective", "lens_distortion", "clock_offset", "line_lag", "led_drift", "ambient_light",
+        "seating", "frame_compliance", "marker_slip",
     )
 )  # fmt: skip
 WEIGHT = Parameter("density_kg_m3", "kg/m3", 0.0, 2500.0, 0.0, (1000.0,))
@@ -114,10 +114,17 @@ def error_over_noise(of: Order, experiments: Sequence[Experiment], verdict: Verd
     simulator = simulator_of(experiments)
     for e in verdict.experiments:
         for row, channel in enumerate(simulator.channels(e)):
-            if (added := noise.get((e.name, channel))) is not None:
+            if (added := added_to(noise, e, channel)) is not None:
                 off = e[channel] - simulator.predict(e, values)[row]
                 worst = max(worst, float(np.sqrt(np.nanmean(off**2))) / added)
     return worst
+
+
+def added_to(noise: Mapping[tuple[str, str], float], e: Experiment, channel: str) -> float | None:
+    """Noise added to a predicted channel, in its unit; of a stress read as a force by the section."""
+    if channel == "stress_kPa" and e.section_mm and (newton := noise.get((e.name, "force_N"))) is not None:
+        return 1e3 * newton / (e.section_mm[0] * e.section_mm[1])
+    return noise.get((e.name, channel))
 
 
 def _set(verdict: Verdict) -> set[str]:

@@ -13,16 +13,18 @@ from .recording import Trial
 Rng = np.random.Generator
 Mishap = Callable[[Rng, Sequence[Trial], float], list[Trial]]
 
-# Names that are right, in the set, for each mishap; of none nothing of the model is to be blamed.
+# Names that are right, in the set, for each mishap; with none, the library has no name for it, and an open
+# verdict is right.
 SCALE = ("geometry_as_typed", "batch_variation", "force_scale", "step_change")
 RIGHT: dict[str, tuple[str, ...]] = {
     "height": SCALE,
     "swapped": SCALE,
-    "slip": (),
+    # What scales the force of a test says "clamping" too; from a moment on, what changed and stayed.
+    "slip": ("force_scale", "step_change"),
     "selfheat": ("self_heating", *SCALE),
     "warming_room": ("temperature_drift",),
-    "nonlinear_gauge": (),
-    "rezero": (),
+    "nonlinear_gauge": ("force_nonlinearity",),
+    "rezero": ("force_drift", "pressure_drift", "pressure_offset", "step_change"),
     "unit_change": (),
     "bursts": (),
     "grows_with_load": (),

@@ -7,8 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from .judging import INSTRUMENTS
+from .lab import CLEAN
 
 Row = dict[str, Any]
+# Error over noise from which on a verdict `none` misleads.
+GROSS = 5.0
+# Outcomes that name nothing, and trust nothing either.
+OPEN = ("unexplained", "unidentifiable", "refused")
 
 
 def counted(rows: Sequence[Row], hit: Callable[[Row], bool]) -> str:
@@ -35,6 +40,19 @@ def _called_wrong(row: Row) -> bool:
 
 def _outcomes(*which: str) -> Callable[[Row], bool]:
     return lambda row: row["outcome"] in which
+
+
+def _of_a_laboratory(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Rates of mishaps: those that leave the model right, and those of tests, geometry and instruments."""
+    clean = [r for r in rows if CLEAN.issuperset(r["faults"])]
+    faulty = [r for r in rows if not CLEAN.issuperset(r["faults"])]
+    return [
+        ("lab, model right: any verdict but none", counted(clean, _called_wrong)),
+        ("lab, mishap: right, in the set, or open", counted(faulty, _outcomes("exact", "in_set", *OPEN))),
+        ("lab, mishap: right, or in the set", counted(faulty, _outcomes("exact", "in_set"))),
+        ("lab, mishap: wrong with confidence", counted(faulty, _outcomes("wrong"))),
+        ("lab, mishap: set without the truth", counted(faulty, _outcomes("wrong_set"))),
+    ]
 
 
 def report(rows: Iterable[Row]) -> str:
@@ -71,6 +89,10 @@ def report(rows: Iterable[Row]) -> str:
     line("two effects: both named, or in the set", counted(two, _outcomes("exact", "in_set")))
     line("two effects: both named alone", counted(two, _outcomes("exact")))
     line("two effects: wrong with confidence", counted(two, _outcomes("wrong")))
+    for words, found in _of_a_laboratory(by["lab"]):
+        line(words, found)
+    errors = [r for r in by["lab"] + single + two + outside if r.get("error_over_noise", 0.0) > GROSS]
+    line(f"none, where the error is above {GROSS:g} times the noise", counted(errors, _outcomes("none")))
     for noise in ("white", "slow", "quantised", ""):
         own = [r for r in by["coverage"] if noise in ("", r["noise"])]
         each = [{"in": v} for r in own for v in r["inside"].values()]

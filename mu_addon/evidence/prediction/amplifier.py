@@ -1,4 +1,4 @@
-"""What a load cell and its amplifier do: a gain that is off, a mean over time that delays what is read."""
+"""What a load cell and its amplifier do: a gain that is off or changes with load, a mean over time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,16 @@ from .effective_pressure import first_order_lag
 Array = np.ndarray[Any, Any]
 
 GAIN = Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "calibrations of load cells")
+BOW = Parameter(
+    "bow",
+    "",
+    -0.05,
+    0.05,
+    0.0,
+    (0.01,),
+    "off straight at half load, of the largest; load cells 0.0005, film sensors 0.03",
+    spread=0.01,
+)
 FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
 # Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.
 FILTER_OF_TWO = (
@@ -25,9 +35,10 @@ FILTERED = ("force_lag.time_s", "force_lag.period_s")
 
 
 def amplifier(kind: str) -> tuple[Effect, ...]:
-    """Effects, for a kind, of the load cell's amplifier: its gain, a filter of one pole, or of two."""
+    """Effects, for a kind, of the load cell's amplifier: gain, curve, a filter of one pole, or of two."""
     return (
         Effect("force_scale", (GAIN,), (kind,)),
+        Effect("force_nonlinearity", (BOW,), (kind,)),
         Effect("force_lag", FILTER, (kind,)),
         Effect(
             "force_lag",
@@ -39,9 +50,14 @@ def amplifier(kind: str) -> tuple[Effect, ...]:
     )
 
 
-def amplified(force: Array, values: Mapping[str, float]) -> Array:
-    """Force or stress (n,) with the gain that a load cell has beside the right one (`amplifier`)."""
-    gain = values.get("force_scale.gain", 0.0)
+def amplified(force: Array, values: Mapping[str, float], largest: float) -> Array:
+    """Force or stress (n,) with the gain that a load cell has beside the right one (`amplifier`).
+
+    largest: reading at which its curve is straight again, in the unit of force; 0 where none is known.
+    """
+    gain, bow = values.get("force_scale.gain", 0.0), values.get("force_nonlinearity.bow", 0.0)
+    if bow and largest > 0.0:
+        force = force * (1.0 + 4.0 * bow * (1.0 - np.abs(force) / largest))
     return force * (1.0 + gain) if gain else force
 
 

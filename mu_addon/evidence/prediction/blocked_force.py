@@ -68,7 +68,7 @@ class BlockedForce:
         here = [e for e in experiments if e.kind == KIND]
         static = [e for e in self._driven.effects if e.name in responses[0].variants]
         self._sizes = {e.name: e.keys[0] for e in static}
-        most = largest_reading(FORCE, KIND, here)
+        self._most = most = largest_reading(FORCE, KIND, here)
         gauge = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, here)
         self.effects = (
             *(
@@ -113,7 +113,7 @@ class BlockedForce:
             static["gravity"] = static["gravity"] / modulus
         force = self._balanced(response, p, static, get("frame_compliance.stand_mm_per_N", 0.0) * modulus)
         read = modulus * pressing(t, force, relaxing)
-        read = amplified(filtered(t, read, values), values) + drift("force_drift", t, values)
+        read = amplified(filtered(t, read, values), values, self._most) + drift("force_drift", t, values)
         return (read + get(_zero(experiment), 0.0))[None]
 
     def _balanced(self, response: UnitResponse, p: Array, static: Mapping[str, float], give: float) -> Array:

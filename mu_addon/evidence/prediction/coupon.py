@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, load_cell, load_zeros, machine, recorded, strain_histories
+from .specimen import NEW, largest_N, load_cell, load_zeros, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -84,6 +84,7 @@ class CouponStress:
         strains = [float(np.abs(e["strain"]).max()) for e in experiments if e.kind == KIND]
         self._largest = max(strains, default=0.0) or 1.0
         self._histories = strain_histories(experiments, KIND)
+        self._largest_N = largest_N(experiments, KIND)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The predicted column: nominal stress in kPa."""
@@ -113,7 +114,8 @@ class CouponStress:
                 stress = stress * (1.0 + off * strain)
             return stress * np.where(strain < 0, 1 + excess, 1.0) if excess else stress
 
-        return recorded(experiment, law, values, self._histories.get(experiment.name, NEW))[None]
+        past = self._histories.get(experiment.name, NEW)
+        return recorded(experiment, law, values, past, self._largest_N)[None]
 
 
 def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .specimen import NEW, load_cell, machine, recorded, strain_histories
+from .specimen import NEW, largest_N, load_cell, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
 
@@ -209,6 +209,7 @@ class LatticeStress:
         curve: Callable[[Array], Array] = _linear,
     ) -> None:
         self._histories = strain_histories(experiments, KIND)
+        self._largest_N = largest_N(experiments, KIND)
         self.scalings = scalings
         most = min(
             (self._scaling(e).largest_offset_mm(e.scale) for e in experiments if e.kind == KIND),
@@ -252,7 +253,8 @@ class LatticeStress:
                 stress = stress / np.maximum(1 - at_tenth * (10.0 * np.abs(strain)) ** order, 0.02)
             return stress
 
-        found = [recorded(experiment, law, values, self._histories.get(experiment.name, NEW))]
+        past = self._histories.get(experiment.name, NEW)
+        found = [recorded(experiment, law, values, past, self._largest_N)]
         if "mass_g" in self.channels(experiment):
             mass = values.get(DENSITY.name, DENSITY.null) * (_volume_cm3(experiment) or 0.0)
             mass *= scaling.mass(experiment.scale, offset)

@@ -167,12 +167,21 @@ def load_cell(experiments: Sequence[Experiment], kind: str) -> tuple[Effect, ...
     One cell reads all specimens, so that its zero drifts in N. A specimen whose section is not given is taken
     for a cube of `LENGTH_mm`.
     """
-    timed = [e for e in experiments if e.kind == kind and {"time_s", "stress_kPa"} <= set(e.columns)]
+    timed = _timed(experiments, kind)
     if not timed:
         return ()
-    largest_N = max(largest_reading("stress_kPa", kind, [e]) / _kPa_per_N(e) for e in timed)
-    wandering = drifts("force_drift", "N", ZERO_SHARE * largest_N, kind, timed)
-    return (*wandering, *amplifier(kind))
+    most = ZERO_SHARE * largest_N(experiments, kind)
+    return (*drifts("force_drift", "N", most, kind, timed), *amplifier(kind))
+
+
+def largest_N(experiments: Sequence[Experiment], kind: str) -> float:
+    """The largest force in N that a load cell read over time in experiments of a kind; 0 without any."""
+    found = (largest_reading("stress_kPa", kind, [e]) / _kPa_per_N(e) for e in _timed(experiments, kind))
+    return max(found, default=0.0)
+
+
+def _timed(experiments: Sequence[Experiment], kind: str) -> list[Experiment]:
+    return [e for e in experiments if e.kind == kind and {"time_s", "stress_kPa"} <= set(e.columns)]
 
 
 def _kPa_per_N(experiment: Experiment) -> float:
@@ -181,11 +190,16 @@ def _kPa_per_N(experiment: Experiment) -> float:
 
 
 def recorded(
-    experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory = NEW
+    experiment: Experiment,
+    law: Law,
+    values: Mapping[str, float],
+    past: StrainHistory = NEW,
+    largest_N: float = 0.0,
 ) -> Array:
     """Nominal stress (n,) in kPa that the machine records at the experiment's strains, its zero included.
 
-    law: stress (n,) in kPa of strain (n,) in slow loading. Faces close a gap g while the load builds up: the
+    law: stress (n,) in kPa of strain (n,) in slow loading. largest_N: force at which the load cell's curve is
+    straight again. Faces close a gap g while the load builds up: the
     specimen strains by e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A
     frame of compliance c in series leaves the specimen e - c A s/L. Relaxation needs time_s, the frame
     section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
@@ -199,7 +213,7 @@ def recorded(
     else:
         found = _borne(experiment, law, values, past)
     if timed:
-        found = amplified(found, values)
+        found = amplified(found, values, largest_N * _kPa_per_N(experiment))
         found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
     zero = values.get(_zero(experiment), 0.0)
     return found + zero if zero else found

@@ -24,6 +24,7 @@ TO_DO = {
     "pressure_gain": f"have the gauge calibrated, or divide its readings by the gain; {_INSTRUMENT}",
     "pressure_drift": f"let the gauge warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_scale": "hang a dead weight from the load cell, measure the section, and clamp the specimen anew",
+    "force_nonlinearity": f"calibrate the load cell by dead weights up to its largest force; {_INSTRUMENT}",
     "geometry_as_typed": "measure the specimen and correct its height as typed",
     "step_change": "look up what was changed between these tests, and make the first one again",
     "self_heating": "test slowly or with pauses, or measure the specimen's temperature",
