@@ -18,6 +18,8 @@ from ..unit import object as unit_object
 from ..unit.drawing import CANDIDATE
 from . import ranking
 
+BETTER = "Mean deviation [mm], smaller is better"
+"""What a ranking says of its numbers, beside the lattice and in the panel."""
 BESIDE = 190
 """Pixels that the legend of a field takes, to the left of this one."""
 
@@ -26,7 +28,7 @@ def lines(known: ranking.Known) -> list[str]:
     """Lines above the ramp: what it shows, and where the ranking is stale, that it is."""
     if known.stale:
         return ["Mean deviation", "stale: ranked with other parameters, hence grey"]
-    return ["Mean deviation [mm], smaller is better"]
+    return [BETTER]
 
 
 def marks(known: ranking.Known) -> list[tuple[float, str]]:
@@ -48,8 +50,7 @@ def label(root: Any, known: ranking.Known, name: str) -> list[str]:
 
 def _draw() -> None:
     context = bpy.context
-    root = unit_object.active_root(context)
-    tubes = [] if root is None else _seen(root)
+    root, tubes = _subject(context)
     if not tubes:
         return
     known = ranking.known(root)
@@ -67,6 +68,19 @@ def _draw() -> None:
             legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
     if known.j and root.mu_motion.legend:
         _legend(context, root, known, scale)
+
+
+def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
+    """The unit whose candidate paths are told of, and those of them that are seen.
+
+    It is the active one, or another one while that shows none: colours and legend go together.
+    """
+    active = unit_object.active_root(context)
+    for root in [active, *(other for other in unit_object.roots() if other != active)]:
+        tubes = [] if root is None else _seen(root)
+        if tubes:
+            return root, tubes
+    return active, []
 
 
 def _legend(context: Any, root: Any, known: ranking.Known, scale: float) -> None:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import bpy
+from bpy.props import EnumProperty
 
 from ...design.anchors import windows
 from ..shared.panels import UnitPanel, parameters, wrapped
+from ..shared.texts import path_symbol
 from . import ranking
+from .legend import BETTER
 from .operators import selected_candidate
+
+ORDERS = (
+    ("name", "By Name", "As they lie along the unit, on the lattice, too"),
+    ("deviation", "By Deviation", "The one that disturbs the motion least first"),
+)
 
 
 class MU_PT_path(UnitPanel, bpy.types.Panel):
@@ -19,36 +27,64 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         props = root.mu_unit
-        ranked = ranking.ranked(root)
         row = layout.row()
         row.use_property_split = False
         row.prop(props, "candidates", toggle=True, icon="HIDE_OFF" if props.candidates else "HIDE_ON")
-        column = layout.column(align=True)
-        # The best first, once they are ranked; a sort keeps the order of what it finds equal.
-        unranked = (float("inf"), 0)
-        for window in sorted(
-            windows(props.chambers.count), key=lambda window: ranked.get(window.name, unranked)[0]
-        ):
-            chosen = props.path == window.name
-            text = f"{window.name}    P{window.start} to P{window.start + window.length - 1}"
-            if window.name in ranked:
-                j, rank = ranked[window.name]
-                text += f"    J {j:.3f} mm, no. {rank}"
-            icon = "RADIOBUT_ON" if chosen else "RADIOBUT_OFF"
-            column.operator("mu.path", text=text, icon=icon, depress=chosen).name = (
-                "none" if chosen else window.name
-            )
+        _list(layout, context, root)
         name = selected_candidate(context)
         if name and name != props.path:
-            layout.operator(
-                "mu.path", text=f"Use {name}, selected in the view", icon="RESTRICT_SELECT_OFF"
-            ).name = name
-        if not ranked:
-            wrapped(layout, "Simulate to rank them: Place the Sensor", "INFO")
+            text = f"Use {path_symbol(name)}, selected in the view"
+            layout.operator("mu.path", text=text, icon="RESTRICT_SELECT_OFF").name = name
         parameters(layout, root, "path")
+
+
+def _list(layout, context, root) -> None:
+    """Every path: its anchors and, once they are ranked, its mean deviation and rank."""
+    ranked = ranking.ranked(root)
+    if ranked:
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(context.window_manager, "mu_path_order", expand=True)
+        wrapped(layout, BETTER)
+    else:
+        wrapped(layout, "Simulate to rank them: Place the Sensor", "INFO")
+    column = layout.column(align=True)
+    for window in in_order(root, ranked, context.window_manager.mu_path_order):
+        chosen = root.mu_unit.path == window.name
+        row = column.split(factor=0.34, align=True)
+        icon = "RADIOBUT_ON" if chosen else "RADIOBUT_OFF"
+        button = row.operator("mu.path", text=path_symbol(window.name), icon=icon, depress=chosen)
+        button.name = "none" if chosen else window.name
+        row = row.split(factor=0.45)
+        row.label(text=f"P{window.start} to P{window.start + window.length - 1}")
+        if window.name in ranked:
+            j, rank = ranked[window.name]
+            row.label(text=f"{j:.3f}  #{rank}")
+
+
+def in_order(root, ranked, order: str):
+    """Windows of a unit by their names or, where they are ranked and it is wanted, the best first."""
+    found = windows(root.mu_unit.chambers.count)
+    if order == "name":
+        return found
+    # A sort keeps the order of what it finds equal.
+    return sorted(found, key=lambda window: ranked.get(window.name, (float("inf"), 0))[0])
 
 
 CLASSES = (MU_PT_path,)
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+
+def register() -> None:
+    """The panel, and the order of its list, which no file keeps."""
+    bpy.types.WindowManager.mu_path_order = EnumProperty(
+        name="Order", description="Order of the list of paths", items=ORDERS, default="deviation"
+    )
+    _register_classes()
+
+
+def unregister() -> None:
+    """Take them out."""
+    _unregister_classes()
+    del bpy.types.WindowManager.mu_path_order

@@ -22,27 +22,48 @@ TABLE = 128
 COLOUR = "mu_field_colour"
 """The colour attribute that solid shading shows; renders and material preview use the material."""
 _PLAIN = "MU Solid"
+RARE = 0.2
+"""Percent of a field's values, at either end, that do not stretch the range: at edges stress has no bound."""
 
 
 @attrs.frozen
 class Field:
-    """A field: its attribute, what it is called, its unit and what it says."""
+    """A field: its attribute, what it is called, its unit and what it says.
+
+    amount: whether its colours begin at 0; rare: percent of its values, at either end, that stretch no
+    range; spots: whether it is 0 but for few places, which alone say how far the range goes.
+    """
 
     name: str
     label: str
     unit: str
     text: str
+    amount: bool = False
+    rare: float = RARE
+    spots: bool = False
+
+    def ends(self, values: Any) -> tuple[float, float]:
+        """The range of values (s, v) over the whole motion without its rarest, NaN left out."""
+        if self.spots:
+            values = values[values > 0.0]
+            if not len(values):
+                return 0.0, 0.0
+        low, high = np.nanpercentile(values, (self.rare, 100.0 - self.rare))
+        return 0.0 if self.amount else float(low), float(high)
 
 
 FIELDS = (
-    Field("displacement_mm", "Displacement", "mm", "Distance from where the point is at rest"),
+    Field("displacement_mm", "Displacement", "mm", "Distance from where the point is at rest", amount=True),
     Field(
         "deviation_mm",
         "Deviation",
         "mm",
         "Distance between the unit with the sensor and Model A, point by point",
+        amount=True,
     ),
-    Field("von_mises_kPa", "Von Mises Stress", "kPa", "Of Cauchy's stress, averaged at the nodes"),
+    Field(
+        "von_mises_kPa", "Von Mises Stress", "kPa", "Of Cauchy's stress, averaged at the nodes", amount=True
+    ),
     Field(
         "largest_principal_stress_kPa",
         "Largest Principal Stress",
@@ -56,12 +77,16 @@ FIELDS = (
         "Self-Contact Pressure",
         "kPa",
         "Between walls and struts that touch each other; of Model A, simulated with self-contact",
+        amount=True,
+        rare=5.0,
+        spots=True,
     ),
     Field(
         "run_difference_mm",
         "Difference of Runs",
         "mm",
         "Distance between where this run and the one that it is compared with have moved a point",
+        amount=True,
     ),
     Field(
         "dJ_by_modulus_mm_per_MPa",

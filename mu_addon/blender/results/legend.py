@@ -22,7 +22,7 @@ from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import field_colours
+from . import field_colours, places
 from . import motion as motion_parts
 
 PIECES = 48
@@ -40,11 +40,16 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def lines(root: Any, motion: Any, scene: Any) -> list[str]:
-    """Lines of the legend: field, time and pressure, contact forces, and whether the results are stale."""
+    """Lines of the legend: field, time and pressure, contact forces, and whether the results are stale.
+
+    A unit that is not the active one is named.
+    """
     field = field_colours.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
     found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
+    if root != unit_object.active_root(bpy.context):
+        found.insert(0, root.name)
     other = studies.run_by_key(root, root.mu_unit.study.against)
     if field.name == motion_parts.DIFFERENCE and other is not None:
         itself = other.folder == motion.folder.parent
@@ -63,13 +68,11 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
 
 def _draw() -> None:
     context = bpy.context
-    root = unit_object.active_root(context)
-    if root is None or not root.mu_motion.legend:
-        return
-    shown = [part for part in motion_parts.parts(root) if motion_parts.is_seen(root, part)]
-    motion = motion_parts.motion_of(root) if shown else None
+    root = subject(context)
+    motion = None if root is None or not root.mu_motion.legend else motion_parts.motion_of(root)
     if motion is None:
         return
+    shown = places.seen(root)
     scale = context.preferences.system.ui_scale
     size = round(12 * scale)
     in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
@@ -80,6 +83,13 @@ def _draw() -> None:
         for line, text in enumerate(reversed(lines(root, motion, context.scene))):
             write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
     _names(context, root, motion, size)
+
+
+def subject(context: Any) -> Any | None:
+    """The unit whose colours a legend tells: the active one, or another one while that shows none."""
+    active = unit_object.active_root(context)
+    every = [active, *(root for root in unit_object.roots() if root != active)]
+    return next((root for root in every if root is not None and places.seen(root)), None)
 
 
 def beside_tools(area: Any) -> float:

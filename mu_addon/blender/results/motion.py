@@ -45,9 +45,6 @@ DISPLACEMENT, DEVIATION = "displacement_mm", "deviation_mm"
 DIFFERENCE = "run_difference_mm"
 RUN = "mu_run"
 
-_RARE = 0.2
-"""Percent of the values, at either end, that do not stretch the range: at edges stress has no bound."""
-
 
 @attrs.frozen(eq=False)
 class Played:
@@ -383,7 +380,7 @@ def extent(root: Any, field: str) -> tuple[float, float]:
     found = [p.fields[field] for p in (played(root, part) for part in parts(root)) if p and field in p.fields]
     if not found:
         return 0.0, 1.0
-    ends = np.array([np.nanpercentile(values, (_RARE, 100.0 - _RARE)) for values in found])
+    ends = np.array([field_colours.BY_NAME[field].ends(values) for values in found])
     low, high = float(np.nanmin(ends[:, 0])), float(np.nanmax(ends[:, 1]))
     if root.mu_motion.symmetric:
         high = max(abs(low), abs(high))
@@ -402,7 +399,7 @@ def peak_frame(root: Any, scene: Any) -> int | None:
         values = found.fields.get(field) if found else None
         if found is None or values is None or values.ndim == 1 or np.isnan(values).all():
             continue
-        largest = np.nanpercentile(values, 100.0 - _RARE, axis=1)[found.motion.state]
+        largest = np.nanpercentile(values, 100.0 - field_colours.RARE, axis=1)[found.motion.state]
         sample = int(largest.argmax())
         if best is None or largest[sample] > best[0]:
             best = largest[sample], frame_of(found.motion, float(found.motion.time_s[sample]), scene)

@@ -128,8 +128,8 @@ def _inside(area: Any, x: int, y: int) -> bool:
 
 def _draw() -> None:
     context = bpy.context
-    root = unit_object.active_root(context)
-    if root is None or not places.seen(root):
+    root = legend.subject(context)
+    if root is None:
         return
     size = round(12 * context.preferences.system.ui_scale)
     if root.mu_motion.marker:

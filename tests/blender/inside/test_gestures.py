@@ -82,7 +82,7 @@ def test_a_click_on_a_candidate_works_on_its_unit():
     tube = unit_object.candidate(root, "alpha3")
     select(tube)
     assert unit_object.active_root(bpy.context) == root
-    assert "Use alpha3" in drawn([bpy.types.MU_PT_path])
+    assert "Use α3" in drawn([bpy.types.MU_PT_path])
     assert bpy.ops.mu.path() == {"FINISHED"}
     assert root.mu_unit.path == "alpha3"
 

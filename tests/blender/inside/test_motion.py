@@ -4,9 +4,10 @@ import bpy
 import numpy as np
 
 from mu_addon.blender.path import legend as path_legend
+from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.path import picking, ranking
 from mu_addon.blender.results import field_colours as fields
-from mu_addon.blender.results import legend_object, run_motions
+from mu_addon.blender.results import legend, legend_object, run_motions
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.shared.compat import modifier_input
@@ -150,6 +151,35 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
     assert settings.high < 10.0
 
 
+def test_colours_and_their_legend_go_together_when_another_unit_is_active(study):
+    root = started(study)
+    assert legend.subject(bpy.context) is None
+    assert bpy.ops.mu.field_show(field="displacement_mm") == {"FINISHED"}
+    root.name = "the first"
+    motion = motion_parts.motion_of(root)
+    assert legend.subject(bpy.context) == root
+    assert "the first" not in legend.lines(root, motion, bpy.context.scene)
+    other = add(preset="mu-0.75x")
+    assert unit_object.active_root(bpy.context) == other
+    assert legend.subject(bpy.context) == root
+    assert legend.lines(root, motion, bpy.context.scene)[0] == "the first"
+    root.hide_set(True)
+    assert legend.subject(bpy.context) is None
+
+
+def test_a_field_of_few_spots_has_a_range_of_what_it_is_there():
+    touched = np.zeros((4, 1000))
+    touched[2, :20] = np.linspace(10.0, 30.0, 20)
+    touched[3, 0] = 336.0
+    low, high = fields.BY_NAME["contact_pressure_kPa"].ends(touched)
+    assert low == 0.0
+    assert 28.0 < high < 50.0, "one corner stretches no range"
+    assert fields.BY_NAME["contact_pressure_kPa"].ends(np.full((2, 3), np.nan)) == (0.0, 0.0)
+    stress = np.linspace(5.0, 105.0, 1001)
+    assert fields.BY_NAME["von_mises_kPa"].ends(stress)[0] == 0.0, "an amount's colours begin at 0"
+    assert fields.BY_NAME["largest_stretch"].ends(stress)[0] > 5.0
+
+
 def test_the_legend_stands_in_the_scene(study):
     root = started(study)
     show(name="model_a")
@@ -287,6 +317,13 @@ def test_candidates_say_their_rank(study):
         assert label.startswith("α"), label
         assert label.endswith(f"#{known[name][1]}"), label
     assert tubes["alpha4"].data.materials[0].name == "MU Waveguide"
+    # The list of the panel is sorted either way, and says what its numbers are.
+    by_rank = sorted(known, key=lambda name: known[name][1])
+    assert [w.name for w in path_panel.in_order(root, known, "deviation")] == by_rank
+    assert [w.name for w in path_panel.in_order(root, known, "name")] == [f"alpha{k}" for k in range(1, 11)]
+    words = drawn([path_panel.MU_PT_path])
+    assert "Mean deviation [mm], smaller is better" in words.replace("  ", " ")
+    assert f"{known['alpha4'][0]:.3f}  #{known['alpha4'][1]}" in words
     colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
     assert len(colours) == 9
     assert not unit_object.behind(root)
