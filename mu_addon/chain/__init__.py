@@ -25,12 +25,4 @@ if TYPE_CHECKING:
     from .learning import Sampling as Sampling
     from .learning import learn as learn
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "chain": "Chain ChainState Link Loads",
-            "inverse": "Reach reach_point",
-            "joint": "Joint",
-            "learning": "Learned Sampling learn",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -50,22 +50,4 @@ if TYPE_CHECKING:
     from .strut_cell import StrutCell as StrutCell
     from .threemf import write_3mf as write_3mf
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "anchors": "Window anchor_points window windows",
-            "body": "Body read_body",
-            "dimensions": "Dimensions",
-            "export": "write_nodes write_stl",
-            "gates": "GateError",
-            "gripper": "Gripper build_gripper load_gripper read_gripper",
-            "lattices": "LatticeKind",
-            "parameters": "Unit assumed from_toml load_preset preset_names read_unit to_toml write_unit",
-            "profile": "cavity_radius cavity_volume membrane_volume outer_radius",
-            "quantity": "in_MPa in_kPa",
-            "rigid_body": "RigidBody",
-            "solid": "Solid build_solid",
-            "strut_cell": "StrutCell",
-            "threemf": "write_3mf",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -31,19 +31,4 @@ if TYPE_CHECKING:
     from .verdict import Verdict as Verdict
     from .verdict import diagnose as diagnose
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "effect": "Effect Parameter",
-            "extended": "ExtendedModel extended_model load_model",
-            "fit": "Fit Fitter",
-            "next_experiment": "Proposal propose_experiment",
-            "noise": "Source Whitening",
-            "record": "Record",
-            "simulator": "Composite Simulator",
-            "unit_fem": "UnitSettings unit_responses",
-            "verdict": "Verdict diagnose",
-            "prediction.bench": "bench_simulators",
-            "prediction.unit": "UnitPressure",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

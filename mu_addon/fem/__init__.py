@@ -66,30 +66,4 @@ if TYPE_CHECKING:
     from .trajectory import simulate as simulate
     from .unit import materials_of as materials_of
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "arc": "ContinuationSettings",
-            "batched_newton": "BatchedNewton Variant",
-            "continuation": "Branch limit_pressure trace_branch",
-            "embedding": "Embedding embed",
-            "equilibrium": "Equilibrium",
-            "kinematics": "Probe TipSection bending_angle_deg probe",
-            "lattice_law": "LatticeLaw",
-            "laws": "Foam Friction Law Layered MooneyRivlin NeoHooke Ogden OgdenRoxburgh Prony Yeoh",
-            "loads": "gravity traction",
-            "materials": "Layer Materials",
-            "model": "Model",
-            "newton_settings": "NewtonSettings",
-            "obstacle": "Obstacle ObstacleContact",
-            "protocol": "Protocol read_protocol",
-            "rigid": "Box Plane Pose Sphere",
-            "self_intersection": "crossings first_self_intersection",
-            "solver": "SolverChoice",
-            "state": "State rest",
-            "stress": "cauchy von_mises",
-            "time_stepping": "Instant simulate_in_time",
-            "trajectory": "Trajectory simulate",
-            "unit": "materials_of",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -27,13 +27,4 @@ if TYPE_CHECKING:
     from .tree_file import read_tree as read_tree
     from .tree_file import tree_text as tree_text
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "check": "Fault faults",
-            "definition": "Call Definition Input Output Setting",
-            "evaluation": "Evaluation Kept Order Record State",
-            "tree": "Node NodeTree Source",
-            "tree_file": "parse_tree read_tree tree_text",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

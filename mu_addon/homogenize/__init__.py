@@ -37,18 +37,4 @@ if TYPE_CHECKING:
     from .stretch import StretchSettings as StretchSettings
     from .stretch import stretch_lattice as stretch_lattice
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "bounds": "hashin_shtrikman",
-            "cell_mesh": "CellMeshSettings cell_materials mesh_cell",
-            "compression": "Compression compress",
-            "curve": "Curve",
-            "effective": "Effective read_effective write_effective",
-            "elasticity": "Elasticity effective_tensor young_modulus",
-            "foam_fit": "FoamFit fit_foam lattice_law",
-            "modulus": "moduli",
-            "specimen": "Specimen block_specimen",
-            "stretch": "StretchSettings stretch_lattice",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -26,13 +26,4 @@ if TYPE_CHECKING:
     from .stability import Stability as Stability
     from .stability import check_stability as check_stability
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "choice": "choose",
-            "coupon": "MODES Coupon Response incompressible response",
-            "fit": "Fit fit_coupons",
-            "library": "Material load_material material_names read_material write_material",
-            "stability": "Stability check_stability",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -14,11 +14,4 @@ if TYPE_CHECKING:
     from .folder import read_folder as read_folder
     from .table import Remark as Remark
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "experiment": "Experiment",
-            "folder": "Measured read_folder",
-            "table": "Remark",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -28,14 +28,4 @@ if TYPE_CHECKING:
     from .unit import MeshingWarning as MeshingWarning
     from .unit import mesh_unit as mesh_unit
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "lattice": "GmshUnavailable",
-            "mesh": "LATTICE MEMBRANE Mesh mirror",
-            "quality": "Quality mesh_quality",
-            "settings": "MeshSettings",
-            "surface": "VOID Surface mesh_surface",
-            "unit": "MeshingWarning mesh_unit",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -30,15 +30,4 @@ if TYPE_CHECKING:
     from .unit_body import Mechanics as Mechanics
     from .unit_body import UnitBody as UnitBody
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "evaluation": "Evaluated Evaluator evaluate",
-            "freedoms": "Freedom changed_unit",
-            "gradient": "gradients",
-            "quantities": "Angle RestStiffness Stretch",
-            "structure": "Condition Structure solve",
-            "targets": "Target",
-            "unit_body": "Mechanics UnitBody",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -42,17 +42,4 @@ if TYPE_CHECKING:
     from .search import SearchSettings as SearchSettings
     from .search import search_paths as search_paths
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "batch": "CandidateBatch",
-            "candidates": "Candidate Evaluation candidate_paths evaluate with_sensor",
-            "deviation": "Deviation centreline centreline_deviation rank",
-            "graph": "Graph Limits lattice_graph",
-            "inclusion": "Inclusion RULES straight_inclusion sensor_share",
-            "influence": "Influence deviation_map influence_map",
-            "polyline": "polyline_inclusion",
-            "response": "Response reduced_response",
-            "search": "Search SearchSettings search_paths",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -16,13 +16,4 @@ if TYPE_CHECKING:
     from .vtk import write_mesh as write_mesh
     from .vtk import write_trajectory as write_trajectory
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "html": "page table",
-            "pc2": "read_pc2 write_pc2",
-            "render": "Camera Part png",
-            "results": "ReportData",
-            "vtk": "write_mesh write_trajectory",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -18,6 +18,4 @@ if TYPE_CHECKING:
     from .unit import mesh_of as mesh_of
     from .unit import mesh_printed as mesh_printed
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__, {"strut": "strut_mesh", "unit": "mesh_of mesh_printed"}
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

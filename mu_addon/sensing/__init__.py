@@ -50,21 +50,4 @@ if TYPE_CHECKING:
     from .tracing import Light as Light
     from .tracing import trace as trace
 else:
-    __getattr__, __dir__, __all__ = public_face(
-        __name__,
-        {
-            "calibration": "Calibration CalibrationSweep calibrate read_calibration write_calibration",
-            "decoder": "Decoder",
-            "embedded_waveguide": "EmbeddedWaveguide Joints WaveguideShape embed_waveguide",
-            "framing": "cobs_decoded cobs_encoded crc16",
-            "guide": "Centreline Guide",
-            "law": "Law fit_law",
-            "optics": "Optics",
-            "recording": "Recorder Recording read_recording",
-            "samples": "Layout Samples",
-            "session": "Control run_session",
-            "signal": "Response Signal signal_of_nodes signal_of_states",
-            "sources": "Replay SerialLine Simulated ports",
-            "tracing": "Light trace",
-        },
-    )
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -4,6 +4,7 @@ import ast
 import importlib
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -42,12 +43,25 @@ def test_every_name_of_a_public_face_resolves(package):
 def test_the_type_checker_sees_the_same_names(package):
     tree = ast.parse((FOLDER / package / "__init__.py").read_text())
     imports = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.level == 1]
-    checked = {(node.module, alias.name) for node in imports for alias in node.names}
-    [table] = [node for node in ast.walk(tree) if isinstance(node, ast.Dict)]
-    offered = ast.literal_eval(table)
-    assert checked == {(module, name) for module, names in offered.items() for name in names.split()}
+    checked = {alias.asname for node in imports for alias in node.names}
+    assert checked == set(importlib.import_module(f"mu_addon.{package}").__all__)
     modules = {path.stem for path in (FOLDER / package).iterdir()}
-    assert not {name for _, name in checked} & modules, "a module of that name would take its place"
+    assert not checked & modules, "a module of that name would take its place"
+
+
+def test_a_face_works_from_a_zip_too(tmp_path):
+    with zipfile.ZipFile(tmp_path / "packed.zip", "w") as packed:
+        for file in ("__init__.py", "lazy.py", "errors.py", *_python_files("measured")):
+            packed.write(FOLDER / file, f"mu_addon/{file}")
+    code = "from mu_addon import measured; print(measured.__file__, measured.__all__, measured.Remark)"
+    command = [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {packed.filename!r}); {code}"]
+    said = subprocess.check_output(command, text=True)
+    assert "packed.zip" in said
+    assert "read_folder" in said
+
+
+def _python_files(package):
+    return [path.relative_to(FOLDER) for path in (FOLDER / package).rglob("*.py")]
 
 
 def test_packages_and_help_load_nothing_heavy():
