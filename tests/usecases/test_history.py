@@ -229,7 +229,7 @@ def test_runs_side_by_side(tmp_path):
     assert rows["wall"].unit == "mm"
     assert rows["job"].values == ("ranking", "motion")
     assert rows["At 40 kPa"].values == ("+6.00", "+4.50")
-    assert rows["J of it"].values == ("0.0500", "-")
+    assert rows["Its deviation"].values == ("0.0500", "-")
     assert rows["Time taken"].values == ("480", "40")
     # What they share is not listed.
     assert {"scale", "cell", "mesh, order", "protocol", "paths", "rules"}.isdisjoint(rows)

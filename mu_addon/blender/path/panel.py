@@ -41,13 +41,12 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 def _list(layout, context, root) -> None:
     """Every path: its anchors and, once they are ranked, its mean deviation and rank."""
     ranked = ranking.ranked(root)
-    if ranked:
-        row = layout.row(align=True)
-        row.use_property_split = False
-        row.prop(context.window_manager, "mu_path_order", expand=True)
-        wrapped(layout, BETTER)
-    else:
-        wrapped(layout, "Simulate to rank them: Place the Sensor", "INFO")
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.enabled = bool(ranked)
+    row.prop(context.window_manager, "mu_path_order", expand=True)
+    # As high either way: a click on a run that has no ranking moves nothing.
+    wrapped(layout, BETTER if ranked else "Simulate to rank them: with Place the Sensor")
     column = layout.column(align=True)
     for window in in_order(root, ranked, context.window_manager.mu_path_order):
         chosen = root.mu_unit.path == window.name

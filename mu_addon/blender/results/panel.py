@@ -9,10 +9,10 @@ import bpy
 from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A
 from ...usecases.simulate_and_place.panel_pictures import ANGLE, delta_name
 from ..shared.panels import UnitPanel, alert, wrapped
-from ..shared.texts import path_symbol
+from ..shared.texts import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from . import field_colours, field_operators, legend_object, run_motions, thumbnails
+from . import field_colours, field_operators, legend_object, run_motions, run_panel, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION
 
@@ -23,8 +23,15 @@ BUTTONS = (
     ("contact_pressure_kPa", "Self-Contact"),
 )
 """Fields that a click paints on the unit, and what the button says."""
+AS = {motion_parts.MESH: "Analysis mesh", motion_parts.PRINT: "Printable solid"}
+"""As what a motion is shown."""
 PICTURE = 13.0
 """Side of a picture, in heights of a button."""
+
+
+def _of(name: str) -> str:
+    """Whose motion it is, in words."""
+    return "Without a sensor" if name == MODEL_A else f"Path {path_symbol(name)}"
 
 
 class MU_PT_results(UnitPanel, bpy.types.Panel):
@@ -34,14 +41,16 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
     bl_label = "Results"
 
     def show(self, layout, context, root):
+        # First what never changes its height: a click on a run moves nothing under the mouse.
+        run_panel.draw_runs(layout, root)
         found = studies.findings(root)
         if found is None:
-            wrapped(layout, "Nothing simulated yet", "INFO")
+            wrapped(layout, "Nothing simulated yet: the button at the top begins", "INFO")
             return
         if found.stale:
             alert(layout, "Stale: these results belong to other parameters. Simulate again")
         if not found.run.complete:
-            wrapped(layout, found.run.state.capitalize(), "INFO")
+            wrapped(layout, sentence(found.run.state), "INFO")
         if found.quick:
             wrapped(
                 layout,
@@ -65,17 +74,14 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if ranking:
             best, j = ranking[0]
             tied = (found.summary.get("tied_with_chosen") or {}).get(found.run.rule) or []
-            column.label(text=f"Best path {best}, J {j:.4f} mm")
+            icon = "CHECKMARK" if root.mu_unit.path == best else "NONE"
+            column.label(text=f"Best path {path_symbol(best)}: deviates {j:.3f} mm", icon=icon)
             if tied:
-                column.label(text=f"tied with {', '.join(tied)}")
-            if root.mu_unit.path == best:
-                column.label(text="This path is chosen", icon="CHECKMARK")
-            elif not found.stale:
-                layout.operator("mu.path", text=f"Use {best}", icon="CON_FOLLOWPATH").name = best
+                wrapped(column, f"as good: {path_symbol(', '.join(tied))}")
         search = found.summary.get("search")
         if search:
             best = search["best"]
-            column.label(text=f"Whole lattice: {best['name']}, J {best['J_hat_mm']:.4f} mm")
+            column.label(text=f"Whole lattice: {best['name']}, {best['J_hat_mm']:.3f} mm")
             column.label(
                 text=f"{best['length_mm']:.0f} mm long, {search['checked']} of {search['paths']} solved"
             )
@@ -101,33 +107,57 @@ def _look_buttons(layout, root, ranked: bool) -> None:
     row.prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
 
 
-class _OfResults(UnitPanel):
-    # Below the runs, see `run_panel`, which are registered later.
+class MU_MT_motion(bpy.types.Menu):
+    """What of a run can be shown: the unit without a sensor and with each path, as mesh and as print"""
+
+    bl_idname = "MU_MT_motion"
+    bl_label = "Show"
+
+    def draw(self, context):
+        root = unit_object.active_root(context)
+        motion = None if root is None else motion_parts.motion_of(root)
+        if motion is None:
+            self.layout.label(text=NO_MOTION)
+            return
+        on, row = motion_parts.shown(root), self.layout.row()
+        for what, title in AS.items():
+            column = row.column()
+            column.label(text=title)
+            for name in (MODEL_A, *motion.paths):
+                entry = column.row()
+                entry.enabled = (name, what) not in on
+                button = entry.operator("mu.motion", text=_of(name))
+                button.name, button.what, button.on = name, what, True
+
+
+class _OfMotion(UnitPanel):
+    """A panel that is there once a motion is."""
+
     bl_parent_id = "MU_PT_results"
     bl_options: ClassVar[set[str]] = set()
 
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.active_root(context)
+        return root is not None and motion_parts.motion_of(root) is not None
 
-class MU_PT_motion(_OfResults, bpy.types.Panel):
-    """The motion on the timeline: Model A and any path, side by side, as mesh and as print"""
+
+class MU_PT_motion(_OfMotion, bpy.types.Panel):
+    """The motion on the timeline: the unit without a sensor and with any path, side by side"""
 
     bl_idname = "MU_PT_motion"
     bl_label = "On the Model"
     bl_order = 1
 
     def show(self, layout, context, root):
-        motion = motion_parts.motion_of(root)
-        if motion is None:
-            wrapped(layout, NO_MOTION, "INFO")
-            return
-        on = motion_parts.shown(root)
-        for what, title in ((motion_parts.MESH, "Analysis mesh"), (motion_parts.PRINT, "Printable solid")):
-            layout.label(text=title)
-            grid = layout.grid_flow(columns=4, align=True, even_columns=True, row_major=True)
-            for name in (MODEL_A, *motion.paths):
-                text = "A" if name == MODEL_A else path_symbol(name)
-                there = (name, what) in on
-                button = grid.operator("mu.motion", text=text, depress=there)
-                button.name, button.what, button.on = name, what, not there
+        motion, on = motion_parts.motion_of(root), motion_parts.shown(root)
+        column = layout.column(align=True)
+        for name, what in on:
+            row = column.row(align=True)
+            row.label(text=f"{_of(name)}, {AS[what].lower()}")
+            button = row.operator("mu.motion", text="", icon="X")
+            button.name, button.what, button.on = name, what, False
+        layout.menu("MU_MT_motion", text="Add a Motion", icon="ADD")
         if not motion.paths:
             wrapped(layout, "Paths: simulate with Place the Sensor", "INFO")
         settings = root.mu_motion
@@ -151,7 +181,7 @@ class MU_PT_motion(_OfResults, bpy.types.Panel):
         column.prop(settings, "live")
 
 
-class MU_PT_field(_OfResults, bpy.types.Panel):
+class MU_PT_field(_OfMotion, bpy.types.Panel):
     """The field shown by the colours, and its range"""
 
     bl_idname = "MU_PT_field"
@@ -160,12 +190,14 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        root = unit_object.active_root(context)
-        return root is not None and bool(motion_parts.parts(root))
+        return super().poll(context) and bool(motion_parts.parts(unit_object.active_root(context)))
 
     def show(self, layout, context, root):
         settings = root.mu_motion
-        layout.prop(settings, "field")
+        # As wide as the panel: names of stresses are long.
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(settings, "field", text="")
         missing = [
             part.name for part in motion_parts.parts(root) if settings.field not in part.data.attributes
         ]
@@ -193,7 +225,7 @@ class MU_PT_field(_OfResults, bpy.types.Panel):
         row.operator("mu.motion_legend", text="In Renders", icon="RENDER_STILL", depress=there).on = not there
 
 
-class MU_PT_pictures(_OfResults, bpy.types.Panel):
+class MU_PT_pictures(_OfMotion, bpy.types.Panel):
     """The angle over the pressure, and where and when the chosen path disturbs the motion"""
 
     bl_idname = "MU_PT_pictures"
@@ -209,12 +241,12 @@ class MU_PT_pictures(_OfResults, bpy.types.Panel):
                 layout.template_icon(icon, scale=PICTURE)
                 layout.operator("mu.picture", text="Enlarge", icon="FULLSCREEN_ENTER").name = name
         if all(icon is None for _, icon in found):
-            wrapped(layout, "No pictures yet: simulate this unit first", "INFO")
+            wrapped(layout, "This run made no pictures: run it again for them", "INFO")
         elif not root.mu_unit.path:
             wrapped(layout, "Choose a sensor path to see its deviation", "INFO")
 
 
-CLASSES = (MU_PT_results, MU_PT_motion, MU_PT_field, MU_PT_pictures)
+CLASSES = (MU_PT_results, MU_MT_motion, MU_PT_motion, MU_PT_field, MU_PT_pictures)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

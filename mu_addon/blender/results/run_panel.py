@@ -1,8 +1,10 @@
-"""The panels Runs and Comparison: every run of the unit in a list, and two of them side by side."""
+"""Every run of the unit in a list, for the panel Results; the panel Comparison, two of them side by side."""
 
 from __future__ import annotations
 
+import textwrap
 import time
+from itertools import zip_longest
 from typing import ClassVar
 
 import bpy
@@ -10,13 +12,15 @@ import bpy
 from ...run.progress import spell
 from ...usecases.simulate_and_place.comparison import compare
 from ..shared.panels import UnitPanel, wrapped
-from ..shared.texts import path_symbol
+from ..shared.texts import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import runs
 
 ROWS = 4
 """Runs that the list shows at once."""
+COLUMN = 9
+"""Letters in a line of a column of the comparison."""
 
 
 class MU_UL_runs(bpy.types.UIList):
@@ -53,36 +57,24 @@ def found_in(run) -> str:
     return run.state.partition(";")[0]
 
 
-class MU_PT_runs(UnitPanel, bpy.types.Panel):
-    """Every run of this unit, the latest first; a click shows its results"""
-
-    bl_idname = "MU_PT_runs"
-    bl_parent_id = "MU_PT_results"
-    bl_label = "Runs"
-    bl_options: ClassVar[set[str]] = set()
-
-    @classmethod
-    def poll(cls, context):
-        root = unit_object.active_root(context)
-        return root is not None and bool(studies.runs_of(root))
-
-    def show(self, layout, context, root):
-        listed = runs.listed()
-        row = layout.row()
-        row.template_list("MU_UL_runs", "", listed, "entries", listed, "index", rows=ROWS)
-        column = row.column(align=True)
-        column.operator("mu.run_restore", text="", icon="LOOP_BACK").key = ""
-        column.operator("mu.run_remove", text="", icon="TRASH").key = ""
-        run = studies.shown_run(root)
-        if run is not None:
-            ended = time.strftime("%d %b %H:%M", time.localtime(run.changed_s))
-            took = f", took {spell(run.seconds)}" if run.seconds else ""
-            layout.label(text=f"{ended}{took}", icon="TIME")
-            if not run.complete:
-                wrapped(layout, run.state, "INFO")
-        others = len(studies.runs_of(root)) > 1
-        if others and not studies.run_by_key(root, root.mu_unit.study.against):
-            wrapped(layout, "Tick a run to compare the shown one with it", "INFO")
+def draw_runs(layout, root) -> None:
+    """Every run of a unit, the latest first, and when the shown one ended; nothing without runs."""
+    run, every = studies.shown_run(root), studies.runs_of(root)
+    if not every:
+        return
+    listed = runs.listed()
+    row = layout.row()
+    row.template_list("MU_UL_runs", "", listed, "entries", listed, "index", rows=ROWS)
+    column = row.column(align=True)
+    column.operator("mu.run_restore", text="", icon="LOOP_BACK").key = ""
+    column.operator("mu.run_remove", text="", icon="TRASH").key = ""
+    words = "Click one to see its results"
+    if run is not None:
+        took = f", took {spell(run.seconds)}" if run.seconds else ""
+        words = f"{time.strftime('%d %b %H:%M', time.localtime(run.changed_s))}{took}"
+    layout.label(text=words, icon="TIME")
+    if len(every) > 1 and not studies.run_by_key(root, root.mu_unit.study.against):
+        wrapped(layout, "Tick a run to compare the shown one with it", "INFO")
 
 
 class MU_PT_comparison(UnitPanel, bpy.types.Panel):
@@ -107,15 +99,23 @@ class MU_PT_comparison(UnitPanel, bpy.types.Panel):
             return
         box = layout.box().column(align=True)
         box.scale_y = 0.85
-        _row(box, "", shown.title, other.title)
+        for names in zip_longest(_name_lines(shown), _name_lines(other), fillvalue=""):
+            _row(box, "", *names)
+        box.separator()
         inputs = None
         for line in compare([shown, other]):
             if inputs and not line.is_input:
                 box.separator()
             inputs = line.is_input
-            _row(box, f"{line.what} ({line.unit})" if line.unit else line.what, *line.values)
+            what = sentence(line.what)
+            _row(box, f"{what} ({line.unit})" if line.unit else what, *line.values)
         button = layout.operator("mu.field_show", text="Difference on the Unit", icon="MOD_DATA_TRANSFER")
         button.field = "run_difference_mm"
+
+
+def _name_lines(run) -> list[str]:
+    """The name of a run in the lines that a column has room for."""
+    return textwrap.wrap(run.title, COLUMN)
 
 
 def _row(column, what: str, one: str, other: str) -> None:
@@ -126,7 +126,7 @@ def _row(column, what: str, one: str, other: str) -> None:
     split.label(text=other.replace("alpha", "α"))
 
 
-CLASSES = (MU_UL_runs, MU_PT_runs, MU_PT_comparison)
+CLASSES = (MU_UL_runs, MU_PT_comparison)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

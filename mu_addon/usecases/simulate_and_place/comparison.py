@@ -57,7 +57,7 @@ def compare(runs: Sequence[Run]) -> list[Row]:
     if any(run.ranking for run in runs):
         best = [run.ranking[0] if run.ranking else (NONE, None) for run in runs]
         rows.append(Row("Best path", "", tuple(name for name, _ in best)))
-        rows.append(Row("J of it", "mm", tuple(_number(j, ".4f") for _, j in best)))
+        rows.append(Row("Its deviation", "mm", tuple(_number(j, ".4f") for _, j in best)))
     rows.append(Row("Time taken", "s", tuple(_number(run.seconds or None, ".0f") for run in runs)))
     return rows
 

@@ -6,6 +6,7 @@ The runs are of known bending, written without a solver.
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -18,7 +19,7 @@ from mu_addon.blender.unit import object as unit_object
 from .acting import add, refused
 from .drawing import drawn
 
-PANELS = [panel.MU_PT_results, run_panel.MU_PT_runs, run_panel.MU_PT_comparison, *panel.CLASSES[1:]]
+PANELS = [panel.MU_PT_results, run_panel.MU_PT_comparison, panel.MU_PT_motion, panel.MU_PT_field]
 
 
 def started(home):
@@ -72,6 +73,18 @@ def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run
     assert "no run 'never'" in refused(bpy.ops.mu.run_show, key="never")
 
 
+def test_a_click_on_a_run_moves_nothing_above_it(home):
+    root = started(home)
+    above = []
+    for key in keys(root):
+        assert bpy.ops.mu.run_show(key=key) == {"FINISHED"}
+        layout = MagicMock()
+        panel.MU_PT_results.show(MagicMock(), layout, bpy.context, root)
+        calls = [name for name, _, _ in layout.mock_calls]
+        above.append(calls[: calls.index("row().template_list")])
+    assert above == [["row"]] * 3
+
+
 def test_what_is_shown_on_the_unit_follows_the_run(home):
     root = started(home)
     full, _, thick = keys(root)
@@ -107,7 +120,8 @@ def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
     assert "Compare with another run" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
     assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
     texts = drawn(PANELS)
-    assert "wall (mm) 0.9 1.1" in texts, texts
+    assert "Wall (mm) 0.9 1.1" in texts, texts
+    assert "Ranking Motion" in texts, "the columns are named by the runs"
     assert "At 40 kPa (deg) +50.00 +40.00" in texts, texts
     assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
     scene = bpy.context.scene
