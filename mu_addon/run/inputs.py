@@ -38,12 +38,12 @@ def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another fo
     return parse_toml(text, where)
 
 
-def read_inputs(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """What a file of inputs says, and its table `[run]` of what decides no result. Raises InputError.
 
-    A file without `format`, as older versions wrote some, is of format 1.
+    A file without `format`, as older versions wrote some, is of format 1. words: as those of `read_toml`.
     """
-    document = read_toml(path)
+    document = read_toml(path, *words)
     found = document.pop("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(

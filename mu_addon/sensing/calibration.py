@@ -24,7 +24,7 @@ from scipy.special import stdtrit
 
 from ..errors import InputError
 from ..files import write_text
-from ..reading import file_text, is_number, parse_toml
+from ..reading import file_text, is_number, parse_toml, unreadable
 from ..toml_writer import Commented, toml_text
 
 Array = np.ndarray[Any, Any]
@@ -371,11 +371,11 @@ def read_calibration(path: Path) -> Calibration:
     Raises InputError where it cannot be read, has another version, lacks a value or has one that is no
     number, or where its map is not monotonic.
     """
-    remedy = "name a calibration.toml"
+    remedy = "give the calibration.toml that `calibrate` writes"
     try:
         table = parse_toml(file_text(path), str(path))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the calibration: {error}", str(path), remedy) from None
+        raise InputError(f"cannot read the calibration: {unreadable(error)}", str(path), remedy) from None
     except InputError as error:
         raise InputError(f"cannot read the calibration: {error.what}", error.where, remedy) from None
     try:

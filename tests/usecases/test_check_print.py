@@ -14,9 +14,9 @@ from mu_addon.design.printing.printer import MEANING, load_printer, printer_text
 from mu_addon.design.solid import build_solid, printable
 from mu_addon.design.surface import bad_edges, genus, stl_bytes, stl_surface, volume
 from mu_addon.errors import InputError
-from mu_addon.usecases.check_print.job import Job
+from mu_addon.usecases.check_print.job import Job, part_in
 from mu_addon.usecases.check_print.report import direction_name
-from mu_addon.usecases.check_print.run import console_summary, nominal_of, part_in
+from mu_addon.usecases.check_print.run import console_summary, nominal_of
 
 
 def bottle(bore):
@@ -152,7 +152,7 @@ def test_what_is_no_stl_is_refused(content):
 
 @pytest.mark.parametrize("text", [False, True])
 def test_more_triangles_than_can_be_checked_are_refused_before_they_are_read(text, monkeypatch):
-    monkeypatch.setattr("mu_addon.usecases.check_print.run.MOST_TRIANGLES", 3)
+    monkeypatch.setattr("mu_addon.usecases.check_print.job.MOST_TRIANGLES", 3)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
     content = stl_bytes(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
     if text:

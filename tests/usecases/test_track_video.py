@@ -243,4 +243,4 @@ def test_a_marker_without_a_pixel_is_named(tmp_path):
         raise AssertionError
 
     with pytest.raises(InputError, match="marker 'a' has no pixel"):
-        tracking.track(tmp_path / "bench.mp4", bench, tmp_path / "p.csv", tmp_path / "out", follow)
+        tracking.followed(tmp_path / "bench.mp4", bench, tmp_path / "p.csv", follow)

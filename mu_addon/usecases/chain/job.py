@@ -184,7 +184,7 @@ def read_chain(path: Path, changes: Mapping[str, Any] | None = None) -> Job:
 
     Raises InputError that names file and key.
     """
-    values, _ = read_inputs(path)
+    values, _ = read_inputs(path, "chain", "give a chain.toml, such as assets/examples/trunk/chain.toml")
     values |= changes or {}
     entries = values.pop("unit", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):

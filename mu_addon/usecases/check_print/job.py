@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 
 import attrs
+import numpy as np
 
 from ...design.anchors import Window, window
+from ...design.body import MOST_MM
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.printer import Printer, printer_text, read_printer
+from ...design.surface import Triangles, Vertices
+from ...design.surface_file import read_surface
 from ...errors import InputError
 from ...reading import file_bytes
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
 from ...toml_writer import toml_text
 
-# No STL is longer, in bytes: as text what MOST_TRIANGLES of `run` take.
+MOST_TRIANGLES = 1_000_000
+"""Of an STL file: nine units in one piece have 620 000. Each takes some 4 kB to check."""
+# No STL is longer, in bytes: as text what so many triangles take.
 _LONGEST = 1 << 28
 # Of layers to draw: how many at most, and no part is so tall, in mm.
 MOST_LAYERS, _FARTHEST = 60, 1e5
@@ -59,6 +66,13 @@ class Job:
                 "layers",
                 f"give up to {MOST_LAYERS} heights above the part's lowest point, in mm, from 0 on",
             )
+        # What is no part must be refused before a folder is opened.
+        _ = self.stl_surface
+
+    @cached_property
+    def stl_surface(self) -> tuple[Vertices, Triangles] | None:
+        """The surface (n, 3), (m, 3) of the STL file, if there is one. Raises InputError."""
+        return None if self.stl is None else part_in(self.stl, self.stl_name)
 
     @property
     def stl_name(self) -> str:
@@ -100,6 +114,23 @@ def read_stl(path: Path) -> bytes:
         raise InputError(
             f"cannot read the file: {error.strerror or error}", str(path), "check its name"
         ) from error
+
+
+def part_in(content: bytes, name: str) -> tuple[Vertices, Triangles]:
+    """Surface of a part's STL, OBJ or PLY file, equal corners merged; raises InputError."""
+    again = "export the part again"
+    vertices, triangles = read_surface(content, name, MOST_TRIANGLES)
+    if not len(triangles):
+        raise InputError("the file holds no triangles", name, again)
+    if len(triangles) > MOST_TRIANGLES:
+        raise InputError(
+            f"the file holds {len(triangles)} triangles", name, f"simplify it to {MOST_TRIANGLES} at most"
+        )
+    if not np.isfinite(vertices).all():
+        raise InputError("the file holds numbers that are not finite", name, again)
+    if (farthest := float(np.abs(vertices).max())) > MOST_MM:
+        raise InputError(f"a coordinate of {farthest:.3g} mm lies beyond {MOST_MM:g} mm", name, again)
+    return vertices, triangles
 
 
 def read_job(folder: Path) -> Job:

@@ -8,23 +8,17 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.body import MOST_MM
 from ...design.gates import GateError
 from ...design.printing.check import PrintCheck, check
 from ...design.printing.printer import MEANING, Printer
 from ...design.printing.repair import Repair, repaired
 from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes
-from ...design.surface_file import read_surface
-from ...errors import InputError
 from ...files import write_bytes, write_json
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .job import LAYOUT, Job, read_job
 from .report import write_report
-
-MOST_TRIANGLES = 1_000_000
-"""Of an STL file: nine units in one piece have 620 000. Each takes some 4 kB to check."""
 
 
 def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
@@ -83,8 +77,8 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
 
 def surface_of(job: Job) -> tuple[Vertices, Triangles]:
     """The surface (n, 3), (m, 3) that is checked; raises InputError and GateError."""
-    if job.stl is not None:
-        return part_in(job.stl, job.stl_name)
+    if job.stl_surface is not None:
+        return job.stl_surface
     assert job.unit is not None
     solid = build_solid(job.unit, job.window, job.quality)
     return solid.vertices, solid.triangles
@@ -98,23 +92,6 @@ def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
         return None
     solid = build_solid(job.unit, job.window, job.quality)
     return solid.vertices, solid.triangles
-
-
-def part_in(content: bytes, name: str) -> tuple[Vertices, Triangles]:
-    """Surface of a part's STL, OBJ or PLY file, equal corners merged; raises InputError."""
-    again = "export the part again"
-    vertices, triangles = read_surface(content, name, MOST_TRIANGLES)
-    if not len(triangles):
-        raise InputError("the file holds no triangles", name, again)
-    if len(triangles) > MOST_TRIANGLES:
-        raise InputError(
-            f"the file holds {len(triangles)} triangles", name, f"simplify it to {MOST_TRIANGLES} at most"
-        )
-    if not np.isfinite(vertices).all():
-        raise InputError("the file holds numbers that are not finite", name, again)
-    if (farthest := float(np.abs(vertices).max())) > MOST_MM:
-        raise InputError(f"a coordinate of {farthest:.3g} mm lies beyond {MOST_MM:g} mm", name, again)
-    return vertices, triangles
 
 
 def require_whole(mended: Repair, name: str) -> None:

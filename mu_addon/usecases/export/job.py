@@ -136,6 +136,12 @@ def resin_of(name: str | None) -> Material:
 
 def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
     """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first unless named."""
+    if row is not None and not (name or "").endswith(".csv"):
+        raise InputError(
+            f"--path-row {row} names a row of a paths.csv, and --path gives none",
+            "--path-row",
+            "give the paths.csv of `place --paths graph` with --path, or leave --path-row out",
+        )
     if name is None:
         return None, ""
     if not name.endswith(".csv"):

@@ -40,12 +40,14 @@ def import_files(
     was understood was written. show: is given the same as lines of a terminal before questions. dry: the page
     is all that is written, and open questions are told.
     """
-    context.open_folder(folder)
-    context.console_summary = console_summary
     given = dict(answers)
     remarks: list[Remark] = []
-    with context.progress.stage("import"):
+    with context.progress.stage("read"):
+        # A file that is missing or holds no table leaves no folder.
         found = understand(files, given)
+    context.open_folder(folder)
+    context.console_summary = console_summary
+    with context.progress.stage("import"):
         if found.open and not dry:
             show(terminal_lines(found))
         while found.open and ask is not None and not dry:

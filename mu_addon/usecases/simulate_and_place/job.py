@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ...design.anchors import windows
+from ...design.anchors import window, windows
 from ...design.assets import asset_root
 from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
@@ -114,6 +114,9 @@ class Job:
     path: str = attrs.field(default="", validator=attrs.validators.instance_of(str))
 
     def __attrs_post_init__(self) -> None:
+        if self.path:
+            # Only its name is kept: an unknown one must not be met after the solid was built.
+            window(self.unit, self.path)
         if self.mesh.resolved:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
             object.__setattr__(self, "rules", (PRINTED,))

@@ -23,7 +23,7 @@ from ...measured.kinds import COMMON, KINDS
 from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
-from ...measured.writing import add_experiment, csv_text, file_stem
+from ...measured.writing import add_experiment, csv_text, file_stem, tried
 from ...reading import file_text, require_rows, unreadable
 from ...run.context import RunContext
 from ...toml_writer import toml_text
@@ -393,14 +393,8 @@ def read_pixels(path: Path) -> Tracks:
     return Tracks(names, pixels, time_s=time)
 
 
-def track(
-    clip: Path,
-    bench: Bench,
-    pressure: Path,
-    folder: Path,
-    follow: Tracker,
-) -> tuple[dict[str, Any], tuple[Remark, ...]]:
-    """From a clip to an experiment in a folder; returns figures of it, and remarks.
+def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filmed:
+    """The experiment that a clip shows; writes nothing. Raises InputError.
 
     follow: follows the markers, see `Tracker`; not asked where the clip is a CSV file of pixels.
     """
@@ -422,23 +416,29 @@ def track(
                 "give its pixel position in the first frame",
             )
         tracks = follow(Path(clip), bench.markers)
-    found = filmed(tracks, bench, recorded, str(clip))
-    name = str(bench.experiment.get("name", Path(clip).stem))
-    table, remarks = write_experiment(found, bench, name, folder)
-    return figures(found, name, table), (*found.remarks, *remarks)
+    return filmed(tracks, bench, recorded, str(clip))
 
 
 def track_into(
     folder: Path, clip: Path, bench: Bench, pressure: Path, follow: Tracker, context: RunContext
 ) -> None:
-    """`track` as a run in the folder of measured data, its remarks as warnings."""
+    """Put what a clip shows into a folder of measured data, as a run whose remarks are warnings.
+
+    A clip that cannot be used leaves no folder.
+    """
+    name = str(bench.experiment.get("name", Path(clip).stem))
+    with context.progress.stage("track"):
+        found = followed(clip, bench, pressure, follow)
+        file = f"{file_stem(name)}.csv"
+        # What `diagnose` could not read must not be met once the folder is there.
+        tried(_block(name, file, bench), file, _table(found, bench))
     context.open_folder(folder)
     context.console_summary = console_summary
-    with context.progress.stage("track"):
-        found, remarks = track(clip, bench, pressure, folder, follow)
+    table, remarks = write_experiment(found, bench, name, folder)
+    remarks = (*found.remarks, *remarks)
     for remark in remarks:
         context.progress.warning(remark.what, remark.where, remark.remedy)
-    context.summary |= found | {"remarks": [remark.what for remark in remarks]}
+    context.summary |= figures(found, name, table) | {"remarks": [remark.what for remark in remarks]}
 
 
 def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
