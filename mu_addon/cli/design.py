@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .options import EXAMPLE, add_body, add_report, add_solid, add_unit
+from .options import add_body, add_report, add_solid, add_unit
 from .study_job import run
 
 if TYPE_CHECKING:
@@ -16,7 +16,9 @@ __all__ = ["add", "run"]
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `design`."""
     command = commands.add_parser(
-        "design", help="Generate the printable solid of a unit: STL file and lattice nodes.", epilog=EXAMPLE
+        "design",
+        help="Generate the printable solid of a unit: STL file and lattice nodes.",
+        epilog="example: run.py design --preset mu-1.0x --path alpha4 --out out/mu-1.0x",
     )
     add_unit(command)
     add_report(command)

@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         answers,
         context,
         _asked_in_terminal if asks else None,
-        (lambda lines: None) if options.json else _show,
+        (lambda lines: None) if options.json or (options.quiet and not asks) else _show,
         options.dry_run,
     )
 

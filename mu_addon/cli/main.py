@@ -7,10 +7,13 @@ import math
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from . import all_commands
+
+if TYPE_CHECKING:
+    from ..run.progress import Sink
 
 STATUSES = (
     "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
@@ -23,10 +26,16 @@ _OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
 
 
 class _Commands(argparse._SubParsersAction):
-    """Shows a subcommand's summary in its own --help, too."""
+    """Shows a subcommand's summary in its own --help, too, and gives every subcommand --quiet."""
 
     def add_parser(self, name: str, **options: Any) -> Any:
-        return super().add_parser(name, description=options["help"], **options)
+        command = super().add_parser(name, description=options["help"], **options)
+        command.add_argument(
+            "--quiet",
+            action="store_true",
+            help="Show errors and results only; progress and warnings stay in the folder's log.ndjson.",
+        )
+        return command
 
 
 class _Parser(argparse.ArgumentParser):
@@ -93,6 +102,14 @@ def _short_report(folder: Path, why: str) -> None:
     write_stopped_report(folder, why)
 
 
+def sink_of(options: argparse.Namespace) -> Sink:
+    """Where messages go by --json and --quiet: a terminal's lines, or JSON; all, or how the run ended."""
+    from ..run.progress import json_lines, outcome, terminal
+
+    sink = json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr)
+    return outcome(sink) if options.quiet else sink
+
+
 def main(arguments: list[str]) -> int:
     """Run one command line; returns its exit status and never raises."""
     options = parser().parse_args(arguments)
@@ -100,10 +117,9 @@ def main(arguments: list[str]) -> int:
 
     # Only now, so that --help answers at once.
     from ..run.context import run_to_end
-    from ..run.progress import Progress, json_lines, printable, terminal
+    from ..run.progress import Progress, printable
 
-    json = getattr(options, "json", False)
-    progress = Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)])
+    progress = Progress([sink_of(options)])
     with run_to_end(progress) as context:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)
@@ -111,7 +127,7 @@ def main(arguments: list[str]) -> int:
         # Blender itself has no threads of ours.
         with nullcontext() if "bpy" in sys.modules else context.progress.beating():
             command.run(options, context)
-    if context.status == 0 and not json:
+    if context.status == 0 and not getattr(options, "json", False):
         results = [f"results: {context.folder}"] if context.folder is not None else []
         lines = [*results, *context.console_summary(context.summary)]
         sys.stdout.write(printable("\n".join(lines), sys.stdout) + "\n")

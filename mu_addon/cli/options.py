@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
 
-EXAMPLE = "example: run.py place --preset mu-1.0x --out out/mu-1.0x"
 Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .options import (
-    EXAMPLE,
     add_body,
     add_model,
     add_obstacles,
@@ -30,7 +29,7 @@ def add(commands: Commands[Any]) -> None:
         "place",
         help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
         "motion (the main job).",
-        epilog=EXAMPLE,
+        epilog="example: run.py place --preset mu-1.0x --fidelity homogenised --out out/mu-1.0x",
     )
     add_unit(command)
     add_report(command)

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `ports`."""
-    commands.add_parser("ports", help="List the serial ports, for `stream` and `record`.")
+    commands.add_parser(
+        "ports", help="List the serial ports, for `stream` and `record`.", epilog="example: run.py ports"
+    )
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

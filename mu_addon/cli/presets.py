@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `presets`."""
-    commands.add_parser("presets", help="List the shipped presets: units, and grippers for `grip`.")
+    commands.add_parser(
+        "presets",
+        help="List the shipped presets: units, and grippers for `grip`.",
+        epilog="example: run.py presets",
+    )
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

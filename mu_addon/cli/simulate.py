@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .options import (
-    EXAMPLE,
     add_body,
     add_model,
     add_obstacles,
@@ -29,7 +28,7 @@ def add(commands: Commands[Any]) -> None:
     command = commands.add_parser(
         "simulate",
         help="Run `design`, then simulate the unit's motion under a pressure protocol.",
-        epilog=EXAMPLE,
+        epilog="example: run.py simulate --preset mu-1.0x --fidelity homogenised --out out/mu-1.0x",
     )
     add_unit(command)
     add_report(command)

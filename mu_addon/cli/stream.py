@@ -95,8 +95,10 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     )
 
 
-def shown(options: argparse.Namespace) -> Sink:
-    """Display of the stream: a line for people, or JSON for programs."""
+def shown(options: argparse.Namespace) -> Sink | None:
+    """Display of the stream: a line for people, or JSON for programs; none with --quiet."""
+    if options.quiet:
+        return None
     from ..run.progress import json_lines
     from ..usecases.sensor.stream import Display
 

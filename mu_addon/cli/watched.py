@@ -43,8 +43,8 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
     """Say how the process of a command line ended, where it stood and what to do, in its folder as well."""
     # Only now: as long as all goes well, this process needs none of it.
     from ..run.context import asked_to_stop, has_ended, last_stage, record_crash
-    from ..run.progress import Progress, json_lines, terminal
-    from .main import parser
+    from ..run.progress import Progress
+    from .main import parser, sink_of
 
     options = parser().parse_args(list(line))
     folder = Path(options.out) if getattr(options, "out", None) else None
@@ -61,11 +61,10 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
         # Whatever it is: the words below are still to be said.
         with suppress(Exception):
             write_stopped_report(folder, error.what)
-    json = getattr(options, "json", False)
-    if not json and sys.stderr.isatty():
+    if not getattr(options, "json", False) and not options.quiet and sys.stderr.isatty():
         # Off the line in which its progress stood.
         sys.stderr.write("\n")
-    Progress([json_lines(sys.stdout) if json else terminal(sys.stderr)]).error(error)
+    Progress([sink_of(options)]).error(error)
 
 
 def _error(options: Any, folder: Path | None, stage: str, made: Sequence[str], crash: Crash) -> MuError:

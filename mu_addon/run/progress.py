@@ -181,6 +181,16 @@ def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> S
     return _LiveLine(stream, clock) if stream.isatty() else _PlainLines(stream, clock)
 
 
+def outcome(sink: Sink) -> Sink:
+    """Hands `sink` how the run ended, result or error, and nothing of its way there."""
+
+    def passed(message: Message) -> None:
+        if message["type"] in ("result", "error"):
+            sink(message)
+
+    return passed
+
+
 def printable(text: str, stream: TextIO | None = None) -> str:
     """`text` with everything but line ends that would not be shown as a character spelt as \\xNN or \\uNNNN.
 
