@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import random
-import subprocess
-import sys
-import time
-import tty
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +24,6 @@ from .mutations import FORMATS, NASTY, decoded, sound
 from .test_session import _Scripted
 
 ROOT = Path(__file__).parents[2]
-needs_terminals = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals")
 
 
 def test_first_labels_damaged_in_two_ways_do_not_hold_back_the_right_one():
@@ -276,61 +270,3 @@ def test_coloured_text_of_no_format_is_not_noise() -> None:
     decoder.feed(b"\x1b[32mhello\x1b[0m \x1b[31mthere\x1b[0m\n" * 60, 0.0)
     assert decoder.complaint is not None
     assert "text" in decoder.complaint[0]
-
-
-def recorded(data: bytes, folder: Path) -> tuple[dict[str, Any], str]:
-    """The last status of `record` of bytes sent through a pseudo terminal, and what it showed."""
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    run = [sys.executable, str(ROOT / "headless/run.py"), "record", "--port", os.ttyname(slave)]
-    with subprocess.Popen([*run, "--out", str(folder)], stdout=subprocess.PIPE, text=True) as process:
-        until = time.monotonic() + 60
-
-        def status() -> dict[str, Any]:
-            try:
-                return dict(json.loads((folder / "status.json").read_text()))
-            except (OSError, ValueError):
-                return {}
-
-        while status().get("state") != "connected" and time.monotonic() < until:
-            time.sleep(0.02)
-        for k in range(0, len(data), 512):
-            os.write(master, data[k : k + 512])
-            time.sleep(0.005)
-        while status().get("bytes", 0) < len(data) and time.monotonic() < until:
-            time.sleep(0.02)
-        process.terminate()
-        shown, _ = process.communicate(timeout=30)
-    os.close(master)
-    os.close(slave)
-    assert process.returncode == 0, shown
-    return status(), shown
-
-
-@needs_terminals
-def test_a_coloured_device_through_a_terminal(tmp_path: Path) -> None:
-    lines = [b"\x1b[2J\x1b[31mlight sensor 1.2\x1b[0m\r\n"]
-    lines += [b"\x1b[32mlight\x1b[0m: %d\tdark: 3\r\n" % k for k in range(300)]
-    last, shown = recorded(b"".join(lines), tmp_path / "out")
-    (recording,) = read_recording(tmp_path / "out")
-    np.testing.assert_array_equal(recording.columns["light"], np.arange(300))
-    assert list(recording.columns)[3:] == ["light", "dark"]
-    assert last["coloured"] == 300
-    assert last["read_bytes"] + last["cut_bytes"] == last["bytes"] == sum(map(len, lines))
-    assert "left out of 300 lines" in shown
-    assert "\x1b" not in shown
-
-
-@needs_terminals
-def test_a_damaged_stream_through_a_terminal(tmp_path: Path) -> None:
-    lines = [b"\n", *(b"seq:%d,light:%d\n" % (k % 256, k) for k in range(300))]
-    for place, nasty in enumerate(NASTY):
-        lines.insert(20 + 10 * place, nasty + b"\n")
-    data = b"".join(lines)
-    last, shown = recorded(data, tmp_path / "out")
-    (recording,) = read_recording(tmp_path / "out")
-    assert set(range(300)) <= set(recording.columns["light"])
-    assert last["bytes"] == len(data)
-    accounted = last["read_bytes"] + last["rejected_bytes"] + last["cut_bytes"] + last["overlong"]
-    assert accounted == len(data)
-    assert "unreadable" in shown
