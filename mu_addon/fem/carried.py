@@ -68,10 +68,12 @@ class Carried:
         forces[self.nodes] = 0.0
         return forces
 
-    def turning(self, u: Array, forces: Array) -> tuple[Array, Array]:
+    def turning(self, u: Array, forces: Array, convex: bool = False) -> tuple[Array, Array]:
         """Stiffness (t, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
 
         And the nodes (t,) that hold them: what forces that keep their direction do as their arms turn.
+        convex: each without its negative eigenvalues. Contact that presses a strut from both sides turns it
+        over otherwise, and on the way to equilibrium its forces are far larger than there.
         """
         acting = self._share[:, None] * forces[self.nodes[self._own]]
         found = np.zeros((len(self._turns), 3, 3))
@@ -79,6 +81,9 @@ class Carried:
             lever = self._arm[:, axis]
             total = [np.bincount(self._of, acting[:, i] * lever, len(self._turns)) for i in range(3)]
             found += turned_curvature(u[self._turns], arm, np.column_stack(total))
+        if convex:
+            values, axes = np.linalg.eigh(found)
+            found = (axes * np.maximum(values, 0.0)[:, None, :]) @ axes.transpose(0, 2, 1)
         return found, self._turns
 
     def operators(self, u: Array) -> Array:

@@ -28,6 +28,8 @@ FRICTION_TOLERANCE = 1e-4
 MOST_LAGS = 40
 # In how many steps a weight is put on, where fewer are not enough.
 WEIGHT_STEPS = (1, 4, 16)
+# Of the way to a predicted state, after which it is looked whether surfaces met on it.
+SHARES_OF_WAY = (1 / 16, 1 / 4)
 
 
 class Equilibrium:
@@ -267,6 +269,11 @@ class Equilibrium:
 
         Cut short at the touch a prediction lies next to it, where the barrier's forces are largest.
         """
+        # What touches early on a long way is found without the search of all that lies along it.
+        for share in SHARES_OF_WAY:
+            part = self.model.following(u + share * (guess - u))
+            if self.model.before_touch(u, part) is not part:
+                return u
         return guess if self.model.before_touch(u, guess) is guess else u
 
     def _predict(self, history: Sequence[State], pressure: float) -> Array:

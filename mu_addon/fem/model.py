@@ -322,7 +322,7 @@ class Model:
         """Unknowns (e, 12) of the beams' ends at u (n, 3)."""
         return np.asarray(u.ravel()[self._three])
 
-    def _beam_tangent(self, u: Array, pressure: float, m: MaterialData, own: Array) -> Array:
+    def _beam_tangent(self, u: Array, pressure: float, m: MaterialData, own: Array, convex: bool) -> Array:
         """Blocks of the tangent, those of beams and of what they carry added to its own (b, 3, 3)."""
         assert m.beams is not None
         assert self._carried is not None
@@ -339,7 +339,7 @@ class Model:
         seen = self._seen
         if seen is None or seen[1] != pressure or seen[2] is not m or not np.array_equal(seen[0], u):
             seen = u, pressure, m, self._forces(u, pressure, m)
-        turning, turns = self._carried.turning(u, seen[3])
+        turning, turns = self._carried.turning(u, seen[3], convex)
         np.add.at(
             found,
             np.searchsorted(self._all_keys, turns.astype(np.int64) * (len(self.mesh.nodes) + 1)),
@@ -620,7 +620,8 @@ class Model:
         """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
 
         u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact.
-        convex: self-contact without what makes it less than definite (`SelfContact.stiffness`).
+        convex: self-contact without what makes it less than definite (`SelfContact.stiffness`), and forces
+        on the sections of beams without what it is to turn these (`Carried.turning`).
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
@@ -629,15 +630,17 @@ class Model:
             inputs = [part_MPa, self._x, faces, *self._face_rule]
             inputs += [self._element_blocks + first * per_face, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
-        values = self._values(self._gathered(u), u, pressure, m)
+        values = self._values(self._gathered(u), u, pressure, m, convex)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
 
-    def _values(self, blocks: Array, u: Array, pressure: float, m: MaterialData) -> Array:
+    def _values(
+        self, blocks: Array, u: Array, pressure: float, m: MaterialData, convex: bool = False
+    ) -> Array:
         """The tangent's own values (nnz,) of its blocks (b, 3, 3), with those of beams added."""
         if self._carried is not None:
-            blocks = self._beam_tangent(u, pressure, m, blocks)
+            blocks = self._beam_tangent(u, pressure, m, blocks, convex)
         return np.asarray(blocks.ravel()[self._scalar_map])
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:

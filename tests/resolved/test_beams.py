@@ -86,6 +86,20 @@ def test_forces_and_tangent_are_slopes_with_loads_on_what_is_carried(mesh):
     assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
+def test_sections_pressed_from_both_sides_stay_definite_where_asked(mesh):
+    """An energy that grows outward presses toward the axis and turns a section over; the rest is kept."""
+    _, u = random_state(mesh)
+    carried = Carried(mesh)
+    slope = np.zeros_like(mesh.nodes)
+    slope[mesh.carried] = mesh.nodes[mesh.carried] - mesh.nodes[mesh.carriers[:, 0]]
+    exact, turns = carried.turning(u, slope)
+    convex, same = carried.turning(u, slope, convex=True)
+    assert (same == turns).all()
+    before, after = np.linalg.eigvalsh(exact), np.linalg.eigvalsh(convex)
+    assert (before.min(axis=1) < 0).any()
+    np.testing.assert_allclose(after, np.maximum(before, 0.0), atol=1e-12 * np.abs(before).max())
+
+
 def test_an_image_moves_as_what_it_mirrors(mesh):
     _, u = random_state(mesh)
     whole = mirror(mesh, "x")
