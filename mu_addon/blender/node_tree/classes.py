@@ -15,7 +15,7 @@ from ...usecases.graph.definitions import definitions
 from ..shared.panels import wrapped
 from ..shared.texts import sentence
 from ..shared.updates import Signal
-from ..unit.fields import blender_property, field, label, tooltip
+from ..unit.fields import blender_property, field, label, tied_update, tooltip
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import sockets
 
@@ -250,7 +250,8 @@ def _property(s: Setting):
             max=d.high,
             precision=3 if d.high < 1000 else 2,
             step=10 if d.high > 20 else 1,
-            update=_changed,
+            # The same coupling as in the unit's sidebar.
+            update=tied_update(d.name, _changed),
         )
     return blender_property(d, _changed)
 

@@ -13,6 +13,7 @@ from ...errors import InputError
 from ...graph.definition import Setting
 from ...graph.tree import Node, NodeTree, Source
 from ...usecases.graph.definitions import definitions
+from ..shared import updates
 from ..unit.fields import exact
 from ..unit.properties import to_unit
 from .classes import GROUP, TREE, attribute, node_class
@@ -208,6 +209,8 @@ def _link(tree: Any, before: Any, output: str, after: Any, key: str) -> None:
 
 def _set(new: Any, node: Node) -> None:
     """Set a node's fields; a value of another type, or no choice, is refused as the core refuses it."""
-    for s in new.definition.settings:
-        if s.name in node.settings:
-            setattr(new, attribute(s), s.checked(node.settings[s.name]))
+    # As they are: one that a rule ties to another one may differ in a file, and is then told.
+    with updates.paused():
+        for s in new.definition.settings:
+            if s.name in node.settings:
+                setattr(new, attribute(s), s.checked(node.settings[s.name]))

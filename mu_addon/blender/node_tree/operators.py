@@ -15,10 +15,10 @@ from ...usecases.graph.definitions import definitions
 from ...usecases.graph.templates import template, template_names
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared.operators import NO_UNIT, open_file, reports_errors
+from ..shared.operators import NO_UNIT, UnitOperator, open_file, reports_errors
 from ..shared.texts import sentence
 from ..unit import object as unit_object
-from . import conversion, state
+from . import conversion, following, state
 from .classes import TREE
 from .groups import TreeOperator, active_tree
 
@@ -189,6 +189,42 @@ class MU_OT_tree_of_unit(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class MU_OT_tree_show(UnitOperator, bpy.types.Operator):
+    """Show the tree that the unit follows in a node editor; fields of the sidebar are fields of its nodes"""
+
+    bl_idname = "mu.tree_show"
+    bl_label = "Show the Tree"
+    bl_options = {"REGISTER"}
+
+    @reports_errors
+    def execute(self, context):
+        root = unit_object.active_root(context)
+        node = following.followed(root)
+        if node is None:
+            raise InputError(
+                "the unit follows no tree",
+                root.name,
+                "use Tree of the Active Unit in a node editor, with Steps",
+            )
+        tree = node.id_data
+        tree.nodes.active = node
+        if not bpy.app.background:
+            space = _node_editor(context)
+            space.tree_type, space.node_tree = TREE, tree
+        return {"FINISHED"}
+
+
+def _node_editor(context):
+    """A node editor that is open, else one in a new window."""
+    windows = context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas if area.type == "NODE_EDITOR"]
+    if not areas:
+        bpy.ops.wm.window_new()
+        areas = [windows[-1].screen.areas[0]]
+        areas[0].ui_type = TREE
+    return areas[0].spaces.active
+
+
 class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
     """Open what the active node's run left: its report, its folder or its table"""
 
@@ -224,6 +260,7 @@ CLASSES = (
     MU_OT_tree_load,
     MU_OT_tree_save,
     MU_OT_tree_of_unit,
+    MU_OT_tree_show,
     MU_OT_node_open,
     *job_operators(
         state.RUN,

@@ -27,12 +27,12 @@ from ...usecases.graph.definitions import definitions
 from ...usecases.graph.job import LAYOUT, Job, file_name
 from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
-from ..shared import handlers, updates
+from ..shared import handlers
 from ..shared.file_cache import FileCache
 from ..simulate.study_folder import default_folder, relative
 from ..unit import object as unit_object
-from ..unit.properties import PARAMETERS_CHANGED, from_unit, to_unit
-from . import classes, conversion
+from ..unit.properties import PARAMETERS_CHANGED, to_unit
+from . import classes, conversion, following
 from .classes import CHANGED, TREE
 from .plan import plan_of
 
@@ -123,17 +123,14 @@ def _follow(tree: Any, evaluation: Evaluation) -> None:
     for node in tree.nodes:
         root = getattr(node, "follower", None)
         design = evaluation.outputs.get(node.name, {}).get("unit")
-        if root is None or design is None or not root.mu_unit.uuid:
+        # What the sidebar changed meanwhile is the tree's first, which is then refreshed again.
+        if root is None or not root.mu_unit.uuid or following.give_back(root) or design is None:
             continue
         try:
             same = to_unit(root.mu_unit) == design.unit and root.mu_unit.path == design.path
         except MuError:
             same = False
-        if not same:
-            with updates.paused():
-                from_unit(root.mu_unit, design.unit)
-                root.mu_unit.path = design.path
-            unit_object.rebuild(root)
+        following.agree(root) if same else following.take(root, design)
 
 
 def _keep_reachable(tree: Any) -> None:
@@ -259,6 +256,7 @@ def _job_ended(key: str) -> None:
 
 @persistent
 def _all(*_: Any) -> None:
+    following.forget()
     for tree in trees():
         schedule(tree)
 
@@ -281,7 +279,12 @@ _HANDLERS: dict[str, Callable[..., Any]] = dict.fromkeys(("undo_post", "redo_pos
 _DRIVEN: dict[str, Callable[..., Any]] = dict.fromkeys(
     ("frame_change_post", "depsgraph_update_post"), _driven
 )
-_CONNECTIONS = ((CHANGED, schedule), (PARAMETERS_CHANGED, _of_object), (JOB_ENDED, _job_ended))
+_CONNECTIONS = (
+    (CHANGED, schedule),
+    (PARAMETERS_CHANGED, _of_object),
+    (unit_object.REBUILT, following.give_back),
+    (JOB_ENDED, _job_ended),
+)
 
 
 def register() -> None:
@@ -302,3 +305,4 @@ def unregister() -> None:
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     _pending.clear()
+    following.forget()

@@ -139,8 +139,10 @@ def field(group, d: Description) -> str:
     return d.name + TRUE if scaled else d.name
 
 
-def _tied_update(name: str, changed):
-    """The update of a parameter that is tied to another one: both change as one."""
+def tied_update(name: str, changed):
+    """The update of a parameter: one that is tied to another one changes that, too."""
+    if len(tied({name: 0.0})) == 1:
+        return changed
 
     def update(group, context):
         if not updates.are_paused():
@@ -157,8 +159,7 @@ def generated_fields(section: type, changed) -> dict[str, Any]:
     """Blender properties of every parameter of a section, and of every length as it is."""
     annotations = {}
     for d in describe(section):
-        update = _tied_update(d.name, changed) if len(tied({d.name: 0.0})) > 1 else changed
-        annotations[d.name] = blender_property(d, update)
+        annotations[d.name] = blender_property(d, tied_update(d.name, changed))
         if d.unit == "mm" and not d.fixed:
             annotations |= true_length(d.name, label(d), tooltip(d), step_of(d.high))
     return annotations

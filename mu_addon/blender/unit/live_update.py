@@ -73,7 +73,19 @@ def _job_ended(_key) -> None:
     catch_up()
 
 
-_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _after_undo_or_load)
+@persistent
+def _played(*_):
+    """Keyframes and drivers set parameters without a property's update."""
+    for root in unit_object.roots():
+        data = root.animation_data
+        if data is not None and (data.action or data.drivers) and unit_object.behind(root):
+            schedule(root)
+
+
+_HANDLERS = {
+    **dict.fromkeys(("undo_post", "redo_post", "load_post"), _after_undo_or_load),
+    "frame_change_post": _played,
+}
 _CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show), (JOB_ENDED, _job_ended))
 
 

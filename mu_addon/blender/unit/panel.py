@@ -7,6 +7,7 @@ import bpy
 from ..body import panel as body_panel
 from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
+from ..node_tree import following
 from ..shared import scene_units
 from ..shared.operators import NO_UNIT, linked
 from ..shared.panels import (
@@ -47,6 +48,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
             return
         if linked(root):
             wrapped(layout, linked(root), "LINKED")
+        _tree(layout, root)
         if untrue := _untrue_size(root, context.scene):
             alert(layout, untrue)
         row = layout.row(align=True)
@@ -63,6 +65,16 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
         _head(layout, root)
+
+
+def _tree(layout, root) -> None:
+    """The tree whose values the panel edits, where the unit follows one, and which of them the tree keeps."""
+    node = following.followed(root)
+    if node is None:
+        return
+    layout.operator("mu.tree_show", text=f"Edits the tree {node.id_data.name}", icon="NODETREE")
+    if kept := following.kept_by_tree(root):
+        wrapped(layout, f"By a link or driver of the tree: {', '.join(kept)}", "DECORATE_DRIVER")
 
 
 def _untrue_size(root, scene) -> str:

@@ -6,7 +6,18 @@ import attrs
 import bpy
 import pytest
 
-from mu_addon.blender.node_tree import classes, conversion, groups, operators, panel, plan, sockets, state
+from mu_addon.blender.node_tree import (
+    classes,
+    conversion,
+    following,
+    groups,
+    operators,
+    panel,
+    plan,
+    sockets,
+    state,
+)
+from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.run.child import DONE
@@ -15,6 +26,7 @@ from mu_addon.usecases.graph.job import STATES
 from mu_addon.usecases.graph.templates import template, template_names
 
 from .acting import add, refused
+from .drawing import drawn
 from .jobs import ended
 
 
@@ -291,6 +303,66 @@ def test_the_sidebar_and_the_trees_node_edit_the_same_fields():
     assert "wall_mm = 0.8" in design.settings["parameters"]
     root.mu_unit.chambers.wall_mm = 9.0
     assert state.refresh(tree)[node.name].error is not None
+
+
+def test_the_sidebar_of_a_unit_that_follows_edits_the_trees_fields():
+    root = add(preset="mu-1.0x")
+    assert following.followed(root) is None
+    assert "follows no tree" in refused(bpy.ops.mu.tree_show)
+    assert bpy.ops.mu.tree_of_unit(steps=True) == {"FINISHED"}
+    (tree,) = state.trees()
+    state.refresh(tree)
+    assert f"Edits the tree {tree.name}" in drawn([unit_panel.MU_PT_unit])
+    root.mu_unit.chambers.wall_mm = 1.15
+    assert abs(tree.nodes["Chambers"].wall_mm - 1.15) < 1e-6
+    # The next change of a node overwrites nothing, and the other way round.
+    tree.nodes["Struts"].junction_diameter_mm = 1.5
+    state.refresh(tree)
+    assert abs(root.mu_unit.chambers.wall_mm - 1.15) < 1e-6
+    assert abs(root.mu_unit.lattice.junction_diameter_mm - 1.5) < 1e-6
+    # Material, path and scale, and what operators set.
+    root.mu_unit.material.sensor_modulus_kPa = 900.0
+    root.mu_unit.scale = 1.5
+    bpy.ops.mu.path(name="alpha5")
+    assert (tree.nodes["Path"].path, tree.nodes["Profile"].scale) == ("alpha5", 1.5)
+    assert tree.nodes["Assemble Unit"].material_sensor_modulus_kPa == 900.0
+    state.refresh(tree)
+    assert root.mu_unit.path == "alpha5", "the waveguide is linked with its path"
+    bpy.ops.mu.path(name="none")
+    state.refresh(tree)
+    assert root.mu_unit.path == ""
+    # A wall that breaks a rule is the tree's, too, and so is its repair.
+    root.mu_unit.chambers.wall_mm = 4.4
+    assert "failed" in states(tree).values()
+    assert bpy.ops.mu.fit_all() == {"FINISHED"}
+    assert "failed" not in states(tree).values()
+    assert root.mu_unit.trouble == ""
+
+
+def test_what_a_driver_or_a_link_gives_is_the_trees_and_the_sidebar_says_so():
+    root = add(preset="mu-1.0x")
+    assert bpy.ops.mu.tree_of_unit(steps=True) == {"FINISHED"}
+    (tree,) = state.trees()
+    tree.nodes["Chambers"].driver_add("wall_mm").driver.expression = "0.9"
+    state.refresh(tree)
+    root.mu_unit.chambers.wall_mm = 1.2
+    root.mu_unit.chambers.neck_diameter_mm = 13.0
+    assert following.kept_by_tree(root) == ["Wall"]
+    state.refresh(tree)
+    state.refresh(tree)
+    assert abs(root.mu_unit.chambers.wall_mm - 0.9) < 1e-6
+    assert tree.nodes["Profile"].neck_diameter_mm == root.mu_unit.chambers.neck_diameter_mm == 13.0
+    assert "By a link or driver of the tree: Wall" in drawn([unit_panel.MU_PT_unit]).replace("  ", " ")
+
+
+def test_cell_and_bladder_are_coupled_in_the_node_as_in_the_sidebar():
+    tree = new("unit")
+    profile = tree.nodes["Profile"]
+    profile.cell_mm = 13.0
+    assert profile.bladder_diameter_mm == 26.0
+    assert "failed" not in states(tree).values()
+    profile.bladder_diameter_mm = 24.0
+    assert profile.cell_mm == 12.0
 
 
 def test_a_unit_follows_the_steps_of_its_tree_and_lets_go_when_it_is_deleted():

@@ -142,6 +142,22 @@ def test_a_preview_that_fell_behind_is_caught_up():
     assert abs(tall - 4 * 12.5) < 1e-4
 
 
+def test_keyframes_and_drivers_on_a_unit_are_followed():
+    root = add()
+    root.keyframe_insert("mu_unit.chambers.neck_diameter_mm", frame=1)
+    root.mu_unit.chambers.neck_diameter_mm += 2.0
+    root.keyframe_insert("mu_unit.chambers.neck_diameter_mm", frame=21)
+    root.driver_add("mu_unit.lattice.junction_diameter_mm").driver.expression = "2 - frame / 100"
+    shapes, wide = [], []
+    for frame in (1, 21):
+        bpy.context.scene.frame_set(frame)
+        assert not unit_object.behind(root)
+        shapes.append(points_of(root, "actuator"))
+        wide.append(attribute(root, "radius").mean())
+    assert np.abs(shapes[1] - shapes[0]).max() > 0.9, "a neck wider by 2 mm"
+    assert wide[1] < wide[0]
+
+
 def test_strangers_are_left_alone():
     root = add()
     stranger = bpy.data.objects.new("stranger", None)
