@@ -9,9 +9,14 @@ import numpy as np
 
 from ..errors import InputError
 from ..meshing.mesh import AXES, TET_EDGES, Mesh, boundary_faces
-from .elements import shape_functions, shape_gradients, triangle_shapes
+from ..meshing.quality import shapes
+from .elements import shape_functions, triangle_shapes
 
 Array = np.ndarray[Any, Any]
+
+
+SETTLED = 1e-9
+"""A step of Newton's method in reference coordinates after which there is nothing more to gain."""
 
 
 @attrs.frozen(eq=False)
@@ -61,15 +66,23 @@ def invert(nodes: Array, points: Array, local: Array) -> Array:
     nodes (e, 10, 3) and points (e, 3) in mm. local (e, 3): where to begin, changed in place; -1 where the map
     is singular on its way.
     """
+    left = np.arange(len(local))
     for _ in range(8):
-        bary = np.column_stack([1 - local.sum(axis=1), local])
-        x = np.einsum("en,eni->ei", shape_functions(bary, 2), nodes)
-        jacobian = np.einsum("eni,enj->eij", nodes, shape_gradients(bary, 2))
+        own = nodes[left]
+        bary = np.column_stack([1 - local[left].sum(axis=1), local[left]])
+        shape, slope = shapes(bary, TET_EDGES, 2)
+        away = points[left] - np.einsum("en,eni->ei", shape, own)
+        jacobian = np.einsum("eni,enj->eij", own, slope)
         # A point far outside an element may meet a singular map; such an element is not its home.
         good = np.abs(np.linalg.det(jacobian)) > 1e-12
-        local[~good] = -1.0
-        step = np.linalg.solve(jacobian[good], (points - x)[good][:, :, None])[:, :, 0]
-        local[good] += np.clip(step, -1, 1)
+        local[left[~good]] = -1.0
+        left = left[good]
+        step = np.clip(np.linalg.solve(jacobian[good], away[good][:, :, None])[:, :, 0], -1, 1)
+        local[left] += step
+        # The next step would be the square of this one, below the last digit.
+        left = left[np.abs(step).max(axis=1, initial=0.0) > SETTLED]
+        if not len(left):
+            break
     return local
 
 
