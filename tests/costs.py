@@ -89,8 +89,8 @@ def read():
 
 
 def write(costs):
-    """The table, longest first; what it has of files that did not run stays."""
-    ran = {name.partition("::")[0] for name in costs}
+    """The table, longest first. What it has of files that did not run stays, and of fixtures of a session."""
+    ran = {name.partition("::")[0] for name in costs} - {""}
     costs = {name: s for name, s in read().items() if name.partition("::")[0] not in ran} | dict(costs)
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file, lineterminator="\n")

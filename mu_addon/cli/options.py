@@ -7,12 +7,39 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
+    from ..design.quantity import Description
     from ..fem.solver import SolverChoice
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
 
 Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
+
+
+def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str | None = None) -> None:
+    """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
+
+    Bounds are checked by the job.
+    """
+    option = d.name.replace("_", "-")
+    if d.type is bool:
+        command.add_argument(f"--no-{option}", dest=d.name, action="store_false", help=f"Do not {d.text}.")
+    else:
+        command.add_argument(
+            f"--{option}",
+            type=d.type,
+            choices=d.choices or None,
+            default=d.default,
+            metavar=metavar,
+            help=help_of(d),
+        )
+
+
+def help_of(d: Description, default: str = "") -> str:
+    """Help of a setting's option; default: in words, where it is not the setting's own."""
+    own = {True: "yes", False: "no"}.get(d.default, d.default) if d.type is bool else d.default
+    shown = default or (f"{own:g}" if d.type is float else own)
+    return f"{d.text[:1].upper()}{d.text[1:]} (default: {shown})."
 
 
 def add_results(command: argparse.ArgumentParser) -> None:
@@ -56,13 +83,10 @@ def add_model(command: argparse.ArgumentParser) -> None:
 
 def add_orientation(command: argparse.ArgumentParser) -> None:
     """--orientation, the direction of gravity."""
+    from ..usecases.simulate_and_place.settings import ORIENTATION
+
     command.add_argument(
-        "--orientation",
-        type=float,
-        default=0.0,
-        metavar="DEG",
-        help="Orientation of the unit, degrees about x; 0: hanging, tip down (default: 0). Has an effect "
-        "only if --model includes gravity.",
+        "--orientation", type=float, default=ORIENTATION.default, metavar="DEG", help=help_of(ORIENTATION)
     )
 
 
@@ -170,40 +194,27 @@ class _Friction(argparse.Action):
 
 def add_fidelity(command: argparse.ArgumentParser) -> None:
     """Add fidelity and self-contact of a job that simulates a unit many times: homogenised by default."""
-    from ..meshing.settings import FIDELITIES, HOMOGENISED
+    from ..meshing.settings import FIDELITY, SELF_CONTACT
 
-    command.add_argument(
-        "--fidelity",
-        choices=FIDELITIES,
-        default=HOMOGENISED,
-        help="Model of the lattice: every strut as printed (resolved; solid checks it), or a continuum "
-        "(default: homogenised).",
-    )
+    add_setting(command, FIDELITY)
     command.add_argument(
         "--self-contact",
         action=argparse.BooleanOptionalAction,
-        default=False,
-        help="Keep walls and struts of a resolved unit apart, at several times the cost. Without it they may "
-        "cross; the run gives the pressure (default: no).",
+        default=SELF_CONTACT.default,
+        help=help_of(SELF_CONTACT),
     )
 
 
 def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
     """Add fidelity and self-contact of a study, which simulates a unit once: resolved by default."""
-    from ..meshing.settings import FIDELITIES
+    from ..meshing.settings import STUDY_FIDELITY, STUDY_SELF_CONTACT
 
-    command.add_argument(
-        "--fidelity",
-        choices=FIDELITIES,
-        help="Model of the lattice: every strut as printed (resolved: beams where they are whole; solid, to "
-        "check these), or a continuum for a quick look (default: resolved; homogenised with --lattice, "
-        "--rule, --mesher or --order 1, which need it).",
+    default = (
+        f"{STUDY_FIDELITY.default}; homogenised with --lattice, --rule, --mesher or --order 1, which need it"
     )
+    command.add_argument("--fidelity", choices=STUDY_FIDELITY.choices, help=help_of(STUDY_FIDELITY, default))
     command.add_argument(
-        "--self-contact",
-        action=argparse.BooleanOptionalAction,
-        help="Keep walls and struts of a resolved unit apart. Without it they may cross; the run gives the "
-        "pressure (default: yes).",
+        "--self-contact", action=argparse.BooleanOptionalAction, help=help_of(STUDY_SELF_CONTACT)
     )
 
 
@@ -217,38 +228,21 @@ def fidelity_of(options: argparse.Namespace) -> str:
     return HOMOGENISED if only else RESOLVED
 
 
-def add_self_friction(command: argparse.ArgumentParser) -> None:
-    """Add the friction of a resolved unit's parts on each other."""
-    command.add_argument(
-        "--self-friction",
-        type=float,
-        default=0.0,
-        metavar="MU",
-        help="Coulomb friction coefficient of walls and struts on each other, with --self-contact. The "
-        "motion is then solved in order of time (default: 0).",
-    )
-
-
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
+    from ..meshing.settings import ORDER, REFINE
+    from ..usecases.simulate_and_place.settings import SELF_FRICTION, TIMES
+
     command.add_argument(
         "--protocol",
         metavar="CSV",
         help="Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
         "protocol).",
     )
-    command.add_argument(
-        "--order", type=int, choices=(1, 2), default=2, help="Order of the finite elements (default: 2)."
-    )
-    command.add_argument(
-        "--refine",
-        type=float,
-        default=1.0,
-        metavar="F",
-        help="Mesh refinement: every element size is divided by F (default: 1).",
-    )
+    add_setting(command, ORDER, "P")
+    add_setting(command, REFINE, "F")
     add_fidelity_of_study(command)
-    add_self_friction(command)
+    add_setting(command, SELF_FRICTION, "MU")
     command.add_argument(
         "--lattice",
         metavar="FILE",
@@ -256,13 +250,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         "stored with the results (default: neo-Hookean with the unit's material.lattice_modulus_kPa "
         "and lattice_poisson).",
     )
-    command.add_argument(
-        "--times",
-        type=int,
-        default=13,
-        metavar="K",
-        help="Number of time samples of the protocol (default: 13).",
-    )
+    add_setting(command, TIMES, "K")
     command.add_argument(
         "--mesher",
         choices=("auto", "gmsh", "pytetwild"),

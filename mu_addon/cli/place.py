@@ -11,6 +11,7 @@ from .options import (
     add_orientation,
     add_report,
     add_resin,
+    add_setting,
     add_simulation,
     add_solid,
     add_unit,
@@ -25,6 +26,8 @@ __all__ = ["add", "run"]
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
+    from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+
     command = commands.add_parser(
         "place",
         help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
@@ -40,35 +43,16 @@ def add(commands: Commands[Any]) -> None:
     add_body(command)
     add_obstacles(command)
     add_simulation(command)
-    command.add_argument(
-        "--stations",
-        type=int,
-        default=51,
-        metavar="J",
-        help="Number of stations along the backbone (default: 51).",
-    )
+    add_setting(command, STATIONS, "J")
     command.add_argument(
         "--rule",
         choices=("both", "intersect", "volume_fraction"),
         help="Inclusion rule of a homogenised unit: how the sensor stiffens the elements it intersects "
         "(default: both).",
     )
-    command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
-    )
-    command.add_argument(
-        "--no-mesh-check",
-        dest="mesh_check",
-        action="store_false",
-        help="Skip the second mesh, from which the mesh uncertainty of the ranking is estimated.",
-    )
-    command.add_argument(
-        "--paths",
-        choices=("windows", "graph"),
-        default="windows",
-        help="Candidate paths: windows of consecutive anchors, or graph, every path through the lattice, "
-        "bent ones included (default: windows).",
-    )
+    add_setting(command, WORKERS, "N")
+    add_setting(command, MESH_CHECK)
+    add_setting(command, PATHS)
     command.add_argument(
         "--light",
         nargs="+",
@@ -99,11 +83,5 @@ def add(commands: Commands[Any]) -> None:
         metavar="A",
         help="Largest bend at a node, in degrees (default: 75).",
     )
-    search.add_argument(
-        "--checks",
-        type=int,
-        default=100,
-        metavar="N",
-        help="Largest number of paths solved by the full model (default: 100).",
-    )
+    add_setting(search, CHECKS, "N")
     command.set_defaults(stages=("design", "simulate", "place"))

@@ -5,16 +5,19 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import attrs
-import numpy as np
 
 from ..errors import InputError
 
+if TYPE_CHECKING:
+    # The command line's --help reads settings, and must answer at once.
+    import numpy as np
+
 PAPER = "paper"
 
-Number = TypeVar("Number", float, np.ndarray[Any, Any])
+Number = TypeVar("Number", float, "np.ndarray[Any, Any]")
 
 
 def in_MPa(value_kPa: Number) -> Number:
@@ -64,6 +67,48 @@ class Description(NamedTuple):
     def assumed(self) -> bool:
         """True if the source paper gives no value."""
         return self.source.startswith("assumed")
+
+    def checked(self, value: Any) -> Any:
+        """The value as its type; raises InputError for another type, a value out of bounds, no choice."""
+        if self.type is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if self.type is int and isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if type(value) is not self.type:
+            words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+            raise InputError(f"{self.name} = {value!r} is not {words[self.type]}", self.name, self.text)
+        if self.choices and value not in self.choices:
+            raise InputError(f"{self.name} = {value!r} is not known", self.name, f"choose {self.allowed}")
+        if self._is_out_of_bounds(value):
+            unit = f" {self.unit}" if self.unit else ""
+            shown = f"{value:g}" if self.type is float else value
+            raise InputError(
+                f"{self.name} = {shown}{unit} is out of bounds", self.name, f"choose {self.allowed}{unit}"
+            )
+        return value
+
+    def _is_out_of_bounds(self, value: Any) -> bool:
+        if self.type not in (int, float):
+            return False
+        return not (math.isfinite(value) and self.low <= value <= self.high)
+
+    def field(self) -> Any:
+        """The attrs field of a job that has this setting."""
+        return attrs.field(default=self.default, converter=self.checked)
+
+
+def described(
+    name: str,
+    default: Any,
+    text: str,
+    *,
+    unit: str = "",
+    low: float = math.nan,
+    high: float = math.nan,
+    choices: tuple[str, ...] = (),
+) -> Description:
+    """A setting of a job, stated once: its field, option, property and node's setting are made from this."""
+    return Description(name, type(default), default, unit, low, high, text, "", False, choices)
 
 
 def quantity(

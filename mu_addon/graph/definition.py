@@ -8,8 +8,7 @@ from typing import Any
 
 import attrs
 
-from ..design.quantity import Description
-from ..errors import InputError
+from ..design.quantity import Description, described
 
 NUMBER = "number"
 """Type of the outputs that may give a setting its value."""
@@ -38,24 +37,8 @@ class Setting:
         return self.description.type in (int, float)
 
     def checked(self, value: Any) -> Any:
-        """The value as its type; raises InputError for another type, a value out of bounds, no choice."""
-        d = self.description
-        if d.type is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if d.type is int and isinstance(value, float) and value.is_integer():
-            value = int(value)
-        if type(value) is not d.type:
-            words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[d.type]
-            raise InputError(f"{d.name} = {value!r} is not {words}", d.name, d.text)
-        if d.choices and value not in d.choices:
-            raise InputError(f"{d.name} = {value!r} is not known", d.name, f"choose {d.allowed}")
-        if isinstance(value, int | float) and self.is_number:
-            unit = f" {d.unit}" if d.unit else ""
-            if not (math.isfinite(value) and d.low <= value <= d.high):
-                raise InputError(
-                    f"{d.name} = {value:g}{unit} is out of bounds", d.name, f"choose {d.allowed}{unit}"
-                )
-        return value
+        """The value as its type; see `Description.checked`."""
+        return self.description.checked(value)
 
 
 def setting(
@@ -71,9 +54,8 @@ def setting(
     shown: bool = True,
 ) -> Setting:
     """A setting that is no parameter of a unit; see `Setting` and `Description`."""
-    return Setting(
-        Description(name, type(default), default, unit, low, high, text, "", False, choices), path, shown
-    )
+    found = described(name, default, text, unit=unit, low=low, high=high, choices=choices)
+    return Setting(found, path, shown)
 
 
 @attrs.frozen

@@ -6,12 +6,30 @@ from typing import Any
 
 import attrs
 
+from ..design.quantity import described
 from ..errors import InputError
 
 FRACTIONS = ("half", "full")
 FIDELITIES = RESOLVED, SOLID, HOMOGENISED = ("resolved", "solid", "homogenised")
 CELL_MM = 12.5
 """The cell, in mm, that the element sizes are given for."""
+ORDER = described("order", 2, "order of the finite elements; 1 for a quick look only", low=1, high=2)
+REFINE = described("refine", 1.0, "mesh refinement: every element size is divided by it", low=0.2, high=8.0)
+FIDELITY = described(
+    "fidelity",
+    HOMOGENISED,
+    "model of the lattice: every strut as printed (resolved: beams where they are whole; solid, to check "
+    "these), or a continuum",
+    choices=FIDELITIES,
+)
+SELF_CONTACT = described(
+    "self_contact",
+    False,
+    "keep walls and struts of a resolved unit apart, at several times the cost; without it they may cross, "
+    "and the run gives the pressure",
+)
+# Of a study, which simulates a unit once: its printed body.
+STUDY_FIDELITY, STUDY_SELF_CONTACT = FIDELITY._replace(default=RESOLVED), SELF_CONTACT._replace(default=True)
 
 
 def _one_of(*allowed: Any) -> Any:
@@ -49,15 +67,15 @@ class MeshSettings:
     (2, 'half')
     """
 
-    order: int = attrs.field(default=2, validator=_one_of(1, 2))
+    order: int = ORDER.field()
     fraction: str = attrs.field(default="half", validator=_one_of(*FRACTIONS))
-    refine: float = attrs.field(default=1.0, validator=_between(0.2, 8.0))
+    refine: float = REFINE.field()
     meridian_mm: float = attrs.field(default=1.5, validator=_between(0.1, 100.0))
     hoop_mm: float = attrs.field(default=4.0, validator=_between(0.1, 100.0))
     through_wall: int = attrs.field(default=1, validator=_between(1, 8))
     anchor_mm: float = attrs.field(default=2.5, validator=_between(0.1, 100.0))
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
-    fidelity: str = attrs.field(default=HOMOGENISED, validator=_one_of(*FIDELITIES))
+    fidelity: str = FIDELITY.field()
 
     @property
     def resolved(self) -> bool:

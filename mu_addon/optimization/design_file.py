@@ -14,16 +14,19 @@ from ..design.anchors import windows
 from ..design.body import Body, envelope, read_body
 from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
+from ..design.quantity import Description
 from ..design.toml_text import nearest
 from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
-from ..meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings
+from ..meshing.settings import FIDELITIES, FIDELITY, HOMOGENISED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
+from . import settings as settings_of
 from .freedoms import PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
+from .settings import FINER
 from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
 from .whole import Mass
@@ -36,8 +39,6 @@ _KEYS = (
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
     "orientation_deg", "robust", "check_fidelity", "self_contact", "body",
 )  # fmt: skip
-# A finer mesh for what is proposed, over the search's.
-FINER = 1.5
 
 
 @attrs.frozen
@@ -68,11 +69,11 @@ class Design:
     document: Mapping[str, Any]
     material: Material
     orientation_deg: float | None = None
-    robust: bool = False
+    robust: bool = settings_of.ROBUST.default
     check_struts: bool = False
     materials: Mapping[str, Material] = attrs.field(factory=dict)
     body: Body | None = None
-    self_contact: bool = False
+    self_contact: bool = settings_of.SELF_CONTACT.default
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -245,8 +246,8 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     base = changed_unit(base, [Freedom(name) for name in fixed], list(fixed.values()))
     freedoms = read_freedoms(tables["freedom"], where["freedom"], base)
     settings = MeshSettings(
-        refine=number("refine", 0.5, 0.2, 8.0),
-        fidelity=_word(document, "fidelity", HOMOGENISED, origin, FIDELITIES),
+        refine=number(settings_of.REFINE),
+        fidelity=_word(document, "fidelity", FIDELITY.default, origin, FIDELITY.choices),
     )
     resin, printer = (
         _word(document, "resin", "elastic-50a-v1", origin),
@@ -261,7 +262,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     }
     if body is None and "body" in document:
         body = read_body(folder / _word(document, "body", "", origin))
-    self_contact = _flag(document, "self_contact", text, origin)
+    self_contact = _flag(document, settings_of.SELF_CONTACT, text, origin)
     if self_contact and not settings.resolved:
         raise InputError(
             "a homogenised lattice has no struts that could touch",
@@ -269,7 +270,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
         )  # fmt: skip
     counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
     paths = [w.name for w in windows(min(counts))]
-    turned = number("orientation_deg", 0.0, -360.0, 360.0) if "orientation_deg" in document else None
+    turned = number(settings_of.ORIENTATION) if "orientation_deg" in document else None
     targets = read_targets(
         tables["target"],
         where["target"],
@@ -292,15 +293,16 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     if not settings.resolved:
         _require_homogenised(freedoms, targets, tables["freedom"], where["freedom"])
     search = SearchSettings(
-        evaluations=int(number("evaluations", 40, 1, 100_000, whole=True)),
-        batch=int(number("batch", 1, 1, 256, whole=True)),
-        seed=int(number("seed", 0, 0, 2**31, whole=True)),
+        evaluations=int(number(settings_of.EVALUATIONS)),
+        batch=int(number(settings_of.BATCH)),
+        seed=int(number(settings_of.SEED)),
     )
     return Design(
         base, tuple(targets), tuple(freedoms), settings,
-        number("check_refine", min(FINER * settings.refine, 8.0), 0.2, 8.0), search, printer, resin,
-        number("print_tolerance_mm", 0.05, 0.0, 0.3), number("modulus_tolerance", 0.1, 0.0, 1.0), document,
-        material, turned, _flag(document, "robust", text, origin),
+        number(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
+        printer, resin,
+        number(settings_of.PRINT_TOLERANCE), number(settings_of.MODULUS_TOLERANCE), document,
+        material, turned, _flag(document, settings_of.ROBUST, text, origin),
         not settings.resolved
         and _word(document, "check_fidelity", HOMOGENISED, origin, FIDELITIES) != HOMOGENISED,
         materials, body, self_contact,
@@ -391,12 +393,12 @@ def _word(
     return found
 
 
-def _flag(document: Mapping[str, Any], key: str, text: str, origin: str) -> bool:
-    found = document.get(key, False)
+def _flag(document: Mapping[str, Any], d: Description, text: str, origin: str) -> bool:
+    found = document.get(d.name, d.default)
     if not isinstance(found, bool):
         raise InputError(
-            f"{key} = {found!r} is neither true nor false",
-            f"{origin}, {_line(text, key)}, {key}",
+            f"{d.name} = {found!r} is neither true nor false",
+            f"{origin}, {_line(text, d.name)}, {d.name}",
             "write true or false",
         )
     return found
@@ -408,13 +410,13 @@ class _Numbers:
     text: str
     origin: str
 
-    def __call__(self, key: str, default: float, low: float, high: float, whole: bool = False) -> float:
-        found = self.document.get(key, default)
-        kinds = int if whole else (int, float)
-        if isinstance(found, bool) or not isinstance(found, kinds) or not low <= found <= high:
+    def __call__(self, d: Description, default: float | None = None) -> float:
+        found = self.document.get(d.name, d.default if default is None else default)
+        kinds = int if d.type is int else (int, float)
+        if isinstance(found, bool) or not isinstance(found, kinds) or not d.low <= found <= d.high:
             raise InputError(
-                f"{key} = {found!r} is out of bounds",
-                f"{self.origin}, {_line(self.text, key)}, {key}",
-                f"give {'a whole number' if whole else 'a number'} from {low:g} to {high:g}",
+                f"{d.name} = {found!r} is out of bounds",
+                f"{self.origin}, {_line(self.text, d.name)}, {d.name}",
+                f"give {'a whole number' if d.type is int else 'a number'} from {d.low:g} to {d.high:g}",
             )
         return found

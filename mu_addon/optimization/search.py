@@ -17,6 +17,7 @@ import attrs
 import numpy as np
 
 from .freedoms import Freedom
+from .settings import BATCH, EVALUATIONS, SEED
 from .surrogate import Surrogate, fit_all
 from .targets import Target
 
@@ -37,11 +38,11 @@ STALLED = 8
 
 @attrs.frozen
 class SearchSettings:
-    """evaluations: designs that may be computed at most; batch: so many at a time; seed: of its samples."""
+    """How far a search goes, and how; see `settings`."""
 
-    evaluations: int = 40
-    batch: int = 1
-    seed: int = 0
+    evaluations: int = EVALUATIONS.field()
+    batch: int = BATCH.field()
+    seed: int = SEED.field()
 
 
 @attrs.frozen(eq=False)

@@ -109,6 +109,7 @@ def test_every_order_makes_a_folder_that_is_read(tmp_path):
     assert {n for effects in SINGLE.values() for n in effects} <= set(LIBRARY)
 
 
+@pytest.mark.nightly("tests/evidence/test_owned.py::test_a_leak_of_all_is_nobody_s_own")
 def test_a_leak_through_a_hole_is_named_and_a_clean_hold_is_not():
     clean = judged(Order("clean", "pressure_hold", {}, "uneven", 0.002, 11))
     assert (clean["verdict"], clean["outcome"]) == ("none", "none")

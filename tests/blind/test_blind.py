@@ -76,6 +76,7 @@ def test_a_finer_mesh_judged_by_a_coarse_one_is_called_numerics():
     assert (row["verdict"], row["names"]) == ("named", ["mesh_error"])
 
 
+@pytest.mark.nightly("tests/evidence/test_verdict.py::test_what_does_not_matter_does_not_change_the_verdict")
 def test_what_does_not_matter_does_not_change_the_verdict_and_the_gain_is_on_what_was_not_fitted():
     order = {"effect": "overcure", "times": 8.0, "held_out": True, "changes": list(CHANGES)}
     row = judged(SMALL | {"seed": 11} | order)

@@ -34,15 +34,16 @@ def unit(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory, unit):
-    folder = tmp_path_factory.mktemp("place") / "out"
+def finished(tmp_path_factory, unit, with_light):
+    folder = with_light(tmp_path_factory.mktemp("place") / "out")
     done = run("place", *unit, "--out", folder, *COARSE)
     assert done.returncode == 0, done.stderr
     return folder, done
 
 
-# Linear elements, and no pictures, show as well that a run comes to the same digits by another way.
-QUICK = (*COARSE, "--order", "1", "--no-report")
+# Linear elements, one rule and no pictures show as well that a run comes to the same digits by another way.
+SMALL = (*COARSE, "--order", "1", "--rule", "volume_fraction", "--no-mesh-check")
+QUICK = (*SMALL, "--no-report")
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,7 @@ def test_every_file_is_there(finished):
         "signals.csv",
         "summary.json",
         "report.html",
+        "motion/angle.png",
         "study.toml",
         "unit.toml",
         "protocol.csv",
@@ -195,10 +197,9 @@ def test_other_inputs_set_old_results_aside(finished, tmp_path):
 
 def test_one_worker_finds_the_same(quick, unit, with_light, tmp_path):
     with_light(tmp_path / "one")
-    arguments = ("--rule", "volume_fraction", "--no-mesh-check", "--workers", "1")
-    done = run("place", *unit, "--out", tmp_path / "one", *QUICK, *arguments)
+    done = run("place", *unit, "--out", tmp_path / "one", *QUICK, "--workers", "1")
     assert done.returncode == 0
-    expected = [row["J_hat_mm"] for row in rows(quick) if row["rule"] == "volume_fraction"]
+    expected = [row["J_hat_mm"] for row in rows(quick)]
     assert [row["J_hat_mm"] for row in rows(tmp_path / "one")] == expected
 
 
@@ -207,8 +208,7 @@ def searched(tmp_path_factory, unit, with_light):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
     folder = with_light(tmp_path_factory.mktemp("search") / "out")
     limits = ("--paths", "graph", "--shortest-cells", "2.5", "--longest-cells", "3", "--bend-deg", "20")
-    arguments = ("--rule", "volume_fraction", "--no-mesh-check", *limits)
-    done = run("place", *unit, "--out", folder, *QUICK, *arguments)
+    done = run("place", *unit, "--out", folder, *QUICK, *limits)
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -249,7 +249,7 @@ def test_limits_that_leave_no_path_are_refused(tmp_path, unit):
 
 
 def started(out, unit):
-    words = command("place", *unit, "--out", out, *COARSE, "--order", "1")
+    words = command("place", *unit, "--out", out, *SMALL)
     return subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )

@@ -50,7 +50,7 @@ NIGHTLY = pytest.mark.nightly("test_killed_at_any_stage_it_goes_on_to_the_same_d
     [
         pytest.param("unit.stl", marks=NIGHTLY),
         pytest.param("cache/mesh-*", marks=NIGHTLY),
-        "cache/state-*",
+        pytest.param("cache/state-*", marks=NIGHTLY),
         "cache/sweep-*",
     ],
 )

@@ -106,9 +106,11 @@ def _identifiers(path):
 
 
 def _retired_phrases(text):
-    return [phrase for phrase in PHRASES if phrase in text.lower()]
+    text = text.lower()
+    return [phrase for phrase in PHRASES if phrase in text]
 
 
+@cache
 def _retired_identifiers(name):
     return [word for word in IDENTIFIERS if re.search(rf"(?:^|_){word}(?:_|$)", name.lower())]
 

@@ -50,7 +50,15 @@ def solved(level):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("level", [False, True])
+@pytest.mark.parametrize(
+    "level",
+    [
+        pytest.param(
+            False, marks=pytest.mark.nightly("test_slopes_are_those_of_full_solutions_on_morphed_meshes")
+        ),
+        True,
+    ],
+)
 def test_slopes_are_those_of_full_solutions_on_morphed_meshes(level):
     body, asked, states, values = solved(level)
     found = gradients(body.structure, states, asked, body.pairs(FREE))

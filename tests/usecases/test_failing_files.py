@@ -49,15 +49,16 @@ def for_good(request: pytest.FixtureRequest) -> bool:
     return bool(request.param)
 
 
-def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each third call, to be quick."""
+@pytest.mark.parametrize("step", [11, pytest.param(3, marks=pytest.mark.nightly("test_simulate"))])
+def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    """Each eleventh call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
     monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)
 
-    assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=3) == []
+    assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
 @pytest.mark.parametrize("step", [31, pytest.param(9, marks=pytest.mark.nightly("test_place"))])

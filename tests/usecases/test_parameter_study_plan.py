@@ -181,7 +181,7 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("points = 8", 'method = "random"', "not offered"),
         ("points = 8", "memory_MB = 1", "memory_MB"),
         ("points = 8", "minimize = 3", "list of names"),
-        ("times = 7", "times = 1", "time samples"),
+        ("times = 7", "times = 1", "times = 1 is out of bounds"),
         ("times = 7", "tmies = 7", "unknown key 'tmies'"),
         ("times = 7", 'times = 7\nobstacles = "post.obj"', "does not take obstacles"),
         ("times = 7", 'times = 7\nlattice = "effective.toml"', "does not take lattice"),

@@ -107,7 +107,7 @@ GOOD = compose(JOB.tables())
         ('format = 2\n[design]\nunit = "../../unit.toml"\n', "not in the folder"),
         (GOOD.replace('"unit.toml"', '"/etc/passwd"'), "not in the folder"),
         (GOOD.replace('"effective.toml"', '"effective.toml\\u0000"'), "not in the folder"),
-        (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "study.toml is invalid"),
+        (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "study.toml, .*times"),
         (GOOD.replace("times = 3", "times = 3\nhook = 1"), "unknown key 'hook'"),
         (GOOD.replace("times = 3", "times = 1000000000"), "1000000000"),
         (GOOD.replace('"gmsh"', '"sh -c true"'), "not offered"),
@@ -115,7 +115,7 @@ GOOD = compose(JOB.tables())
         (GOOD.replace('["intersect"]', "[{}]"), "rules"),
         (GOOD.replace("refine = 0.4", "refine = nan"), "refine"),
         (GOOD.replace("refine = 0.4", "refine = 0.4\nhook = 1"), "hook"),
-        (GOOD.replace("mesh_check = false", "mesh_check = []"), "study.toml is invalid"),
+        (GOOD.replace("mesh_check = false", "mesh_check = []"), "study.toml, .*mesh_check"),
     ],
 )  # fmt: skip
 def test_a_hostile_study_is_refused_in_words(tmp_path, text, words):

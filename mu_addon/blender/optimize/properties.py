@@ -9,7 +9,6 @@ from bpy.props import (
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
-    IntProperty,
     StringProperty,
 )
 
@@ -19,9 +18,11 @@ from ...design.assets import asset_names
 from ...design.quantity import Description
 from ...errors import InputError
 from ...optimization.freedoms import PATH, RESIN, parameters
+from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ORIENTATION, ROBUST, SELF_CONTACT
+from ...optimization.settings import REFINE as SEARCH_REFINE
 from ..shared.registration import property_group_factory
 from ..shared.texts import sentence
-from ..unit.fields import exact, label, true_scale
+from ..unit.fields import blender_property, exact, label, true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
@@ -274,61 +275,26 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     )
     targets: CollectionProperty(type=MU_PG_target, description="What the unit shall do")
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
-    robust: BoolProperty(
-        name="Robust",
-        description="Ask for units that meet the targets within the uncertainty of mesh, print and resin",
-        default=False,
-    )
+    robust: blender_property(ROBUST)
     printed_struts: BoolProperty(
         name="Struts as Printed",
         description="Simulate every strut in place of a homogenised lattice: slower by far, and the search "
         "sees the struts' diameters and kind",
         default=False,
     )
-    self_contact: BoolProperty(
-        name="Self-Contact",
-        description="Keep walls and struts from passing through each other: slower again",
-        default=False,
-    )
+    self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     has_gravity: BoolProperty(
         name="Own Weight",
         description="The unit bears its weight; then an angle may be asked for at 0 kPa",
         default=False,
     )
-    orientation_deg: FloatProperty(
-        name="Turned by (deg)",
-        description="0: hanging, tip down; 90: level",
-        default=90.0,
-        min=-360.0,
-        max=360.0,
-        precision=1,
-        step=100,
+    # Level, since a weight matters most there.
+    orientation_deg: blender_property(
+        ORIENTATION._replace(default=90.0), name="Turned by (deg)", precision=1, step=100
     )
-    evaluations: IntProperty(
-        name="Units at Most",
-        description="How many units are simulated at most, those on the finer mesh not counted",
-        default=24,
-        min=1,
-        max=10_000,
-    )
-    refine: FloatProperty(
-        name="Search Mesh",
-        description="What divides every element size; 1 is the mesh of a full simulation",
-        default=0.5,
-        min=0.2,
-        max=4.0,
-        precision=2,
-        step=5,
-    )
-    check_refine: FloatProperty(
-        name="Check Mesh",
-        description="What divides every element size when a proposed unit is simulated again",
-        default=0.75,
-        min=0.2,
-        max=8.0,
-        precision=2,
-        step=5,
-    )
+    evaluations: blender_property(EVALUATIONS, name="Units at Most")
+    refine: blender_property(SEARCH_REFINE, name="Search Mesh", precision=2, step=5)
+    check_refine: blender_property(CHECK_REFINE, name="Check Mesh", precision=2, step=5)
 
 
 register, unregister = property_group_factory(

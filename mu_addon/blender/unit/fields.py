@@ -57,13 +57,14 @@ def tooltip(d: Description) -> str:
     """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
     allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
     fixed = ". The same at every scale" if d.fixed else ""
-    return f"{sentence(d.text)}{allowed}{fixed}.\nSource: {d.source}"
+    source = f".\nSource: {d.source}" if d.source else ""
+    return f"{sentence(d.text)}{allowed}{fixed}{source}"
 
 
-def blender_property(d: Description, update=None, options=frozenset()):
-    """The Blender property of one parameter."""
+def blender_property(d: Description, update=None, options=frozenset(), name="", **more):
+    """The Blender property of one parameter or setting; name and more: in place of what follows from it."""
     shared = {
-        "name": label(d),
+        "name": name or label(d),
         "description": tooltip(d),
         "update": update,
         "options": {"ANIMATABLE", *options},
@@ -78,15 +79,13 @@ def blender_property(d: Description, update=None, options=frozenset()):
     if d.type is bool:
         return BoolProperty(default=d.default, **shared)
     if d.type is int:
-        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **shared)
+        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **more, **shared)
     length = {"subtype": MILLIMETRES} if d.unit == "mm" else {}
     return FloatProperty(
         default=d.default,
         min=d.low,
         max=d.high,
-        precision=3 if d.high < 1000 else 1,
-        step=step_of(d.high),
-        **length,
+        **{"precision": 3 if d.high < 1000 else 1, "step": step_of(d.high), **length, **more},
         **shared,
     )
 

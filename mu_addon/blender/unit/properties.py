@@ -14,7 +14,6 @@ from bpy.props import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
-    FloatProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
@@ -22,6 +21,8 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
+from ...meshing.settings import STUDY_SELF_CONTACT
+from ...usecases.simulate_and_place.settings import ORIENTATION, SELF_FRICTION
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
 from .fields import blender_property, exact, generated_fields, tied
@@ -102,23 +103,8 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="resolved",
     )
-    self_contact: BoolProperty(
-        name="Self-Contact",
-        default=True,
-        description="Keep walls and struts apart where they meet under vacuum, in several times the time. "
-        "Without it they may cross, and the run says from which pressure on",
-    )
-    self_friction: FloatProperty(
-        name="Friction",
-        description="Coulomb friction coefficient of walls and struts on each other. Above 0 the motion is "
-        "solved in order of time, every path for itself",
-        default=0.0,
-        min=0.0,
-        max=5.0,
-        soft_max=1.0,
-        step=5,
-        precision=2,
-    )
+    self_contact: blender_property(STUDY_SELF_CONTACT, name="Self-Contact")
+    self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
     solver: EnumProperty(
         name="Solver",
         description="What solves the linear systems; answers agree within its tolerance",
@@ -145,15 +131,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options=BESIDE_BLEND_FILE,
     )
-    orientation_deg: FloatProperty(
-        name="Gravity (deg)",
-        description="Direction of gravity about the x axis, as in measured data: at 0 the unit hangs, its "
-        "tip down. It matters where a diagnosis named the weight",
-        min=-360.0,
-        max=360.0,
-        precision=1,
-        step=100,
-    )
+    orientation_deg: blender_property(ORIENTATION, name="Gravity (deg)", precision=1, step=100)
     # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
     effects: StringProperty(options={"HIDDEN"})
     # The run whose results were shown last, and the design at which it was chosen, see `study_folder`.

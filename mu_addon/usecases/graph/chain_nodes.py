@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...graph.definition import FILE, Definition, Input, Output, Outputs, setting
+from .common_settings import ORDER, QUICK_REFINE
 from .loading import of_orders
 
 CHAIN = "Chain"
@@ -53,8 +54,8 @@ def chain_nodes() -> tuple[Definition, ...]:
                     high=50.0,
                 ),
                 setting("loaded", True, "learn from loaded states; without: a quick look"),
-                setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
-                setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
+                ORDER,
+                QUICK_REFINE,
             ),
             order=of_orders("chain_order", _ORDERS),
             read=of_orders("chain_of", _ORDERS),

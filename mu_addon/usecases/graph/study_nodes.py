@@ -10,7 +10,18 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
-from .fidelity import FIDELITY, QUICK_FIDELITY, QUICK_SELF_CONTACT, SELF_CONTACT, SELF_FRICTION
+from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+from .common_settings import (
+    FIDELITY,
+    ORDER,
+    ORIENTATION,
+    QUICK_FIDELITY,
+    QUICK_SELF_CONTACT,
+    REFINE,
+    SELF_CONTACT,
+    SELF_FRICTION,
+    TIMES,
+)
 from .loading import of_orders
 from .parts import refuse_body
 
@@ -80,15 +91,13 @@ def study_nodes() -> tuple[Definition, ...]:
             (Output("study", "study", "the motion"),),
             (
                 setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
-                setting("times", 13, "time samples of the protocol", low=2, high=1001),
-                setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
-                setting("refine", 1.0, "what divides every element size", low=0.2, high=8.0),
+                TIMES,
+                ORDER,
+                REFINE,
                 FIDELITY,
                 SELF_CONTACT,
                 SELF_FRICTION,
-                setting(
-                    "orientation_deg", 0.0, "direction of gravity about x", unit="deg", low=-360, high=360
-                ),
+                ORIENTATION,
             ),
             order=of_orders("simulate_order"),
             read=of_orders("study_of"),
@@ -119,16 +128,7 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting(
                     "rule", BOTH, "how the sensor stiffens the elements it meets", choices=(BOTH, *RULES)
                 ),
-                setting("stations", 51, "stations along the backbone", low=2, high=10_001),
-                setting("mesh_check", True, "solve a second mesh, for the mesh uncertainty of the ranking"),
-                setting(
-                    "paths",
-                    "windows",
-                    "windows of anchors, or any path of the lattice besides",
-                    choices=("windows", "graph"),
-                ),
-                setting("checks", 100, "most lattice paths solved by the full model", low=2, high=100_000),
-                setting("workers", 2, "processes at a time; decides no result", low=1, high=256),
+                *(Setting(d) for d in (STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),
             ),
             order=of_orders("place_order"),
             read=of_orders("study_of"),

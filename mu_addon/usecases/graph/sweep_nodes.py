@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
-from .fidelity import QUICK_FIDELITY, QUICK_SELF_CONTACT, SELF_FRICTION
+from .common_settings import (
+    ORDER,
+    QUICK_FIDELITY,
+    QUICK_REFINE,
+    QUICK_SELF_CONTACT,
+    QUICK_TIMES,
+    SELF_FRICTION,
+)
 from .loading import of_orders
 from .parts import described
 
@@ -113,9 +120,9 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 setting("points", 16, "number of points; a grid has its steps'", low=2, high=10_000),
                 setting("seed", 0, "of a method that draws", low=0, high=1_000_000),
                 setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
-                setting("times", 7, "time samples of the protocol", low=2, high=1001),
-                setting("order", 2, "order of the elements: 1 for a look only", low=1, high=2),
-                setting("refine", 0.5, "what divides every element size", low=0.2, high=8.0),
+                QUICK_TIMES,
+                ORDER,
+                QUICK_REFINE,
                 QUICK_FIDELITY,
                 QUICK_SELF_CONTACT,
                 SELF_FRICTION,

@@ -35,6 +35,7 @@ from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.optics import Optics
 from .named_effects import NamedEffects
+from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STATIONS, TIMES, WORKERS
 from .study_file import FILES, LAYOUT, NAME, STAGES, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
@@ -46,21 +47,7 @@ if TYPE_CHECKING:
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
-MOST_FRICTION = 5.0
 LATTICE_LAW = FILES["lattice"]
-
-
-def _whole(low: int, high: int, what: str) -> Any:
-    def check(_: object, field: attrs.Attribute[int], value: int) -> None:
-        if not low <= value <= high:
-            raise InputError(f"{what} is {value}", field.name, f"give a whole number from {low} to {high}")
-
-    return check
-
-
-def _coefficient(_: object, field: attrs.Attribute[Any], value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= MOST_FRICTION:
-        raise InputError(f"a friction coefficient of {value!r}", field.name, f"give 0 to {MOST_FRICTION:g}")
 
 
 def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
@@ -81,19 +68,17 @@ class Job:
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     mesher: str = attrs.field(default="auto", validator=attrs.validators.in_(("auto", "gmsh", "pytetwild")))
-    times: int = attrs.field(default=13, validator=_whole(2, 1001, "the number of time samples"))
-    stations: int = attrs.field(default=51, validator=_whole(2, 10_001, "the number of stations"))
+    times: int = TIMES.field()
+    stations: int = STATIONS.field()
     rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
     quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
-    workers: int = attrs.field(default=2, validator=_whole(1, 256, "the number of workers"))
-    # Whether a second, coarser mesh is solved to tell how far the mesh moves a ranking.
-    mesh_check: bool = attrs.field(default=True, validator=attrs.validators.instance_of(bool))
-    # Which paths: the windows of anchors alone, or the whole lattice graph besides.
-    paths: str = attrs.field(default="windows", validator=attrs.validators.in_(("windows", "graph")))
+    workers: int = WORKERS.field()
+    mesh_check: bool = MESH_CHECK.field()
+    paths: str = PATHS.field()
     limits: Limits = attrs.field(factory=Limits)
     # What the resin does to light, for the signal beside each path's disturbance.
     optics: Optics = attrs.field(factory=Optics)
-    most_checks: int = attrs.field(default=100, validator=_whole(2, 100_000, "the number of checks"))
+    most_checks: int = CHECKS.field()
     # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
     lattice: Effective | None = None
     # A sound body that takes the place of the lattice's box.
@@ -104,8 +89,7 @@ class Job:
     effects: NamedEffects = attrs.field(factory=NamedEffects)
     # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
     self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
-    # Coulomb's coefficient of walls and struts that slide on each other.
-    self_friction: float = attrs.field(default=0.0, validator=_coefficient)
+    self_friction: float = SELF_FRICTION.field()
     # How linear systems are solved: within their tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
     # What is run of it: the first, the first two or all.
@@ -485,6 +469,8 @@ SETTINGS = {
 def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
     try:
         return kind(**values)
+    except InputError as error:
+        raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error
     except TypeError as error:
         raise InputError(f"study.toml is invalid: {error}", where, "correct that key") from error
     except ValueError as error:

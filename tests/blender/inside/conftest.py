@@ -83,14 +83,15 @@ def blender(each_bpy, tmp_path_factory):
 # What a quick look takes, with one path of the whole lattice beside the ten of the anchors.
 PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.5", "--rule", "volume_fraction"]
 PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
+PLACE += ["--no-report"]
 
 
 @pytest.fixture(scope="session")
-def placed(tmp_path_factory):
+def placed(tmp_path_factory, with_light):
     """A finished study of `place`; whoever writes into it takes `study`."""
 
     def make(folder):
-        done = run(*PLACE, "--out", folder)
+        done = run(*PLACE, "--out", with_light(folder))
         assert done.returncode == 0, done.stderr
 
     return made_once(tmp_path_factory, "placed", make)

@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+from PIL import Image
 
 from mu_addon.blender.path import legend as path_legend
 from mu_addon.blender.path import panel as path_panel
@@ -291,6 +292,7 @@ def test_what_is_missing_is_said(study):
     assert "no such picture" in refused(bpy.ops.mu.picture, name="angle.png")
     root.mu_unit.study.folder = str(study)
     assert "no motion of 'alpha77'" in refused(bpy.ops.mu.motion, name="alpha77")
+    Image.new("RGB", (2, 2)).save(study / "motion" / "angle.png")
     assert bpy.ops.mu.picture(name="angle.png") == {"FINISHED"}
     assert "angle.png" in bpy.data.images
     show(name="model_a")

@@ -174,7 +174,7 @@ def test_two_simulations_of_one_unit_are_refused():
 def test_a_quick_look_from_start_to_stale(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = add(preset="mu-0.75x")
-    root.mu_unit.chambers.count = 4
+    root.mu_unit.chambers.count = 3
     root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     child = SIMULATION.child(root)

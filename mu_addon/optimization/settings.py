@@ -1,0 +1,49 @@
+"""Settings of a search for units, stated once: its file and Blender take them from here."""
+
+from __future__ import annotations
+
+from ..design.quantity import described
+from ..meshing.settings import REFINE as REFINEMENT
+
+FINER = 1.5
+"""How much finer than the search's mesh that of a check is, unless the file says it."""
+EVALUATIONS = described(
+    "evaluations",
+    40,
+    "largest number of units simulated, those on the finer mesh not counted",
+    low=1,
+    high=100_000,
+)
+BATCH = described("batch", 1, "number of units simulated at a time", low=1, high=256)
+SEED = described("seed", 0, "seed of the samples that the search draws", low=0, high=2**31)
+REFINE = REFINEMENT._replace(default=0.5)
+CHECK_REFINE = described(
+    "check_refine",
+    FINER * REFINE.default,
+    "mesh refinement of the check of a proposed unit",
+    low=REFINE.low,
+    high=REFINE.high,
+)
+ORIENTATION = described(
+    "orientation_deg",
+    0.0,
+    "orientation of the unit that bears its weight, degrees about x; 0: hanging, tip down; 90: level",
+    low=-360.0,
+    high=360.0,
+)
+ROBUST = described(
+    "robust", False, "ask for units that meet the targets within the uncertainty of mesh, print and resin"
+)
+SELF_CONTACT = described(
+    "self_contact", False, "keep walls and struts from passing through each other, at several times the cost"
+)
+PRINT_TOLERANCE = described(
+    "print_tolerance_mm", 0.05, "scatter of a printed wall from unit to unit", unit="mm", low=0.0, high=0.3
+)
+MODULUS_TOLERANCE = described(
+    "modulus_tolerance",
+    0.1,
+    "scatter of the modulus from unit to unit, as a share",
+    low=0.0,
+    high=1.0,
+)

@@ -1,0 +1,41 @@
+"""Settings of a study, stated once: the job, the command line, nodes and Blender take them from here.
+
+No solver or array library is loaded: the command line's --help reads this module.
+"""
+
+from __future__ import annotations
+
+from ...design.quantity import described
+
+TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=1001)
+STATIONS = described("stations", 51, "number of stations along the backbone", low=2, high=10_001)
+WORKERS = described("workers", 2, "number of worker processes; it decides no result", low=1, high=256)
+MESH_CHECK = described(
+    "mesh_check", True, "solve a second mesh, from which the mesh uncertainty of the ranking is estimated"
+)
+PATHS = described(
+    "paths",
+    "windows",
+    "candidate paths: windows of consecutive anchors, or graph, every path through the lattice besides, bent "
+    "ones included",
+    choices=("windows", "graph"),
+)
+CHECKS = described(
+    "checks", 100, "largest number of paths of the lattice solved by the full model", low=2, high=100_000
+)
+SELF_FRICTION = described(
+    "self_friction",
+    0.0,
+    "Coulomb friction coefficient of walls and struts on each other, with self-contact; above 0 the motion "
+    "is solved in order of time",
+    low=0,
+    high=5,
+)
+ORIENTATION = described(
+    "orientation_deg",
+    0.0,
+    "orientation of the unit, degrees about x; 0: hanging, tip down; it has an effect only with gravity in "
+    "the extended model",
+    low=-360,
+    high=360,
+)

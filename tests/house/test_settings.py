@@ -1,0 +1,116 @@
+"""A setting is stated once: no option, property, node or field of a job repeats its default."""
+
+import argparse
+import ast
+from pathlib import Path
+
+import pytest
+
+import mu_addon
+from mu_addon.cli.main import parser
+from mu_addon.design.quantity import Description
+from mu_addon.meshing import settings as mesh
+from mu_addon.optimization import settings as search
+from mu_addon.usecases.graph.study_nodes import study_nodes
+from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
+from mu_addon.usecases.simulate_and_place import settings as study
+
+ROOT = Path(mu_addon.__file__).parent
+STUDY = (mesh, study)
+WHERE = {
+    "cli/options.py": STUDY,
+    "cli/place.py": STUDY,
+    "cli/simulate.py": STUDY,
+    "blender/unit/properties.py": STUDY,
+    "blender/optimize/properties.py": (search,),
+    "meshing/settings.py": (mesh,),
+    "optimization/search.py": (search,),
+    "optimization/design_file.py": (search,),
+    "usecases/simulate_and_place/job.py": (study,),
+    "usecases/graph/chain_nodes.py": (mesh,),
+    "usecases/graph/sweep_nodes.py": (mesh,),
+}
+
+
+def every(modules):
+    """Names of the settings of some modules."""
+    return {d.name for module in modules for d in vars(module).values() if isinstance(d, Description)}
+
+
+def restated(source, names):
+    """Names among `names` that a source gives a literal default."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            name = _text(node.args[0]).removeprefix("--").replace("-", "_") if node.args else ""
+            if name in names and _function(node) in ("add_argument", "setting") and _has_literal(node):
+                found.add(name)
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            calls = [n for n in (node.annotation, node.value) if isinstance(n, ast.Call)]
+            if node.target.id in names and (_is_literal(node.value) or any(map(_has_literal, calls))):
+                found.add(node.target.id)
+    return found
+
+
+def _text(node):
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+
+
+def _function(call):
+    return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+
+
+def _has_literal(call):
+    given = [k.value for k in call.keywords if k.arg == "default"]
+    given += call.args[1:2] if _function(call) == "setting" else []
+    return any(map(_is_literal, given))
+
+
+def _is_literal(value):
+    """Whether it is a value; None stands for what is left out."""
+    return isinstance(value, ast.Constant) and value.value is not None
+
+
+@pytest.mark.parametrize("file", WHERE)
+def test_no_default_is_stated_twice(file):
+    assert restated((ROOT / file).read_text(encoding="utf-8"), every(WHERE[file])) == set()
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        'command.add_argument("--self-contact", default=False)',
+        'setting("self_contact", True, "keep them apart")',
+        "class A:\n    self_contact: BoolProperty(default=True)",
+        "class A:\n    self_contact: bool = attrs.field(default=True)",
+        "class A:\n    self_contact: bool = False",
+    ],
+)
+def test_the_search_finds_each_way_to_restate_one(source):
+    assert restated(source, every([mesh])) == {"self_contact"}
+
+
+def options(command):
+    commands = next(a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return {action.dest: action for action in commands.choices[command]._actions}
+
+
+@pytest.mark.parametrize(
+    "d", [mesh.ORDER, mesh.REFINE, study.TIMES, study.STATIONS, study.WORKERS, study.CHECKS, study.PATHS]
+)
+def test_an_option_has_default_and_text_of_its_setting(d):
+    action = options("place")[d.name]
+    assert action.default == d.default
+    shown = f"{d.default:g}" if d.type is float else d.default
+    assert action.help.lower() == f"{d.text} (default: {shown}).".lower()
+
+
+def test_nodes_have_the_settings_themselves():
+    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes())}
+    for kind, d in (
+        ("simulate", study.TIMES),
+        ("simulate", mesh.STUDY_SELF_CONTACT),
+        ("place", study.MESH_CHECK),
+        ("sweep", mesh.ORDER),
+    ):
+        assert nodes[kind].setting(d.name).description is d
