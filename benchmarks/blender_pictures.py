@@ -34,7 +34,7 @@ BASE, TIP = ("base a", "base b"), ("tip a", "tip b")
 
 
 def prepare():
-    """A grasp, a unit that met an obstacle, a diagnosis and a filmed bench, as Blender's files."""
+    """A grasp, a unit beside an obstacle, a diagnosis, two rankings and a filmed bench, as .blend files."""
     import mu_addon
     from mu_addon.blender.evidence.state import DIAGNOSIS
     from mu_addon.blender.gripper.state import GRASP
@@ -67,6 +67,29 @@ def prepare():
         bpy.ops.wm.save_mainfile()
         mu_addon.unregister()
         print(name, flush=True)
+    if not ONLY or "runs" in ONLY:
+        _two_runs()
+
+
+def _two_runs():
+    """A unit that was ranked with two walls, as a quick look."""
+    import mu_addon
+    from mu_addon.blender.simulate.job import SIMULATION
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mu_addon.register()
+    bpy.ops.mu.millimetres()
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "runs.blend"))
+    assert bpy.ops.mu.add(preset="mu-1.0x") == {"FINISHED"}
+    unit = bpy.context.view_layer.objects.active
+    unit.mu_unit.study.command, unit.mu_unit.study.detail = "place", "quick"
+    for wall in (1.0, 0.9):
+        unit.mu_unit.chambers.wall_mm = wall
+        assert bpy.ops.mu.simulate() == {"FINISHED"}
+        _wait(SIMULATION.child(unit))
+    bpy.ops.wm.save_mainfile()
+    mu_addon.unregister()
+    print("runs", flush=True)
 
 
 def _wait(child):
@@ -200,6 +223,34 @@ def steps():
     assert called(bpy.ops.mu.mute, step="trim") == {"FINISHED"}
     yield 3.0
     shot("muted")
+
+
+def rule():
+    yield from new()
+    yield from added(preset="mu-1.5x")
+    root().mu_unit.chambers.wall_mm = 3.0
+    root().mu_unit.lattice.cells_x = 4
+    seen_from(20)
+    yield 3.0
+    shot("rule")
+
+
+def paths():
+    yield from new("MU_PT_path", file="runs.blend")
+    root().mu_unit.candidates = True
+    seen_from(20)
+    yield 3.0
+    shot("paths")
+
+
+def results_panel():
+    yield from new("MU_PT_results", file="runs.blend")
+    other = next(run.key for run in studies.runs_of(root()) if run.unit.chambers.wall_mm == 1.0)
+    assert called(bpy.ops.mu.run_compare, key=other) == {"FINISHED"}
+    assert called(bpy.ops.mu.field_show, field="run_difference_mm") == {"FINISHED"}
+    yield 3.0
+    yield from scrolled(4)
+    shot("results-panel")
 
 
 def paint():
@@ -404,8 +455,8 @@ def track():
 
 
 PICTURES = {
-    "add": add, "steps": steps, "paint": paint, "print": print_part, "print-check": print_check,
-    "simulate": simulate,
+    "add": add, "steps": steps, "rule": rule, "paths": paths, "results-panel": results_panel,
+    "paint": paint, "print": print_part, "print-check": print_check, "simulate": simulate,
     "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
     "sensor-live": sensor_live, "track": track,
 }  # fmt: skip
@@ -435,6 +486,7 @@ else:
     unit_object, printing = module("blender.unit.object"), module("blender.printing.state")
     gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
+    studies = module("blender.simulate.study_folder")
     OPTIMIZATION = module("blender.optimize.state").OPTIMIZATION
     sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
     tracking, MarkerSettings = (

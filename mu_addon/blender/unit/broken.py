@@ -101,8 +101,8 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
         # What was changed and could mend nothing is not to blame: its field would be red for no reason.
         fits = {place: value for place, value in fits.items() if value is not None or place in named}
         mending = repairs(sections, scale)
-        # A field's own button sets what the one in the panel's head does.
-        fits |= {(r.section, r.name): r.value for r in mending if (r.section, r.name) in fits}
+        # Every fault is red in its field, whose button sets what the one in the panel's head does.
+        fits |= {(r.section, r.name): r.value for r in mending if r.value is not None}
         return Broken(words(error), fits, mending)
     return Broken(props.trouble, {})
 

@@ -95,7 +95,7 @@ def _untrue_size(root, scene) -> str:
 def _head(layout, root) -> None:
     """What the unit comes to or, in red, the rule that it breaks and buttons that mend it.
 
-    It is as high either way, but for rows of buttons where several rules are broken.
+    It is as high either way, but for rows of buttons where more than two rules are broken.
     """
     lines, wrong = figures.lines(root, CHARACTERS)
     found = broken(root) if wrong else None
@@ -107,15 +107,19 @@ def _head(layout, root) -> None:
         icon = ("ERROR" if wrong else "DRIVER_DISTANCE") if number == 0 else "BLANK1"
         column.label(text=line, icon=icon)
     mending = [] if found is None else [r for r in found.repairs if r.value is not None]
-    # Beside each other two have room for their words.
-    grid = box.grid_flow(columns=2 if len(mending) > 1 else 1, align=True, row_major=True, even_columns=True)
-    grid.alert = False
+    row = box.row(align=True)
+    row.alert = False
+    if not mending:
+        next_step.draw(row, root)
+        return
+    if len(mending) > 1:
+        row = row.split(factor=0.8, align=True)
+    # Beside each other two have room for their words, and a third button for how many it mends.
+    grid = row.grid_flow(columns=min(len(mending), 2), align=True, row_major=True, even_columns=True)
     for repair in mending:
         fix_button(grid, root, repair.section, repair.name, repair.value, found.text)
     if len(mending) > 1:
-        grid.operator("mu.fit_all", text=f"Fix All {len(mending)}")
-    if not mending:
-        next_step.draw(grid.row(align=True), root)
+        row.operator("mu.fit_all", text=f"All {len(mending)}")
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):

@@ -65,7 +65,7 @@ def test_operators_without_a_unit_say_what_is_missing():
             assert "Open a clip of the bench in the Movie Clip Editor" in refused(operator)
         elif name.startswith(("grasp", "gripper")):
             assert "Add > Mesh > Monolithic Gripper" in refused(operator), name
-        elif name.startswith(("node_", "tree_")) and name != "tree_of_unit":
+        elif name.startswith(("node_", "tree_")) and name not in ("tree_of_unit", "tree_show"):
             assert "Open a node tree of the kind Monolithic Unit" in refused(operator), name
         elif name == "skin":
             assert "Select a curve or a mesh" in refused(operator)
@@ -83,7 +83,7 @@ def test_what_changes_the_file_is_one_undo_step():
     outside |= {"assets", "assets_remove", "picture", "probe", "run_remove"}
     outside |= {"evidence_diagnose", "evidence_cancel", "evidence_dismiss", "evidence_open"}
     outside |= {"optimize", "optimize_cancel", "optimize_dismiss", "optimize_open"}
-    outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open"}
+    outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open", "tree_show"}
     outside |= {"node_open", "node_group_edit", "import_page"}
     outside |= {"print_check", "print_check_file", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
@@ -173,10 +173,11 @@ def test_several_faults_have_a_button_each_that_says_what_it_sets_and_one_for_al
     assert "odd count: 3 or 5" in " ".join(lines), "the remedy is never cut"
     root.mu_unit.chambers.neck_diameter_mm = 30.0
     words = drawn(unit_panel.CLASSES)
-    assert "Neck Ø 24 mm Cells X 3 Fix All 2" in words
+    assert "Neck Ø 24 mm Cells X 3 All 2" in words
     assert "sagittal" not in words
     assert broken(root).blames(["lattice"]), "the closed panel's header is marked"
     assert not broken(root).blames(["waveguide"])
+    assert broken(root).fits == {("chambers", "neck_diameter_mm"): 24.0, ("lattice", "cells_x"): 3}
     assert bpy.ops.mu.fit(section="chambers", name="neck_diameter_mm") == {"FINISHED"}
     assert root.mu_unit.chambers.neck_diameter_mm == 24.0
     assert root.mu_unit.trouble, "one is left"
@@ -199,7 +200,7 @@ def test_three_faults_have_three_buttons_and_what_mends_nothing_is_not_red():
     for repair in broken(root).repairs:
         d = description(repair.section, repair.name)
         assert shown_value(root.mu_unit.chambers, d, repair.value) in words
-    assert f"Fix All {len(broken(root).repairs)}" in words
+    assert f"All {len(broken(root).repairs)}" in words
     assert len(broken(root).repairs) == 3
     assert figures.lines(root, 36)[0][0][0].isupper()
 
