@@ -13,13 +13,12 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .record import DRIVES
 from .resolution import STAYS, between_steps, divided, dwell
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
 
-# Columns that may say what was done, where they are not predicted.
-DRIVES = ("pressure_kPa", "angle_deg", "strain", "displacement_mm")
 # Half-widths of windows, in samples.
 WIDTHS = (1, 2, 4, 8, 16, 32, 64)
 # A wider window counts while its straight line agrees with those of all narrower ones, within so many

@@ -12,6 +12,8 @@ from ..errors import InputError
 BATCH = "batch_variation"
 # A height that was mistyped, a change between two tests, what fast tests have: of some experiments alone.
 GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
+# Struts that are printed thicker or thinner than drawn, as another specimen's are not: see `owned`.
+THICKNESS = "strut_thickness"
 # Effects that multiply the modulus in the experiments whose they are.
 SCALES = frozenset((BATCH, STEP, HEATING))
 # Another place of one marker from some moment on, see `prediction.marker_slip`.
@@ -124,6 +126,10 @@ LIBRARY = {
     BATCH: (
         "the modulus of one specimen differs from that of the others",
         "another specimen in its place, its height and section measured, clamped anew",
+    ),
+    THICKNESS: (
+        "the struts of a specimen are not as thick as drawn, or not those that were drawn",
+        "struts of each specimen measured under a microscope, each specimen weighed",
     ),
     GEOMETRY: (
         "a specimen's height is not what was typed, which scales its strain",

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, GEOMETRY, HEATING, SLIP, STEP, Effect, Parameter
+from .effect import BATCH, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
 from .fit import Fit, Fitter
 from .residuals import strict_table, structure
 from .selection import (
@@ -52,12 +52,16 @@ OF_THE_BENCH = CAMERA.union(
 )
 # What may come with a specimen or with the way in which it was held once.
 OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
-# Numerics are alike for all, and a marker's slip says by its moment whose it is.
-OF_NONE = frozenset(("mesh_error", "gravity", SLIP))
+# Numerics and a machine's frame are alike for all, and a marker's slip says by its moment whose it is.
+OF_NONE = frozenset(("mesh_error", "gravity", "frame_compliance", SLIP))
 # Most effects fitted, those first that promise most.
 MOST_FITS = 12
 CHANGE = Parameter("change", "", -0.8, 4.0, 0.0, (0.1,), "batches differ by 5 to 20 %, struts by more")
 BATCH_EFFECT = Effect(BATCH, (CHANGE,), ())
+THICKER = Parameter(
+    "thicker_mm", "mm", -0.4, 0.6, 0.0, (0.05,), "diameter less that drawn; printers are 0.05 to 0.2 mm off"
+)
+THICKNESS_EFFECT = Effect(THICKNESS, (THICKER,), ("lattice_compression",))
 HEIGHT = Parameter("height", "", -0.2, 0.2, 0.0, (0.03,), "true over typed, less 1; misread or mistyped")
 # Kinds in a testing machine, whose force a specimen, its geometry and its clamping scale alike.
 MACHINE = ("coupon", "lattice_compression")
@@ -68,12 +72,10 @@ FASTER = 1.5
 def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
     """Every effect as one of a single specimen, or of a single experiment, that is not alone in its kinds.
 
-    With them comes what most often tells specimens apart, another modulus of one of them (`BATCH`).
+    With them comes what most often tells specimens apart (`of_specimens`).
     """
-    kinds = tuple(dict.fromkeys(e.kind for e in experiments))
-    batch = attrs.evolve(BATCH_EFFECT, kinds=kinds)
-    found = [] if not kinds else list(coincident_effects(experiments))
-    for effect in (*effects, batch):
+    found = [] if not experiments else list(coincident_effects(experiments))
+    for effect in (*effects, *of_specimens(experiments)):
         if effect.name in OF_NONE:
             continue
         own = [e for e in experiments if e.kind in effect.kinds]
@@ -81,6 +83,13 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
             if len(members) < len(own):
                 found.append(attrs.evolve(effect, whose=whose))
     return tuple(found)
+
+
+def of_specimens(experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
+    """What is always of some specimens alone: another modulus, and in a lattice other struts."""
+    kinds = tuple(dict.fromkeys(e.kind for e in experiments))
+    struts = (THICKNESS_EFFECT,) if set(THICKNESS_EFFECT.kinds) & set(kinds) else ()
+    return (attrs.evolve(BATCH_EFFECT, kinds=kinds), *struts)
 
 
 def coincident_effects(experiments: Sequence[Experiment]) -> dict[Effect, frozenset[str]]:

@@ -12,10 +12,11 @@ import numpy as np
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
-from .owned import BATCH_EFFECT, OF_NONE, OF_THE_BENCH
+from .owned import OF_NONE, OF_THE_BENCH, of_specimens
 from .residuals import strict_table, structure
 from .selection import (
     FALSE_ALARM_RATE,
+    LAW,
     RIVAL_DELTA_CHI2,
     Cause,
     Selection,
@@ -108,9 +109,8 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
     all others, is shared. By experiment only what has a size of either sign and no shape: experiments differ
     in what was done, too, and a leak or a drift of each would pass for another law of the same unit.
     """
-    kinds = tuple(dict.fromkeys(e.kind for e in experiments))
     found = []
-    for effect in (*effects, attrs.evolve(BATCH_EFFECT, kinds=kinds)):
+    for effect in (*effects, *of_specimens(experiments)):
         size, *shape = effect.parameters
         if effect.name in OF_NONE:
             continue
@@ -158,7 +158,7 @@ def select_pooled(
     a chi squared of one degree), times the number of effects and groupings that were tried. What every second
     quarter of the records tells of each owner must predict the other quarters. Neither a step
     change nor an effect of one size for all may explain more. Rivals are other effects, or groupings, whose
-    likelihood is as good.
+    likelihood is as good, to what an error of their law would cost (`LAW`).
     """
     from scipy.stats import chi2
 
@@ -185,7 +185,9 @@ def select_pooled(
     # Smooth structure may pass for slow noise; then what all owners share explains more than what differs.
     if any(single.chi2 < best.chi2 for single in found.singles):
         return found
-    near = [f.effects[0] for g, f in fits[1:] if gain - g < RIVAL_DELTA_CHI2]
+    # Nor is what leaves as little as an error of their law would.
+    margin = max(RIVAL_DELTA_CHI2, LAW**2 * gain)
+    near = [f.effects[0] for g, f in fits[1:] if gain - g < margin]
     # Whatever differs among specimens can do so among their experiments, and another law is the same cause.
     rivals = dict.fromkeys(
         e.title for e in near if e.name != best.names[0] or len(sizes_of(e)) < len(sizes_of(best.effects[0]))

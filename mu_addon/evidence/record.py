@@ -177,6 +177,34 @@ class Record:
         return found
 
 
+# Columns that may say what was done, where they are not predicted.
+DRIVES = ("pressure_kPa", "angle_deg", "strain", "displacement_mm")
+# Share of its range by which a drive may differ between repeats.
+ALIKE = 0.05
+
+
+def repeats(record: Record, one: Series, other: Series) -> bool:
+    """Whether two series are one channel of experiments in which the same was done, sample by sample.
+
+    Their clocks must agree to a sample, each drive to `ALIKE` of its range, and all else that was set.
+    """
+    a, b = (record.experiments[s.experiment] for s in (one, other))
+    if (one.channel, a.kind, len(a)) != (other.channel, b.kind, len(b)) or "time_s" not in a.columns:
+        return False
+    if any(getattr(a, name) != getattr(b, name) for name in _SETTINGS) or "time_s" not in b.columns:
+        return False
+    clock = np.abs((a["time_s"] - a["time_s"][0]) - (b["time_s"] - b["time_s"][0])).max()
+    driven = [c for c in DRIVES if c in b.columns and record.driven(one.experiment, c)]
+    return (
+        bool(clock < np.median(np.diff(a["time_s"])))
+        and bool(driven)
+        and all(np.abs(a[c] - b[c]).max() < ALIKE * max(float(np.ptp(a[c])), 1e-9) for c in driven)
+    )
+
+
+_SETTINGS = ("scale", "orientation_deg", "added_mass_g", "axis", "mode", "section_mm", "length_mm", "cells")
+
+
 def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int = BLOCKS) -> Record:
     """The predicted channels of the experiments as one vector of block means.
 

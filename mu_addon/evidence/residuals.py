@@ -19,7 +19,7 @@ from .noise import cycle_s, harmonics
 from .prediction.effective_pressure import play_operator
 from .prediction.unit import KIND as UNIT
 from .prediction.unit import cycles
-from .record import KNOWN, Record, Series
+from .record import KNOWN, Record, Series, repeats
 from .ringing import modes, ringing
 
 Array = np.ndarray[Any, Any]
@@ -500,9 +500,7 @@ def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
     clocked = _clocked(record)
     for k, s in enumerate(clocked):
         for o in clocked[k + 1 :]:
-            if s.channel == o.channel != "pressure_kPa" and same_protocol(
-                record.experiments[s.experiment], record.experiments[o.experiment]
-            ):
+            if repeats(record, s, o):
                 a, b = r[s.at], r[o.at]
                 n = min(len(a), len(b))
                 sums += float(a[:n] @ b[:n])
@@ -511,21 +509,6 @@ def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
         return []
     z = sums / math.sqrt(count)
     return [Dependence("repeat", z, float(norm.sf(z)), "all repeats")]
-
-
-def same_protocol(a: Experiment, b: Experiment) -> bool:
-    """Whether two experiments of one kind, scale, orientation and mass have the same pressures over time.
-
-    Times must agree to a sample, pressures to 5 % of their range.
-    """
-    if a.kind != b.kind or len(a) != len(b) or "pressure_kPa" not in a.columns or "time_s" not in a.columns:
-        return False
-    if (a.scale, a.orientation_deg, a.added_mass_g) != (b.scale, b.orientation_deg, b.added_mass_g):
-        return False
-    p, q = a["pressure_kPa"], b["pressure_kPa"]
-    clock = np.abs((a["time_s"] - a["time_s"][0]) - (b["time_s"] - b["time_s"][0])).max()
-    step = float(np.median(np.diff(a["time_s"])))
-    return bool(clock < step and np.abs(p - q).max() < 0.05 * max(float(np.ptp(p)), 1e-9))
 
 
 def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:

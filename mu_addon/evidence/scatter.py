@@ -11,7 +11,7 @@ import numpy as np
 
 from .drive import FEWEST, reading_noise
 from .noise import Source
-from .record import KNOWN, Record, Series
+from .record import KNOWN, Record, Series, repeats
 from .resolution import divided
 
 Array = np.ndarray[Any, Any]
@@ -24,8 +24,12 @@ FEW = 4.0
 # What gauges and load cells are accurate to where nothing is stated, as a share of the largest reading: slow
 # noise up to this needs no fast part beside it.
 ACCURACY = 0.002
-# Of few readings, or in no order, no scatter is seen: a model that misses by this share of them is no model.
+# Of fewer than `FEWEST` readings no scatter is seen: a model that misses by this share of them is no model.
 UNSEEN = 0.1
+# Nor may noise be so many times what repeats differ by: slow noise of two records may be alike by chance.
+REPEATED = 3.0
+# Of the largest reading: gauges and load cells repeat no better.
+REPEATABLE = 2e-4
 # What is left of readings and is less than so many times their scatter decides nothing for anyone.
 NEAR = 2.0
 # Blocks in a window of a burst, and times the usual scatter: less happens by chance.
@@ -41,7 +45,7 @@ def scatter(record: Record, series: Series) -> float:
     e = record.experiments[series.experiment]
     values = e[series.channel]
     seen = np.isfinite(values)
-    if np.count_nonzero(seen) < 2 * FEWEST:
+    if np.count_nonzero(seen) < FEWEST:
         return math.nan
     clock = e.columns.get("time_s", np.arange(len(values), dtype=float))
     # The least of several estimates: of few readings it is too small.
@@ -58,6 +62,25 @@ def shown_noise(record: Record, series: Series) -> float:
     largest = float(np.nanmax(np.abs(record.experiments[series.experiment][series.channel])))
     seen = scatter(record, series)
     return UNSEEN * largest if math.isnan(seen) else max(TIMES * seen, ACCURACY * largest)
+
+
+def by_repeats(record: Record, series: Series, left: Array) -> float:
+    """The largest standard deviation of noise that a series' repeats allow, in its unit; inf without any.
+
+    left (N,): a misfit in the record's units. What repeats have in common is no noise, however slow or fast.
+    No instrument repeats better than to its steps, or to `REPEATABLE` of the largest reading.
+    """
+    own = left[series.at]
+    apart = [
+        float(np.sqrt(np.mean((own - left[o.at]) ** 2) / 2.0))
+        for o in record.series
+        if o is not series and len(left[o.at]) == len(own) and repeats(record, series, o)
+    ]
+    if not apart:
+        return math.inf
+    largest = float(np.nanmax(np.abs(record.experiments[series.experiment][series.channel])))
+    few = 1.0 + FEW / math.sqrt(len(own))
+    return max(REPEATED * few * max(apart), REPEATABLE * largest, series.step)
 
 
 def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
@@ -103,7 +126,7 @@ def excess(record: Record, left: Array) -> Excess | None:
             own = left[s.at] if s.louder is None else left[s.at] / s.louder
             error = float(np.sqrt(np.mean(own**2)))
             where = f"{record.experiments[s.experiment].name}, {s.channel}"
-            found.append(Excess(error, shown_noise(record, s), where))
+            found.append(Excess(error, min(shown_noise(record, s), by_repeats(record, s, left)), where))
     worst = max(found, key=lambda e: e.times, default=None)
     return worst if worst is not None and worst.times > 1.0 else None
 
@@ -155,12 +178,16 @@ def _loudness(time_s: Array, left: Array) -> Array | None:
 
 
 def within_scatter(record: Record, left: Array) -> bool:
-    """Whether a misfit (N,) is below `NEAR` times the readings' scatter, no stretch beyond `TIMES`."""
+    """Whether a misfit (N,) is below `NEAR` times the readings' scatter, no stretch beyond `TIMES`.
+
+    And within what repeats allow (`by_repeats`).
+    """
     for s in record.series:
         own = left[s.at] if s.louder is None else left[s.at] / s.louder
         stretch = np.convolve(own, np.ones(min(WINDOW, len(own))) / min(WINDOW, len(own)), "valid")
         # Slow noise stays for a while where it goes.
         worst = max(float(np.sqrt(np.mean(own**2))), NEAR / TIMES * float(np.abs(stretch).max(initial=0.0)))
-        if s.group == KNOWN or not worst < NEAR * scatter(record, s):
+        most = min(NEAR * scatter(record, s), by_repeats(record, s, left))
+        if s.group == KNOWN or not worst < most:
             return False
     return True

@@ -416,9 +416,18 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     step = best.names[0] == STEP
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
         return None
-    cause = Cause(best.effects[0], found.p_best, base.chi2 - best.chi2, tuple(near))
+    p = _by_count(base, best, len(found.singles) + len(found.wider))
+    cause = Cause(best.effects[0], p, base.chi2 - best.chi2, tuple(near))
     table = tuple(strict_table(fitter, best))
-    return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="")
+    return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
+
+
+def _by_count(base: Fit, best: Fit, tried: int) -> float:
+    """Probability that noise alone lets the best of so many fits gain as much, at most (Bonferroni)."""
+    from scipy.stats import chi2
+
+    gain = base.chi2 - best.chi2 - by_search(best)
+    return min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(best.keys) - len(base.keys))))
 
 
 def _mainly_several(fitter: Fitter, found: Selection) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measured import Experiment
-from .effect import GEOMETRY, OF, SCALES, Effect, Parameter
+from .effect import GEOMETRY, OF, SCALES, THICKNESS, Effect, Parameter
 
 Array = np.ndarray[Any, Any]
 
@@ -154,7 +154,7 @@ class Composite:
             if key in own or not (whose in owners or experiment.name in self.groups.get(whose, ())):
                 continue
             name = plain.partition(".")[0]
-            if plain in knows or name == GEOMETRY:
+            if plain in knows or name in (GEOMETRY, THICKNESS):
                 own[plain] = value
             elif name in SCALES:
                 moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)

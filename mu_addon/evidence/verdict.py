@@ -27,6 +27,7 @@ from .residuals import structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
 from .scatter import NEAR, with_bursts, within_scatter
 from .selection import (
+    FALSE_ALARM_RATE,
     TOGETHER,
     Cause,
     Selection,
@@ -294,6 +295,12 @@ def diagnose(
     if chosen.left or chosen.doubted:
         # They were not all that was wrong.
         experiments, set_aside, fitter, base, seen, chosen = before
+    if chosen.causes and _kind(fitter, chosen) != "unexplained":
+        louder = _loud_alone(fitter, seen, chosen, progress)
+        if louder is not None:
+            fitter, chosen, bursts = louder
+            base = chosen.base
+            set_aside = [*set_aside, *bursts]
     most = None
     if _kind(fitter, chosen) == "unexplained" and not _of_no_size(fitter, chosen):
         # Where a cause takes most of a misfit, fast errors of its law would pass for bursts.
@@ -349,6 +356,25 @@ def diagnose(
         _nearest(fitter, chosen),
         tuple(unlikely(fitter.curved, chosen.base)),
     )
+
+
+def _loud_alone(
+    fitter: Fitter, seen: Sequence[Sensitivity], found: Selection, progress: Callable[[str], None]
+) -> tuple[Fitter, Selection, list[str]] | None:
+    """Fitter, selection and remarks under noise in bursts, where that had passed for causes; else None.
+
+    Noise that grows with load is largest where every law of the material says most.
+    """
+    left = fitter.record.values - fitter.predict(found.chosen.values)
+    measured, bursts = with_bursts(fitter.record, left)
+    if not bursts:
+        return None
+    progress("noise in bursts")
+    noise = noise_of(measured, fitter.simulator, found.chosen.values, _wandering(found))
+    other = Fitter(measured, fitter.simulator, noise)
+    if all(c.p_value < FALSE_ALARM_RATE for c in reselected(other, seen, found).causes):
+        return None
+    return other, select(other, seen, progress), bursts
 
 
 def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:

@@ -289,6 +289,48 @@ def test_a_computed_cell_of_slender_struts_is_the_power_law(scale, excess):
     assert cell.stiffness(scale, 0.0, excess) == pytest.approx(struts.stiffness(scale, 0.0, excess), rel=1e-3)
 
 
+def test_struts_thinner_than_any_computed_go_on_softening_as_thin_ones_do():
+    struts, cell = Struts(), computed()
+    at = np.linspace(-0.05, 0.2, 26)
+    made = OffsetResponse(at, [struts.stiffness(1, o, 0) for o in at], [struts.mass(1, o) for o in at])
+    for scale in (0.75, 1.5):
+        thin = ComputedCell(made).stiffness(scale, -0.1 * scale, 0.0)
+        assert thin == pytest.approx(struts.stiffness(scale, -0.1 * scale, 0.0), rel=0.05)
+        assert ComputedCell(made).mass(scale, -0.1 * scale) == pytest.approx(
+            struts.mass(scale, -0.1 * scale), rel=1e-3
+        )
+    least = cell.response.range_mm[0]
+    assert cell.stiffness(1.0, least - 1e-9, 0.0) == pytest.approx(cell.stiffness(1.0, least, 0.0))
+
+
+def specimens(thicker_mm, weighed):
+    """Blocks of slender struts, each printed by so much too thick, by the formulas of bending."""
+    rng, found = np.random.default_rng(3), []
+    for i, off in enumerate(thicker_mm):
+        e = block(name=f"block {i}", specimen=f"S{i}", columns={"mass_g": np.ones(81)} if weighed else {})
+        stress = 40.0 * (1.0 + off / 1.5) ** 4 * e["strain"] + 0.05 * rng.normal(size=81)
+        columns = {**e.columns, "stress_kPa": stress}
+        if weighed:
+            mass = 8.0 * (1.0 + off / 1.5) ** 2 + 0.01 * rng.normal()
+            columns |= {"mass_g": np.full(81, mass), "mass_sd_g": np.full(81, 0.02)}
+        found.append(attrs.evolve(e, columns=columns))
+    return found
+
+
+@pytest.mark.parametrize("weighed", [False, True])
+def test_struts_of_each_specimen_stand_beside_its_modulus_until_it_is_weighed(weighed):
+    made = specimens((0.15, 0.13, -0.15, -0.12), weighed)
+    found = diagnose(made, Composite(bench_simulators(made)))
+    cause = found.selection.causes[0]
+    every = {cause.effect.title, *cause.rivals}
+    assert found.kind in ("named", "ambiguous")
+    assert "strut_thickness among specimens" in every
+    assert ("batch_variation among specimens" in every) == (not weighed)
+    if weighed:
+        values = [found.selection.chosen.values[k] for k in cause.effect.keys]
+        assert values[0] - values[2] == pytest.approx(0.30, abs=0.04)
+
+
 def test_the_papers_moduli_by_the_computed_cell():
     """The same verdict as by the power law, and the offset that the homogenization fits by itself."""
     experiments = read_folder(EXAMPLES / "paper-moduli").experiments

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
-from ..effect import Effect, Parameter
+from ..effect import THICKNESS, Effect, Parameter
 from .specimen import NEW, largest_N, load_cell, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
@@ -122,10 +122,14 @@ class Struts:
     exponent: float = 4.0
 
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
-        """Modulus over that as drawn, ((t + 2 offset)/t)^exponent (1 + 2 exponent excess/t); mm."""
+        """Modulus over that as drawn, ((t + 2 offset)/t)^exponent (1 + 2 exponent excess/t); mm.
+
+        A tenth of the strut is left at least.
+        """
         t = self.thickness_mm * scale
         # Without an effect exactly 1.
-        return ((t + 2 * offset_mm) / t) ** self.exponent * (1 + 2 * self.exponent * excess_mm / t)
+        thick = max(t + 2 * offset_mm, 0.1 * t)
+        return (thick / t) ** self.exponent * (1 + 2 * self.exponent * excess_mm / t)
 
     def mass(self, scale: float, offset_mm: float) -> float:
         """Mass over the mass as drawn, ((t + 2 offset)/t)^2; lengths in mm."""
@@ -158,28 +162,36 @@ class ComputedCell:
     def stiffness(self, scale: float, offset_mm: float, excess_mm: float) -> float:
         """Modulus over the reference's as drawn.
 
-        offset_mm and excess_mm, as in `Scaling`, are added to the printed ones. Raises InputError beyond the
-        offsets that were computed.
+        offset_mm and excess_mm, as in `Scaling`, are added to the printed ones. Struts thinner than any that
+        was computed soften by the slope at the thinnest. Raises InputError beyond the largest offset.
         """
         modulus = self.response.modulus_MPa
         drawn = (self.reference or self.response).modulus_MPa
         offset_mm, excess_mm = offset_mm + self.printed_mm, excess_mm + self.printed_excess_mm
-        found = float(modulus(scale, offset_mm, 1.0) / drawn(scale, 0.0, 1.0))
-        if not excess_mm:
-            return found
         low, high = (bound * scale for bound in self.response.range_mm)
+        at = max(offset_mm, low)
+        found = float(modulus(scale, at, 1.0) / drawn(scale, 0.0, 1.0))
+        if not excess_mm and at == offset_mm:
+            return found
         h = 0.01 * (high - low)
-        at = min(max(offset_mm, low + h), high - h)
-        slope = math.log(modulus(scale, at + h, 1.0) / modulus(scale, at - h, 1.0)) / (2 * h)
-        return found * (1 + slope * excess_mm)
+        inside = min(max(at, low + h), high - h)
+        slope = math.log(modulus(scale, inside + h, 1.0) / modulus(scale, inside - h, 1.0)) / (2 * h)
+        return found * math.exp(slope * (offset_mm - at)) * (1 + slope * excess_mm)
 
     def mass(self, scale: float, offset_mm: float) -> float:
         """Mass over the mass as drawn, with offset_mm added to the printed one.
 
-        Raises InputError beyond the offsets that were computed.
+        Of struts thinner than any that was computed it falls as the square of their thickness does: the root
+        is linear. Raises InputError beyond the largest offset.
         """
-        density = self.response.relative_density
-        return float(density(scale, offset_mm + self.printed_mm) / density(1.0, 0.0))
+        density, low = self.response.relative_density, self.response.range_mm[0] * scale
+        offset_mm += self.printed_mm
+        at = max(offset_mm, low)
+        found = float(density(scale, at) / density(1.0, 0.0))
+        if at == offset_mm:
+            return found
+        thick, thin = math.sqrt(density(scale, 0.0)), math.sqrt(density(scale, low))
+        return found * (1 + (thick - thin) / thin * (offset_mm - low) / -low) ** 2
 
     def largest_offset_mm(self, scale: float) -> float:
         """The last offset in mm that was computed, times `scale`, less the lattice's printed offset."""
@@ -239,6 +251,8 @@ class LatticeStress:
         excess = values.get("skin_cure.excess_mm", 0.0)
         modulus = values.get(MODULUS.name, MODULUS.null)
         scaling = self._scaling(experiment)
+        # Both sides of a strut.
+        offset += 0.5 * values.get(f"{THICKNESS}.thicker_mm", 0.0)
         modulus *= scaling.stiffness(experiment.scale, offset, excess)
         closing = values.get("strain_stiffening.closing", 0.0)
         at_tenth = values.get("strain_stiffening.at_tenth", 0.0)

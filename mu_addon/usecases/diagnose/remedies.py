@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...evidence.effect import SLIP
+from ...evidence.effect import SLIP, THICKNESS
 
 _INSTRUMENT = "the simulation is not at fault"
 _MODEL = "simulate with --model model.toml, which has it"
@@ -54,6 +54,7 @@ TO_DO = {
     "waveguide_play": "take the play out of the waveguide's channel or of the stage, and record again",
     "optical_nonlinearity": "calibrate the sensor over the whole range of bending",
     "batch_variation": "print and test the specimens of one batch, or give that specimen its own modulus",
+    THICKNESS: "measure the struts of each specimen, and give each design its own unit file",
     "mesh_error": "simulate with a finer mesh, --refine",
 }
 

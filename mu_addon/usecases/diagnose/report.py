@@ -12,8 +12,8 @@ import numpy as np
 
 from ...evidence.effect import Parameter
 from ...evidence.fit import Fit
-from ...evidence.record import KNOWN
-from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM, same_protocol
+from ...evidence.record import KNOWN, repeats
+from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
 from ...evidence.selection import RIVAL_DELTA_CHI2
 from ...evidence.sensitivity import best_seen
 from ...files import write_text
@@ -492,10 +492,9 @@ def _noise(found: Diagnosis) -> str:
             continue
         source = found.verdict.sources[group]
         clocked = any(not math.isnan(s.sample_s) for s in members)
-        tested = [record.experiments[s.experiment] for s in members]
-        repeats = sum(same_protocol(a, b) for i, a in enumerate(tested) for b in tested[i + 1 :])
+        pairs = sum(repeats(record, a, b) for i, a in enumerate(members) for b in members[i + 1 :])
         origin = f"{len(members)} series, {values} values"
-        origin += f", {repeats} pairs of repeats" if repeats else ""
+        origin += f", {pairs} pairs of repeats" if pairs else ""
         rows.append(
             (
                 [
