@@ -36,8 +36,9 @@ SMALL = {"mu-1.0x": "mu-0.75x"}
 def blocks(page):
     """The lines of each block of commands of a page."""
     text = page.read_text(encoding="utf-8")
-    found = re.findall(r"^```(\w*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-    return [code.splitlines() for kind, code in found if not kind and "headless/run.py" in code]
+    found = re.findall(r"^ *```(\w*)\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+    commands = [code for kind, code in found if not kind and "headless/run.py" in code]
+    return [[line.strip() for line in code.splitlines()] for code in commands]
 
 
 def words_of(line):
@@ -48,7 +49,7 @@ def words_of(line):
 
 def named_in_words(page):
     """What a page names as code within its sentences: what the reader is told to bring stands there."""
-    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     return {word for span in re.findall(r"`([^`]+)`", text) for word in span.split()}
 
 
