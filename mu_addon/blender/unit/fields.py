@@ -32,6 +32,9 @@ _NAMES = {
     "count": "Chambers",
     "bladder_diameter_mm": "Bladder Ø",
     "neck_diameter_mm": "Neck Ø",
+    "inlet_diameter_mm": "Inlet Ø",
+    "junction_diameter_mm": "Junction Ø",
+    "midspan_diameter_mm": "Midspan Ø",
     "row": "Anchor Row",
     "cells_y_minus": "Cells -Y",
     "cells_y_plus": "Cells +Y",
@@ -44,7 +47,7 @@ _NAMES = {
 
 
 def label(d: Description) -> str:
-    """Name of a parameter for a panel: `junction_diameter_mm` becomes "Junction Diameter"."""
+    """Name of a parameter for a panel: `tip_cap_mm` becomes "Tip Cap"."""
     if d.name in _NAMES:
         return _NAMES[d.name]
     words = d.name.split("_")
