@@ -193,6 +193,9 @@ def repeats(record: Record, one: Series, other: Series) -> bool:
         return False
     if any(getattr(a, name) != getattr(b, name) for name in _SETTINGS) or "time_s" not in b.columns:
         return False
+    if np.nanmedian(np.abs(a[one.channel] - b[one.channel])) == 0.0:
+        # A copy of a file, or a display too coarse to tell by.
+        return False
     clock = np.abs((a["time_s"] - a["time_s"][0]) - (b["time_s"] - b["time_s"][0])).max()
     driven = [c for c in DRIVES if c in b.columns and record.driven(one.experiment, c)]
     return (
