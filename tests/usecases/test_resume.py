@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import tomlkit
+import trimesh
 
 from mu_addon.design.anchors import window
 from mu_addon.design.assets import asset_root
@@ -49,7 +50,7 @@ def jobs(folder):
     protocol = Protocol([0.0, 1.0, 2.0], [0.0, 0.1 + 0.2, -20.0])
     resin = load_material("elastic-50a-v1")
     part = folder / "part.stl"
-    part.write_bytes(b"solid none")
+    part.write_bytes(trimesh.creation.box((4.0, 4.0, 4.0)).export(file_type="stl"))
     (folder / "more.csv").write_text("time_s,pressure_kPa\n0,0\n1,20\n", encoding="utf-8")
     sweep = """
         format = 1
