@@ -434,7 +434,7 @@ def _by_count(base: Fit, best: Fit, tried: int) -> float:
 def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
     """A selection of three causes or more without the least, which has rivals; None without such a cause.
 
-    What follows the law of several effects a little better than they do moves them to bounds they do not need.
+    Such a cause stands in for errors of the others' laws, and can move them to bounds that they do not need.
     """
     if len(found.causes) < 3 or not found.causes[-1].rivals:
         return None
