@@ -207,7 +207,8 @@ class Equilibrium:
         if len(history) == 1:
             self.model.forget_contact()
         history = list(history[-3:])
-        step = np.clip(target - history[-1].pressure_MPa, -s.max_step_MPa, s.max_step_MPa)
+        largest = s.largest_step_MPa(history[-1].pressure_MPa, target)
+        step = np.clip(target - history[-1].pressure_MPa, -largest, largest)
         smooth = True
         while history[-1].pressure_MPa != target:
             last = history[-1]
@@ -234,7 +235,7 @@ class Equilibrium:
                 continue
             history, smooth = [*history[-2:], attrs.evolve(state, snapped_mm=last.snapped_mm)], True
             if state.factorisations <= s.easy_factorisations:
-                step = np.clip(2 * step, -s.max_step_MPa, s.max_step_MPa)
+                step = np.clip(2 * step, -largest, largest)
             elif state.factorisations > 2 * s.easy_factorisations:
                 step /= 2
         return history[-1]

@@ -10,7 +10,7 @@ class NewtonSettings:
     """Tolerances and limits of Newton's method; a state converges where the residual is below `tolerance`.
 
     Residuals are relative to the root sum of squares of all element forces. Load steps in MPa lie between
-    min_step_MPa and max_step_MPa. The other numbers are counts and ratios, as the comments say.
+    min_step_MPa and `largest_step_MPa`. The other numbers are counts and ratios, as the comments say.
     """
 
     tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
@@ -20,6 +20,7 @@ class NewtonSettings:
     # a factorisation costs as much as eight steps.
     keep_factor: float = 0.7
     max_step_MPa: float = 0.01
+    max_suction_step_MPa: float = float("inf")  # below 0 MPa besides, where a body closes and its walls touch
     min_step_MPa: float = 1e-4
     # Load steps grow after one with at most so many factorisations, and shrink after one with over twice as
     # many.
@@ -36,6 +37,11 @@ class NewtonSettings:
     # steps after which a body goes on with its own.
     shared_tolerance: float = 2e-8
     max_shared_steps: int = 40
+
+    def largest_step_MPa(self, *pressure_MPa: float) -> float:
+        """The largest step between these pressures in MPa, in MPa."""
+        suction = min(pressure_MPa) < 0
+        return min(self.max_step_MPa, self.max_suction_step_MPa) if suction else self.max_step_MPa
 
 
 RESOLVED_NEWTON = NewtonSettings(
@@ -56,6 +62,6 @@ SELF_CONTACT_NEWTON = NewtonSettings(
 )
 
 RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
-    SELF_CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True
+    SELF_CONTACT_NEWTON, max_suction_step_MPa=0.005, follow_snaps=True
 )
 """For a body strut by strut whose walls and struts touch."""

@@ -109,7 +109,8 @@ def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max
     start = attrs.evolve(start, state=attrs.evolve(start.state, snapped_mm=0.0))
     if span == 0 and rise == 0:
         return start
-    largest = 1 / max(1.0, np.ceil(span / max_step_s), np.ceil(abs(rise) / eq.settings.max_step_MPa - 1e-9))
+    step_MPa = eq.settings.largest_step_MPa(start.state.pressure_MPa, pressure)
+    largest = 1 / max(1.0, np.ceil(span / max_step_s), np.ceil(abs(rise) / step_MPa - 1e-9))
     last, done, step = start, 0.0, largest
     smallest = SNAPS_BELOW * largest if eq.settings.follow_snaps else SMALLEST
     while done < 1:

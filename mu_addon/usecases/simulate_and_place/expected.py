@@ -17,7 +17,7 @@ FULL_S = {
     "motion of the best path": 60.0, "report": 30.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
-PACE = {"full": 1.0, "resolved": 7.0, "quick": 0.1}
+PACE = {"full": 1.0, "resolved": 5.0, "quick": 0.1}
 """How a study's equilibria take longer or shorter by its detail."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 # Pressures other than 0 of the shipped protocol at the default number of times.
