@@ -1,13 +1,15 @@
-"""Ctrl-C at random moments of a sweep, an optimisation and a main job, and what their folders go on to.
+"""Ctrl-C at random moments of every long command, and what their folders go on to.
 
     python benchmarks/interrupts.py                            # all of them, 12 times each
     python benchmarks/interrupts.py --times 30 --seed 7 sweep
     python benchmarks/interrupts.py --kill "place, resolved"   # kill -9 instead
 
-Half of the signals go to the whole process group, as a terminal sends them, half to the command alone; every
-third comes twice, and every fourth within the first second. The command must end in words with status 130 (or
-with 0, where it was done), leave no process and no summary that says running, and, given again, make the same
-files as a run that nothing happened to. After kill -9, of which nobody can tell, the folder must do so, too.
+The moments are spread over the run, one in each of its equal parts. Half of the signals go to the whole
+process group, as a terminal sends them, half to the command alone; every third comes twice, and every fourth
+within the first second. The command must end within MOST_S in words with status 130 (or with 0, where it was
+done), leave no process, a summary that says partial and a report that says why it stopped, and, given again,
+make the same files as a run that nothing happened to. After kill -9, of which nobody can tell, the folder must
+do so, too.
 """
 
 from __future__ import annotations
@@ -82,12 +84,41 @@ PLACE = ["--preset", "mu-1.0x", "--refine", "0.4", "--order", "1", "--times", "7
 RESOLVED = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--fidelity", "resolved", "--refine", "0.4"]
 RESOLVED += ["--times", "2", "--stations", "5", "--no-mesh-check"]
 PROTOCOL = "time_s,pressure_kPa\n0,0\n1,1\n"
+CHAIN = """
+format = 1
+protocol = "chain.csv"
+tip_mass_g = 20.0
+times = 3
+
+[joint]
+pressure_step_kPa = 30.0
+
+[mesh]
+refine = 0.25
+
+[[unit]]
+preset = "mu-1.0x"
+pressure_kPa = [0.0, 30.0]
+
+[[unit]]
+preset = "mu-1.0x"
+pressure_kPa = [0.0, 30.0]
+"""
+CHAIN_PROTOCOL = "time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,30,10\n"
+MOST_S = 5.0
 COMMANDS = {
     "sweep": ["sweep", "sweep.toml"],
     "optimize": ["optimize", "design.toml"],
     "optimize, two workers": ["optimize", "design.toml", "--workers", "2"],
     "place": ["place", *PLACE],
     "place, resolved": ["place", *RESOLVED],
+    "simulate": ["simulate", "--unit", "unit.toml", "--refine", "0.4", "--times", "3"],
+    "homogenize": ["homogenize", "--preset", "mu-1.0x", "--cells", "2", "--refine", "0.5"],
+    "grip": ["grip", "--preset", "gripper", "--coarse", "--no-paths", "--cube", "25", "--refine", "0.3"],
+    "chain": ["chain", "chain.toml"],
+    "diagnose": ["diagnose", str(ROOT / "assets/examples/paper-moduli")],
+    "fit-material": ["fit-material", str(ROOT / "tests/data/treloar")],
+    "reproduce": ["reproduce", "--coarse", "--refine", "0.3"],
 }
 # What a run took is another thing than what it found.
 TOOK = ("seconds", "memory_MB", "worker")
@@ -133,15 +164,30 @@ def left_behind(folder):
     return here
 
 
+def left_wrong(folder):
+    """What is wrong with what a run left that Ctrl-C stopped."""
+    summary, report = folder / "summary.json", folder / "report.html"
+    if not summary.exists():
+        # Stopped before its folder was its own.
+        return []
+    status = json.loads(summary.read_text())["status"]
+    wrong = [] if status == "partial" else [f"says {status}"]
+    if not report.exists():
+        return [*wrong, "no report"]
+    return (
+        wrong if "stopped by Ctrl-C" in report.read_text() else [*wrong, "a report that says nothing of it"]
+    )
+
+
 def three_chambers():
     unit = load_preset("mu-1.0x")
     return to_toml(attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3)))
 
 
-def interrupted(work, words, out, seconds, rng, number, kind):
+def interrupted(work, words, out, moment, rng, number, kind):
     """Status and words of a run that a signal meets, seconds until it ended, and what is wrong."""
     process = start(work, words, out)
-    time.sleep(rng.uniform(0.1, 1.0) if number % 4 == 0 else rng.uniform(0.0, seconds))
+    time.sleep(moment)
     send = os.killpg if number % 2 else os.kill
     sent = time.monotonic()
     for again in range(2 if number % 3 == 0 else 1):
@@ -159,9 +205,10 @@ def interrupted(work, words, out, seconds, rng, number, kind):
         wrong.append("no words")
     if "Traceback" in output or "Exception" in output:
         wrong.append("a stack")
-    summary = out / "summary.json"
-    if kind == signal.SIGINT and summary.exists() and json.loads(summary.read_text())["status"] == "running":
-        wrong.append("says running")
+    if kind == signal.SIGINT and took > MOST_S:
+        wrong.append(f"ended after {took:.1f} s")
+    if kind == signal.SIGINT and process.returncode == 130:
+        wrong += left_wrong(out)
     time.sleep(0.5)
     if left_behind(out):
         wrong.append("processes are left")
@@ -180,7 +227,8 @@ def one(work, name, times, seed, kind):
     ends, slowest, faults = Counter(), 0.0, []
     for number in range(times):
         out = work / f"hit{number}"
-        status, output, took, wrong = interrupted(work, words, out, seconds, rng, number, kind)
+        moment = rng.uniform(0.1, 1.0) if number % 4 == 0 else seconds * (number + rng.uniform()) / times
+        status, output, took, wrong = interrupted(work, words, out, moment, rng, number, kind)
         ends[status] += 1
         slowest = max(slowest, took)
         again = start(work, words, out)
@@ -190,7 +238,7 @@ def one(work, name, times, seed, kind):
         elif found(out) != reference:
             wrong.append("then other results")
         if wrong:
-            faults.append(f"{number}: {', '.join(wrong)}\n{output}\n{more}")
+            faults.append(f"{number} at {moment:.1f} s: {', '.join(wrong)}\n{output}\n{more}")
     statuses = ", ".join(f"{n} times {status}" for status, n in sorted(ends.items()))
     print(f"| {name} | {seconds:.0f} s | {statuses} | {slowest:.1f} s | {len(faults)} |", flush=True)
     return faults
@@ -213,6 +261,8 @@ def main():
             (work / "design.toml").write_text(DESIGN)
             (work / "unit.toml").write_text(three_chambers())
             (work / "protocol.csv").write_text(PROTOCOL)
+            (work / "chain.toml").write_text(CHAIN)
+            (work / "chain.csv").write_text(CHAIN_PROTOCOL)
             kind = signal.SIGKILL if given.kill else signal.SIGINT
             faults += [f"{name} {fault}" for fault in one(work, name, given.times, given.seed, kind)]
     for fault in faults:

@@ -161,11 +161,14 @@ class _Finding:
             self._leave(same, f"{shown!r}: {why}")
 
     def _note_numbers(self, places: Sequence[int] | range) -> None:
-        """List the rows of numbers that are no record."""
-        self._leave(
-            [self.rows[k] for k in places if len(self.numeric[k]) > 1],
-            f"numbers above a table, fewer than {FEWEST} rows",
-        )
+        """List the rows of numbers that are no record, also one that was cut after its first number."""
+        rows = [self.rows[k] for k in places if len(self.numeric[k]) > 1 or self._begins_with_number(k)]
+        self._leave(rows, f"numbers above a table, fewer than {FEWEST} rows")
+
+    def _begins_with_number(self, k: int) -> bool:
+        """Whether the first cell of a row that is not empty is a number: a fact begins with its name."""
+        first = next((place for place, cell in enumerate(self.rows[k].cells) if cell), -1)
+        return first in self.numeric[k]
 
     def _start(self, begin: int) -> int | None:
         """The first row from `begin` on that shares two columns of numbers with one of the next three."""

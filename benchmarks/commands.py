@@ -1,0 +1,188 @@
+"""Every documented command once: exit status, seconds, memory, and what its progress said beside what came.
+
+    python benchmarks/commands.py                       # all of them
+    python benchmarks/commands.py homogenize grip       # some
+    python benchmarks/commands.py --logs FOLDER sweep   # keeps each line that a command wrote, with its time
+
+A command whose full run takes over two minutes runs coarse, as its row shows. "Told" is the time that the
+command gave at its start, "silent" the longest time without a line on the terminal. "Left" is the largest
+factor between a time left that a line told and the time that was left, of lines more than LEAST_S before the
+end. A share done that fell, and a time left that grew without a reason told, count as faults.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
+
+from circumstances import circumstances  # noqa: E402
+from interrupts import CHAIN, CHAIN_PROTOCOL, DESIGN, SWEEP  # noqa: E402
+
+LEAST_S = 10.0
+QUICK = "--fidelity homogenised --order 1 --refine 0.4 --times 5"
+UNIT = "--preset mu-0.75x"
+ROWS = (
+    "presets",
+    f"design {UNIT} --path alpha4",
+    f"check {UNIT} --path alpha4",
+    f"export {UNIT} --path alpha4",
+    "specimens",
+    f"simulate {UNIT} {QUICK}",
+    f"simulate {UNIT} --refine 0.5 --times 3",
+    f"place {UNIT} --fidelity homogenised --refine 0.5 --times 5 --stations 11",
+    "resume FOLDER",
+    f"homogenize {UNIT} --cells 2 --refine 0.6",
+    "fit-material tests/data/treloar",
+    "import tension.csv --set kind=coupon --set mode=uniaxial --set section_mm=12.5x3 --set length_mm=40",
+    "diagnose assets/examples/paper-moduli",
+    "design-experiments assets/examples/paper-bending --noise angle=0.5",
+    "optimize design.toml",
+    "sweep sweep.toml",
+    "graph assets/graphs/unit.toml",
+    "grip --preset gripper --coarse --no-paths --refine 0.3",
+    "chain chain.toml",
+    "reproduce --coarse --refine 0.3",
+    "ports",
+    "stream --simulate --seconds 5",
+    "record --simulate --seconds 5",
+    "replay RECORDING",
+    "calibrate SWEEPS --channel light_V --dark dark_V --angles assets/examples/bench/angles.csv",
+)
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+_SHARE = re.compile(r"^ *(\d+) %  ")
+_LEFT = re.compile(r"(?:, |  )((?:[\d.]+ (?:h|min|s) ?)+) left")
+_TOLD = re.compile(r"^about (.*) on two cores")
+
+
+class Line(NamedTuple):
+    """A line of a command's words, and when it came, in s after its start."""
+
+    at: float
+    text: str
+
+
+class Ran(NamedTuple):
+    """What a command took and wrote."""
+
+    status: int
+    seconds: float
+    memory_MB: float
+    lines: list[Line]
+
+
+def seconds_of(words: str) -> float:
+    """Seconds of a time as the terminal spells it: "3 min 05 s"."""
+    return sum(float(n) * _UNITS[unit] for n, unit in re.findall(r"([\d.]+) (h|min|s)\b", words))
+
+
+def ran(words: list[str], folder: Path) -> Ran:
+    """Run a command in a folder; its lines are read as they come."""
+    line = [sys.executable, str(ROOT / "headless" / "run.py"), *words]
+    begun, lines = time.monotonic(), []
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(
+        line, cwd=folder, stdin=subprocess.DEVNULL, stdout=pipe, stderr=subprocess.STDOUT, text=True
+    )
+
+    def read() -> None:
+        for text in process.stdout or ():
+            lines.append(Line(time.monotonic() - begun, text.rstrip()))
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    _, ended, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(ended)
+    reader.join(5.0)
+    return Ran(process.returncode, time.monotonic() - begun, usage.ru_maxrss / 1e3, lines)
+
+
+def judged(found: Ran) -> tuple[str, float, str, list[str]]:
+    """Time told at the start, longest silence in s, largest factor of a time left, and faults."""
+    told = next((m[1] for line in found.lines if (m := _TOLD.match(line.text))), "")
+    at = [0.0, *(line.at for line in found.lines), found.seconds]
+    silent = max(b - a for a, b in pairwise(at))
+    factor, share, before, faults = 1.0, -1, None, []
+    for line in found.lines:
+        if m := _SHARE.match(line.text):
+            if int(m[1]) < share:
+                faults.append(f"{share} % before {line.text}")
+            share = int(m[1])
+        if m := _LEFT.search(line.text):
+            left, true = seconds_of(m[1]), found.seconds - line.at
+            if true > LEAST_S:
+                factor = max(factor, left / true, true / max(left, 1.0))
+            grew = before is not None and left > 1.02 * (before[1] - (line.at - before[0])) + 2.0
+            if grew and "(" not in line.text[m.end() :]:
+                faults.append(f"grew: {line.text}")
+            before = line.at, left
+    return told, silent, f"{factor:.1f}" if before else "", faults
+
+
+def prepare(work: Path) -> None:
+    """Write the files that the commands read into a folder."""
+    for name in ("assets", "tests"):
+        (work / name).symlink_to(ROOT / name)
+    (work / "sweep.toml").write_text(SWEEP)
+    (work / "design.toml").write_text(DESIGN)
+    (work / "chain.toml").write_text(CHAIN)
+    (work / "chain.csv").write_text(CHAIN_PROTOCOL)
+    rows = "".join(f"{0.1 * n:.1f},{0.05 * n:.3f},{0.02 * n:.3f}\n" for n in range(200))
+    (work / "tension.csv").write_text("Time (s),Force (N),Displacement (mm)\n" + rows)
+
+
+def main() -> None:
+    """Run the commands and print their table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("commands", nargs="*", help="names of commands (default: all)")
+    parser.add_argument("--logs", type=Path, help="folder for the words of each command")
+    given = parser.parse_args()
+    print(circumstances(), "\n")
+    print("| command | exit | seconds | memory [MB] | told | silent [s] | left | faults |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |", flush=True)
+    wrong = []
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        prepare(work)
+        last = {"FOLDER": "", "RECORDING": "", "SWEEPS": ""}
+        for number, row in enumerate(ROWS):
+            name = row.split()[0]
+            words = [last.get(word, word) for word in shlex.split(row)]
+            if given.commands and name not in given.commands:
+                continue
+            out = f"out{number}"
+            if name not in ("presets", "ports", "resume", "replay"):
+                words += ["--out", out]
+            found = ran(words, work)
+            told, silent, factor, faults = judged(found)
+            cells = f"{found.status} | {found.seconds:.1f} | {found.memory_MB:.0f} | {told} | {silent:.1f}"
+            print(f"| `{row}` | {cells} | {factor} | {len(faults)} |", flush=True)
+            if given.logs:
+                given.logs.mkdir(parents=True, exist_ok=True)
+                text = "".join(f"{line.at:8.1f} {line.text}\n" for line in found.lines)
+                (given.logs / f"{number:02d}-{name}.txt").write_text(text)
+            if found.status:
+                wrong.append(f"{row}\n" + "\n".join(line.text for line in found.lines[-12:]))
+            wrong += [f"{row}: {fault}" for fault in faults]
+            if name == "place":
+                last["FOLDER"] = out
+            elif name == "stream":
+                last["RECORDING"] = last["SWEEPS"] = out
+    for one in wrong:
+        print(f"\n{one}")
+
+
+if __name__ == "__main__":
+    main()
