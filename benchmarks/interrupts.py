@@ -8,8 +8,8 @@ The moments are spread over the run, one in each of its equal parts. Half of the
 process group, as a terminal sends them, half to the command alone; every third comes twice, and every fourth
 within the first second. The command must end within MOST_S in words with status 130 (or with 0, where it was
 done), leave no process, a summary that says partial and a report that says why it stopped, and, given again,
-make the same files as a run that nothing happened to. After kill -9, of which nobody can tell, the folder must
-do so, too.
+make the same files as a run that nothing happened to. After kill -9, of which nobody can tell, the folder
+does so, too.
 """
 
 from __future__ import annotations
