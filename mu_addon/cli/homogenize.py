@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_report, add_unit, modelled_unit
+from .options import add_model, add_report, add_setting, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `homogenize`."""
+    from ..usecases.homogenize.settings import CELLS, FRICTION, REFINE, RESIN, STRAIN
+
     command = commands.add_parser(
         "homogenize",
         help="Homogenize the lattice: compute effective moduli from struts and resin, run virtual "
@@ -24,61 +26,30 @@ def add(commands: Commands[Any]) -> None:
     add_unit(command)
     add_report(command)
     add_model(command)
-    command.add_argument(
-        "--resin",
-        metavar="NAME|FILE",
-        help=(
-            "Resin: a material of the library or a TOML file (default: the modulus of the unit's membrane)."
-        ),
-    )
-    command.add_argument(
-        "--cells",
-        type=int,
-        default=3,
-        metavar="N",
-        help="Number of cells along each side of the specimen (default: 3).",
-    )
-    command.add_argument(
-        "--friction",
-        choices=("both", "slide", "stick"),
-        default="both",
-        help="Contact of the specimen with the plates: frictionless (slide), bonded (stick) or both "
-        "(default: both).",
-    )
-    command.add_argument(
-        "--strain",
-        type=float,
-        default=0.4,
-        metavar="E",
-        help="Largest nominal compressive strain (default: 0.4).",
-    )
+    add_setting(command, RESIN, "NAME|FILE")
+    add_setting(command, CELLS, "N")
+    add_setting(command, FRICTION)
+    add_setting(command, STRAIN, "E")
     command.add_argument(
         "--no-specimen",
         dest="specimen",
         action="store_false",
         help="Do not simulate the specimen, only the periodic lattice.",
     )
-    command.add_argument(
-        "--refine",
-        type=float,
-        default=1.0,
-        metavar="F",
-        help="Mesh refinement: the cell's element size is divided by F (default: 1).",
-    )
+    add_setting(command, REFINE, "F")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Homogenise the unit's lattice."""
-    from ..usecases.homogenize.job import FRICTIONS, Job, resin_of
+    from ..usecases.homogenize.job import Job, frictions_of, resin_of
     from ..usecases.homogenize.run import USE_CASE
 
     unit = modelled_unit(options, context)
-    frictions = FRICTIONS if options.friction == "both" else (options.friction,)
     job = Job(
         unit=unit,
         resin=resin_of(options.resin, unit),
         cells=options.cells,
-        frictions=frictions if options.specimen else (),
+        frictions=frictions_of(options.friction) if options.specimen else (),
         strain=options.strain,
         refine=options.refine,
     )

@@ -19,7 +19,7 @@ Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse g
 def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str | None = None) -> None:
     """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
 
-    Bounds are checked by the job.
+    Bounds are checked by the job. A text that is empty by default is None without the option.
     """
     option = d.name.replace("_", "-")
     if d.type is bool:
@@ -29,7 +29,7 @@ def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str |
             f"--{option}",
             type=d.type,
             choices=d.choices or None,
-            default=d.default,
+            default=d.default if d.default != "" else None,
             metavar=metavar,
             help=help_of(d),
         )
@@ -38,8 +38,9 @@ def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str |
 def help_of(d: Description, default: str = "") -> str:
     """Help of a setting's option; default: in words, where it is not the setting's own."""
     own = {True: "yes", False: "no"}.get(d.default, d.default) if d.type is bool else d.default
-    shown = default or (f"{own:g}" if d.type is float else own)
-    return f"{d.text[:1].upper()}{d.text[1:]} (default: {shown})."
+    text, _, empty = d.text.partition("; empty: ")
+    shown = default or empty or (f"{own:g}" if d.type is float else own)
+    return f"{text[:1].upper()}{text[1:]} (default: {shown})."
 
 
 def add_results(command: argparse.ArgumentParser) -> None:

@@ -92,8 +92,8 @@ def test_other_inputs_set_the_old_results_aside(lattice):
 @pytest.mark.parametrize(
     ("more", "status", "words"),
     [
-        (("--cells", "0"), 2, "specimen of 0 cells"),
-        (("--strain", "2"), 2, "compression to 2"),
+        (("--cells", "0"), 2, "cells = 0 is out of bounds"),
+        (("--strain", "2"), 2, "strain = 2 is out of bounds"),
         (("--resin", "no-such-resin"), 2, "no-such-resin"),
     ],
 )

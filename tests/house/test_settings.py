@@ -13,12 +13,14 @@ from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
 from mu_addon.usecases.graph.study_nodes import study_nodes
 from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
+from mu_addon.usecases.homogenize import settings as lattice
 from mu_addon.usecases.simulate_and_place import settings as study
 
 ROOT = Path(mu_addon.__file__).parent
 STUDY = (mesh, study)
 WHERE = {
     "cli/options.py": STUDY,
+    "cli/homogenize.py": (lattice,),
     "cli/place.py": STUDY,
     "cli/simulate.py": STUDY,
     "blender/unit/properties.py": STUDY,
@@ -26,6 +28,7 @@ WHERE = {
     "meshing/settings.py": (mesh,),
     "optimization/search.py": (search,),
     "optimization/design_file.py": (search,),
+    "usecases/homogenize/job.py": (lattice,),
     "usecases/simulate_and_place/job.py": (study,),
     "usecases/graph/chain_nodes.py": (mesh,),
     "usecases/graph/sweep_nodes.py": (mesh,),
@@ -96,10 +99,15 @@ def options(command):
 
 
 @pytest.mark.parametrize(
-    "d", [mesh.ORDER, mesh.REFINE, study.TIMES, study.STATIONS, study.WORKERS, study.CHECKS, study.PATHS]
+    ("command", "d"),
+    [
+        *(("place", d) for d in (mesh.ORDER, mesh.REFINE, study.TIMES, study.STATIONS)),
+        *(("place", d) for d in (study.WORKERS, study.CHECKS, study.PATHS)),
+        *(("homogenize", d) for d in (lattice.CELLS, lattice.FRICTION, lattice.STRAIN, lattice.REFINE)),
+    ],
 )
-def test_an_option_has_default_and_text_of_its_setting(d):
-    action = options("place")[d.name]
+def test_an_option_has_default_and_text_of_its_setting(command, d):
+    action = options(command)[d.name]
     assert action.default == d.default
     shown = f"{d.default:g}" if d.type is float else d.default
     assert action.help.lower() == f"{d.text} (default: {shown}).".lower()
@@ -112,5 +120,6 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", mesh.STUDY_SELF_CONTACT),
         ("place", study.MESH_CHECK),
         ("sweep", mesh.ORDER),
+        ("homogenize", lattice.REFINE),
     ):
         assert nodes[kind].setting(d.name).description is d

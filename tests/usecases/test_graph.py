@@ -20,7 +20,7 @@ from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.job import Job, job_of_file, read_job
 from mu_addon.usecases.graph.run import USE_CASE
 from mu_addon.usecases.graph.templates import steps_of, template, template_names
-from mu_addon.usecases.homogenize.job import FRICTIONS
+from mu_addon.usecases.homogenize.settings import FRICTIONS
 
 
 def evaluated(tree, kept=None):
@@ -59,7 +59,6 @@ def test_every_step_of_the_core_is_a_node_a_new_one_by_itself(monkeypatch):
 
 
 def test_lists_that_stand_in_for_those_of_the_use_cases():
-    assert study_nodes.SPECIMENS == FRICTIONS
     assert set(FRICTIONS) == set(Friction.__args__)
     assert study_nodes.FORMATS == FORMATS
 

@@ -170,7 +170,7 @@ def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
     ("line", "what"),
     [
         ("cells = 2.5", "2.5 does not fit"),
-        ("cells = 99", "a specimen of 99 cells"),
+        ("cells = 99", "cells = 99 is out of bounds"),
         ("frictions = 3", "3 does not fit"),
         ("colour = 1", "unknown key 'colour'"),
         ("run = 1", "run is not a table"),

@@ -30,8 +30,8 @@ from ..grip.grasp import OF_FIDELITY, Cube, Grip
 from ..grip.job import COARSE, REFINE
 from ..grip.job import Job as GripJob
 from ..grip.run import USE_CASE as GRIP
-from ..homogenize.job import FRICTIONS
 from ..homogenize.job import Job as HomogenizeJob
+from ..homogenize.job import frictions_of
 from ..homogenize.job import resin_of as lattice_resin
 from ..homogenize.run import USE_CASE as HOMOGENIZE
 from ..simulate_and_place.extended_unit import read_extended, require_same_print
@@ -151,12 +151,11 @@ def figure_of(call: Call) -> Outputs:
 def homogenize_order(call: Call) -> Order:
     """The lattice's law by homogenization."""
     s, unit = call.settings, call.inputs["unit"].unit
-    frictions = {BOTH: FRICTIONS, "none": ()}.get(s["specimen"], (s["specimen"],))
     job = HomogenizeJob(
         unit=unit,
-        resin=lattice_resin(s["resin"] or None, unit),
+        resin=lattice_resin(s["resin"], unit),
         cells=s["cells"],
-        frictions=frictions,
+        frictions=frictions_of(s["specimen"]),
         strain=s["strain"],
         refine=s["refine"],
     )

@@ -10,6 +10,8 @@ from ...design.solid import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
+from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
+from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .common_settings import (
     FIDELITY,
@@ -28,7 +30,6 @@ from .parts import refuse_body
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
 BOTH = "both"
 # As the use cases name them, which are not loaded for a look at their nodes; a test compares them.
-SPECIMENS = ("slide", "stick")
 FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
 _QUALITY = setting("quality", "interactive", "how fine the facets are", choices=tuple(QUALITY))
 
@@ -174,18 +175,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "the lattice's law from its struts and its resin",
             (_TAKES_UNIT,),
             (Output("law", "law", "the lattice's law"),),
-            (
-                setting("resin", "", "material of the library or its TOML file; empty: that of the unit"),
-                setting("cells", 3, "cells along a side of the specimen", low=1, high=12),
-                setting(
-                    "specimen",
-                    BOTH,
-                    "contact of the specimen with its plates",
-                    choices=(BOTH, *SPECIMENS, "none"),
-                ),
-                setting("strain", 0.4, "largest compression", low=0.01, high=0.8),
-                setting("refine", 1.0, "what divides the cell's element size", low=0.3, high=4.0),
-            ),
+            tuple(map(Setting, (RESIN, CELLS, SPECIMEN, STRAIN, CELL_REFINE))),
             order=of_orders("homogenize_order"),
             read=of_orders("law_of"),
             muting=_LEFT_OUT,

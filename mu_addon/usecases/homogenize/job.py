@@ -8,13 +8,13 @@ import attrs
 
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.strut_cell import StrutCell, strut_cell
-from ...errors import InputError
 from ...homogenize.cell_mesh import CellMeshSettings
 from ...homogenize.compression import STRAINS, Friction
 from ...materials.library import Material, load_material, read_material
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
+from .settings import BOTH, CELLS, FRICTIONS, REFINE, STRAIN
 
 UNIT = "unit.toml"
 LAYOUT = FolderLayout(
@@ -34,7 +34,6 @@ LAYOUT = FolderLayout(
         "report.html",
     ),
 )
-FRICTIONS: tuple[Friction, ...] = ("slide", "stick")
 RESIN = "elastic-50a-v1"
 # Elements to a strut's diameter in the block: its cell's modulus is within 2 % of a fine mesh's.
 BLOCK_PER_DIAMETER = 1.0
@@ -68,18 +67,10 @@ class Job:
 
     unit: Unit
     resin: Resin
-    cells: int = 3
+    cells: int = CELLS.field()
     frictions: tuple[Friction, ...] = FRICTIONS
-    strain: float = 0.4
-    refine: float = 1.0
-
-    def __attrs_post_init__(self) -> None:
-        if not 1 <= self.cells <= 12:
-            raise InputError(f"a specimen of {self.cells} cells per side", "--cells", "give 1 to 12")
-        if not 0.01 <= self.strain <= 0.8:
-            raise InputError(f"a compression to {self.strain:g}", "--strain", "give a share from 0.01 to 0.8")
-        if not 0.3 <= self.refine <= 4.0:
-            raise InputError(f"refine = {self.refine:g} is out of bounds", "--refine", "give 0.3 to 4")
+    strain: float = STRAIN.field()
+    refine: float = REFINE.field()
 
     @property
     def cell(self) -> StrutCell:
@@ -128,9 +119,14 @@ def read_job(folder: Path) -> Job:
     return structured(Job, values, str(path), unit=read_unit(folder / UNIT))
 
 
+def frictions_of(name: str) -> tuple[Friction, ...]:
+    """Contacts of the specimen that a setting names."""
+    return tuple(f for f in FRICTIONS if name in (f, BOTH))
+
+
 def resin_of(name: str | None, unit: Unit) -> Resin:
     """The resin of a name in the library or of a file; the unit's own without one. Raises InputError."""
-    if name is None:
+    if not name:
         return Resin.of_unit(unit, load_material(RESIN))
     path = Path(name)
     return Resin.of(read_material(path) if path.suffix == ".toml" else load_material(name))
