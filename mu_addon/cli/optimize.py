@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_report, add_results, require_out
+from .options import add_model, add_report, add_results, add_scheduler, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `optimize`."""
+    from ..optimization.settings import WORKERS
+
     command = commands.add_parser(
         "optimize",
         help="Find units that meet targets: bending angles, stiffness, stretch, mass, printability and more.",
@@ -26,29 +28,16 @@ def add(commands: Commands[Any]) -> None:
     add_results(command)
     add_model(command)
     add_report(command)
-    command.add_argument(
-        "--workers",
-        type=int,
-        default=1,
-        metavar="N",
-        help="Number of units simulated in parallel on this machine (default: 1).",
-    )
-    command.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Address of a Dask scheduler whose workers simulate the units, such as tcp://host:8786.",
-    )
+    add_setting(command, WORKERS, "N")
+    add_scheduler(command)
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Search, check what is found, and report."""
-    from ..errors import InputError
     from ..usecases.optimize.job import job_from
     from ..usecases.optimize.run import USE_CASE
 
     require_out(options)
-    if not 1 <= options.workers <= 256:
-        raise InputError(f"{options.workers} is out of bounds", "--workers", "give 1 to 256")
     model = None if options.model is None else Path(options.model)
     job = job_from(Path(options.file), model, options.workers, options.scheduler)
     USE_CASE.start(job, Path(options.out), context)

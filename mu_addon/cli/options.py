@@ -71,6 +71,15 @@ def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
     add_results(command)
 
 
+def add_scheduler(command: argparse.ArgumentParser) -> None:
+    """--scheduler, whose workers simulate in place of this machine's."""
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Address of a Dask scheduler whose workers do the simulations, such as tcp://host:8786.",
+    )
+
+
 def add_model(command: argparse.ArgumentParser) -> None:
     """--model, what a diagnosis found."""
     command.add_argument(
@@ -232,14 +241,9 @@ def fidelity_of(options: argparse.Namespace) -> str:
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
     from ..meshing.settings import ORDER, REFINE
-    from ..usecases.simulate_and_place.settings import SELF_FRICTION, TIMES
+    from ..usecases.simulate_and_place.settings import PROTOCOL, SELF_FRICTION, TIMES
 
-    command.add_argument(
-        "--protocol",
-        metavar="CSV",
-        help="Pressure protocol, CSV with the columns time_s,pressure_kPa (default: the shipped grasp "
-        "protocol).",
-    )
+    add_setting(command, PROTOCOL, "CSV")
     add_setting(command, ORDER, "P")
     add_setting(command, REFINE, "F")
     add_fidelity_of_study(command)

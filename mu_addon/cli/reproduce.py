@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, require_out
+from .options import add_report, add_results, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -27,6 +27,8 @@ def add(commands: Commands[Any]) -> None:
 
 def add_options(command: argparse.ArgumentParser) -> None:
     """Folder, meshes and values of a reproduction."""
+    from ..usecases.simulate_and_place.settings import WORKERS
+
     add_results(command)
     add_report(command)
     command.add_argument(
@@ -53,9 +55,7 @@ def add_options(command: argparse.ArgumentParser) -> None:
         action="store_false",
         help="Leave out the gripper's column, as --coarse does.",
     )
-    command.add_argument(
-        "--workers", type=int, default=2, metavar="N", help="Number of worker processes (default: 2)."
-    )
+    add_setting(command, WORKERS, "N")
 
 
 def settings_of(options: argparse.Namespace) -> Settings:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_solver, require_out
+from .options import add_report, add_solver, help_of, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `resume`."""
+    from ..usecases.simulate_and_place.settings import WORKERS
+
     command = commands.add_parser(
         "resume",
         help="Resume a stopped run, or run again what the inputs in a folder describe.",
@@ -24,7 +26,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--json", action="store_true", help="Write one JSON message per line to standard output."
     )
-    command.add_argument("--workers", type=int, metavar="N", help="Number of worker processes (default: 2).")
+    command.add_argument("--workers", type=int, metavar="N", help=help_of(WORKERS, "that of the command"))
     add_report(command)
     add_solver(command)
 

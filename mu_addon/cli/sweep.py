@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, require_out
+from .options import add_report, add_results, add_scheduler, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `sweep`."""
+    from ..usecases.parameter_study.settings import ADD, WORKERS
+
     command = commands.add_parser(
         "sweep",
         help="Run a parameter study: many studies over ranges of inputs, with one table, main effects and "
@@ -28,34 +30,18 @@ def add(commands: Commands[Any]) -> None:
     )
     add_results(command)
     add_report(command)
-    command.add_argument(
-        "--workers",
-        type=int,
-        default=2,
-        metavar="N",
-        help="Number of studies run in parallel on this machine (default: 2).",
-    )
-    command.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Address of a Dask scheduler whose workers run the studies, such as tcp://host:8786.",
-    )
-    command.add_argument("--add", type=int, default=0, metavar="N", help="Add N points to the study.")
+    add_setting(command, WORKERS, "N")
+    add_scheduler(command)
+    add_setting(command, ADD, "N")
     command.add_argument("--retry", action="store_true", help="Run the failed points again.")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run the points that are not there yet, and report on all."""
-    from ..errors import InputError
     from ..usecases.parameter_study.plan import read_plan
     from ..usecases.parameter_study.run import USE_CASE, Job
 
     require_out(options)
-    for name, least in (("workers", 1), ("add", 0)):
-        if not least <= getattr(options, name) <= 100_000:
-            raise InputError(
-                f"{getattr(options, name)} is out of bounds", f"--{name}", f"give {least} or more"
-            )
     job = Job(
         read_plan(Path(options.file)),
         scheduler=options.scheduler,

@@ -16,6 +16,13 @@ EVALUATIONS = described(
 )
 BATCH = described("batch", 1, "number of units simulated at a time", low=1, high=256)
 SEED = described("seed", 0, "seed of the samples that the search draws", low=0, high=2**31)
+WORKERS = described(
+    "workers",
+    1,
+    "number of units simulated in parallel on this machine; it decides how the search goes",
+    low=1,
+    high=256,
+)
 REFINE = REFINEMENT._replace(default=0.5)
 CHECK_REFINE = described(
     "check_refine",

@@ -11,9 +11,11 @@ from mu_addon.cli.main import parser
 from mu_addon.design.quantity import Description
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
+from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
 from mu_addon.usecases.graph.study_nodes import study_nodes
 from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
 from mu_addon.usecases.homogenize import settings as lattice
+from mu_addon.usecases.parameter_study import settings as sweep
 from mu_addon.usecases.simulate_and_place import settings as study
 
 ROOT = Path(mu_addon.__file__).parent
@@ -21,6 +23,9 @@ STUDY = (mesh, study)
 WHERE = {
     "cli/options.py": STUDY,
     "cli/homogenize.py": (lattice,),
+    "cli/optimize.py": (search,),
+    "cli/sweep.py": (sweep,),
+    "cli/reproduce.py": (study,),
     "cli/place.py": STUDY,
     "cli/simulate.py": STUDY,
     "blender/unit/properties.py": STUDY,
@@ -31,7 +36,12 @@ WHERE = {
     "usecases/homogenize/job.py": (lattice,),
     "usecases/simulate_and_place/job.py": (study,),
     "usecases/graph/chain_nodes.py": (mesh,),
-    "usecases/graph/sweep_nodes.py": (mesh,),
+    "usecases/graph/sweep_nodes.py": (mesh, sweep),
+    "usecases/graph/optimize_nodes.py": (search,),
+    "usecases/optimize/job.py": (search,),
+    "usecases/parameter_study/plan.py": (sweep,),
+    "usecases/parameter_study/run.py": (sweep,),
+    "usecases/reproduce/settings.py": (study,),
 }
 
 
@@ -104,6 +114,8 @@ def options(command):
         *(("place", d) for d in (mesh.ORDER, mesh.REFINE, study.TIMES, study.STATIONS)),
         *(("place", d) for d in (study.WORKERS, study.CHECKS, study.PATHS)),
         *(("homogenize", d) for d in (lattice.CELLS, lattice.FRICTION, lattice.STRAIN, lattice.REFINE)),
+        *(("sweep", d) for d in (sweep.WORKERS, sweep.ADD)),
+        ("optimize", search.WORKERS),
     ],
 )
 def test_an_option_has_default_and_text_of_its_setting(command, d):
@@ -114,12 +126,15 @@ def test_an_option_has_default_and_text_of_its_setting(command, d):
 
 
 def test_nodes_have_the_settings_themselves():
-    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes())}
+    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes(), *optimize_nodes())}
     for kind, d in (
         ("simulate", study.TIMES),
         ("simulate", mesh.STUDY_SELF_CONTACT),
         ("place", study.MESH_CHECK),
         ("sweep", mesh.ORDER),
         ("homogenize", lattice.REFINE),
+        ("sweep", sweep.POINTS),
+        ("sweep", sweep.MEMORY),
+        ("optimize", search.WORKERS),
     ):
         assert nodes[kind].setting(d.name).description is d

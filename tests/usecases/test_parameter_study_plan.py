@@ -178,7 +178,7 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("points = 8", "points = 1", "points = 1"),
         ("points = 8", "points = 1e9", "points"),
         ("points = 8", "pionts = 8", "did you mean 'points'"),
-        ("points = 8", 'method = "random"', "not offered"),
+        ("points = 8", 'method = "random"', "is not known"),
         ("points = 8", "memory_MB = 1", "memory_MB"),
         ("points = 8", "minimize = 3", "list of names"),
         ("times = 7", "times = 1", "times = 1 is out of bounds"),

@@ -15,7 +15,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
-from mu_addon.usecases.simulate_and_place.study_file import STAGES, compose, parse, read
+from mu_addon.usecases.simulate_and_place.settings import STAGES
+from mu_addon.usecases.simulate_and_place.study_file import compose, parse, read
 
 from ..homogenize.lattice_laws import body_centred
 

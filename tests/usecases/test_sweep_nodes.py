@@ -11,13 +11,12 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
-from mu_addon.usecases.graph import sweep_nodes, sweep_orders
+from mu_addon.usecases.graph import sweep_orders
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.parts import Design
-from mu_addon.usecases.parameter_study import cluster, sampling, variable
+from mu_addon.usecases.parameter_study import cluster, variable
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point, version
-from mu_addon.usecases.simulate_and_place.study_file import STAGES
 
 
 def call(kind, inputs=None, **settings):
@@ -36,8 +35,6 @@ def study(*ranges, unit="mu-0.75x", **settings):
 
 
 def test_names_and_choices_are_those_of_the_parameter_study():
-    assert sweep_nodes.METHODS == sampling.METHODS
-    assert sweep_nodes.STAGES == STAGES
     parameters = next(s for s in definitions()["range"].settings if s.name == "parameter")
     assert set(parameters.description.choices) <= set(variable.variable_names())
 

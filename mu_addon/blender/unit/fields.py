@@ -21,6 +21,8 @@ from ..shared.texts import sentence
 UNITS = ("mm", "kPa", "s")
 MILLIMETRES = "DISTANCE_CAMERA"
 """Subtype of a property that is in millimetres in any scene."""
+MOST_INT = 2**31 - 1
+"""The largest whole number of a property in Blender."""
 
 
 def exact(value: float) -> float:
@@ -78,11 +80,12 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
         ]
         return EnumProperty(items=items, default=d.default, **shared)
     if d.type is str:
-        return StringProperty(default=d.default, **shared)
+        return StringProperty(default=d.default, **more, **shared)
     if d.type is bool:
         return BoolProperty(default=d.default, **shared)
     if d.type is int:
-        return IntProperty(default=d.default, min=int(d.low), max=int(d.high), **more, **shared)
+        most = min(int(d.high), MOST_INT)
+        return IntProperty(default=d.default, min=int(d.low), max=most, **more, **shared)
     length = {"subtype": MILLIMETRES} if d.unit == "mm" else {}
     return FloatProperty(
         default=d.default,

@@ -22,7 +22,7 @@ from bpy.props import (
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...meshing.settings import STUDY_SELF_CONTACT
-from ...usecases.simulate_and_place.settings import ORIENTATION, SELF_FRICTION
+from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
 from .fields import blender_property, exact, generated_fields, tied
@@ -125,12 +125,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="auto",
     )
-    protocol: StringProperty(
-        name="Protocol",
-        description="CSV file of time_s,pressure_kPa. Empty: the grasp that comes with the extension",
-        subtype="FILE_PATH",
-        options=BESIDE_BLEND_FILE,
-    )
+    protocol: blender_property(PROTOCOL, options=BESIDE_BLEND_FILE, subtype="FILE_PATH")
     orientation_deg: blender_property(ORIENTATION, name="Gravity (deg)", precision=1, step=100)
     # model.toml of the effects that a diagnosis named beside the unit's parameters, see `effects`.
     effects: StringProperty(options={"HIDDEN"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...graph.definition import Setting
+from ...graph.definition import FILE, Setting
 from ...meshing.settings import FIDELITY as FIDELITY_OF_MANY
 from ...meshing.settings import ORDER as ORDER_OF_ELEMENTS
 from ...meshing.settings import REFINE as REFINEMENT
@@ -15,6 +15,7 @@ FIDELITY, SELF_CONTACT = Setting(STUDY_FIDELITY), Setting(STUDY_SELF_CONTACT)
 QUICK_FIDELITY, QUICK_SELF_CONTACT = Setting(FIDELITY_OF_MANY), Setting(SELF_CONTACT_OF_MANY)
 SELF_FRICTION, TIMES = Setting(study.SELF_FRICTION), Setting(study.TIMES)
 ORIENTATION = Setting(study.ORIENTATION)
+PROTOCOL = Setting(study.PROTOCOL, FILE)
 ORDER, REFINE = Setting(ORDER_OF_ELEMENTS), Setting(REFINEMENT)
 QUICK_TIMES = Setting(study.TIMES._replace(default=7))
 QUICK_REFINE = Setting(REFINEMENT._replace(default=0.5))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...graph.definition import FILE, Definition, Input, Output, Outputs, setting
+from ...graph.definition import FILE, Definition, Input, Output, Outputs, Setting, setting
+from ...optimization.settings import WORKERS
 from .loading import of_orders
 
 OPTIMIZE = "Optimize"
@@ -38,7 +39,7 @@ def optimize_nodes() -> tuple[Definition, ...]:
                     path=FILE,
                 ),
                 setting("proposed", 1, "which of the proposed units", low=1, high=6),
-                setting("workers", 1, "units at a time; decides how the search goes", low=1, high=256),
+                Setting(WORKERS),
             ),
             order=of_orders("optimize_order", _ORDERS),
             read=of_orders("proposed_of", _ORDERS),

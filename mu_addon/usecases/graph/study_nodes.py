@@ -17,6 +17,7 @@ from .common_settings import (
     FIDELITY,
     ORDER,
     ORIENTATION,
+    PROTOCOL,
     QUICK_FIDELITY,
     QUICK_SELF_CONTACT,
     REFINE,
@@ -91,7 +92,7 @@ def study_nodes() -> tuple[Definition, ...]:
             ),
             (Output("study", "study", "the motion"),),
             (
-                setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
+                PROTOCOL,
                 TIMES,
                 ORDER,
                 REFINE,

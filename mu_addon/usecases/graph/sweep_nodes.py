@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from ...errors import InputError
-from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, setting
+from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
+from ..parameter_study import settings as study
 from .common_settings import (
     ORDER,
+    PROTOCOL,
     QUICK_FIDELITY,
     QUICK_REFINE,
     QUICK_SELF_CONTACT,
@@ -16,9 +18,6 @@ from .loading import of_orders
 from .parts import described
 
 STUDY = "Parameter Study"
-# As the parameter study names them, which is not loaded for a look at its nodes; a test compares them.
-METHODS = ("grid", "latin_hypercube", "sobol")
-STAGES = ("design", "simulate", "place")
 FACTOR = "protocol.factor"
 REFINE = "simulate.mesh.refine"
 GOALS = ("largest", "smallest")
@@ -110,16 +109,12 @@ def sweep_nodes() -> tuple[Definition, ...]:
             ),
             (Output("table", "study table", "a row a study"),),
             (
-                setting(
-                    "stages",
-                    "simulate",
-                    "what is done of every study, with what is before it",
-                    choices=STAGES,
-                ),
-                setting("method", "grid", "how points are chosen", choices=METHODS),
-                setting("points", 16, "number of points; a grid has its steps'", low=2, high=10_000),
-                setting("seed", 0, "of a method that draws", low=0, high=1_000_000),
-                setting("protocol", "", "CSV of time_s,pressure_kPa; empty: the shipped grasp", path=FILE),
+                Setting(study.LAST_STAGE),
+                # A range has steps.
+                Setting(study.METHOD._replace(default=study.GRID)),
+                Setting(study.POINTS),
+                Setting(study.SEED),
+                PROTOCOL,
                 QUICK_TIMES,
                 ORDER,
                 QUICK_REFINE,
@@ -128,9 +123,7 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 SELF_FRICTION,
                 setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
                 setting("maximize", "", "columns of the table to make large"),
-                setting("memory_MB", 4000, "one study takes no more", unit="MB", low=300, high=1_000_000),
-                setting("minutes", 60.0, "nor longer", unit="min", low=0.01, high=1e5),
-                setting("workers", 2, "studies at a time; decides no result", low=1, high=256),
+                *map(Setting, (study.MEMORY, study.MINUTES, study.WORKERS)),
             ),
             order=of_orders("sweep_order", _ORDERS),
             read=of_orders("table_of", _ORDERS),

@@ -14,6 +14,7 @@ from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit import materials_of
 from ...meshing.settings import RESOLVED, MeshSettings
 from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
+from ...optimization.settings import WORKERS
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
 from ...run.folder import FolderLayout
@@ -42,7 +43,7 @@ class Job:
 
     design: Design
     model: ExtendedModel | None = None
-    workers: int = 1
+    workers: int = WORKERS.field()
     scheduler: str | None = None
 
     def texts(self) -> dict[str, str]:
@@ -54,7 +55,7 @@ class Job:
 def job_from(
     file: Path,
     model: Path | None = None,
-    workers: int = 1,
+    workers: int = WORKERS.default,
     scheduler: str | None = None,
     unit: Unit | None = None,
     body: Body | None = None,

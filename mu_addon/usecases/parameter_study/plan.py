@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
+from ...design.quantity import Description
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
@@ -19,8 +20,10 @@ from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, read_toml
 from ...toml_writer import toml_text
 from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
-from ..simulate_and_place.study_file import FILES, STAGES
-from .sampling import METHODS, sample
+from ..simulate_and_place.settings import STAGES
+from ..simulate_and_place.study_file import FILES
+from .sampling import sample
+from .settings import GRID, LAST_STAGE, MEMORY, METHOD, MINUTES, MOST_POINTS, POINTS, RESIN, SEED
 from .variable import FILE, Inputs, Variable, changed_inputs, variable
 
 Array = np.ndarray[Any, Any]
@@ -32,7 +35,6 @@ LAYOUT = FolderLayout(
     "# The inputs of this sweep; unit.toml and protocol.csv beside it belong to them.",
     results=(PLAN, TABLE, REPORT),
 )
-MOST_POINTS = 100_000
 _KEYS = (
     "format", "preset", "unit", "protocol", "resin", "stages", "method", "points", "seed", "memory_MB",
     "minutes", "minimize", "maximize", "vary", *STAGES,
@@ -60,14 +62,20 @@ class Plan:
     inputs: Inputs
     variables: tuple[Variable, ...]
     folder: Path
-    method: str = "sobol"
-    count: int = 16
-    seed: int = 0
-    memory_MB: int = 4000
-    minutes: float = 60.0
-    resin: str = "elastic-50a-v1"
+    method: str = METHOD.field()
+    count: int = POINTS.field()
+    seed: int = SEED.field()
+    memory_MB: int = MEMORY.field()
+    minutes: float = MINUTES.field()
+    resin: str = RESIN.field()
     minimize: tuple[str, ...] = ()
     maximize: tuple[str, ...] = ()
+
+    def __attrs_post_init__(self) -> None:
+        if self.size > MOST_POINTS:
+            raise InputError(
+                f"the grid has {self.size} points", "steps", f"give fewer steps: {MOST_POINTS} at most"
+            )
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -77,7 +85,7 @@ class Plan:
     @property
     def size(self) -> int:
         """Number of points: a grid's is its levels'."""
-        if self.method != "grid":
+        if self.method != GRID:
             return self.count
         return int(np.prod([len(v.levels) for v in self.variables]))
 
@@ -85,7 +93,7 @@ class Plan:
         self, before: Array | None = None, count: int | None = None
     ) -> tuple[list[dict[str, Any]], Array]:
         """What each point varies, and places (n, d) in the unit cube; `before` are an earlier plan's."""
-        if self.method == "grid":
+        if self.method == GRID:
             grid = itertools.product(*(v.levels for v in self.variables))
             names = [v.name for v in self.variables]
             return [dict(zip(names, row, strict=True)) for row in grid], np.empty((0, len(names)))
@@ -172,7 +180,7 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
             where,
             'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }',
         )
-    stage = _one_of(document, "stages", STAGES, "simulate", where)
+    stage = _checked(document, LAST_STAGE, where)
     stages = STAGES[: STAGES.index(stage) + 1]
     tables: dict[str, dict[str, Any]] = {name: _settings(document, name, where) for name in stages}
     for name in STAGES[len(stages) :]:
@@ -186,19 +194,11 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
         inputs=inputs,
         variables=variables,
         folder=folder if files is None else files,
-        method=_one_of(document, "method", METHODS, "sobol", where),
-        count=int(_number(document, "points", 16, 2, MOST_POINTS, where, whole=True)),
-        seed=int(_number(document, "seed", 0, 0, 2**31, where, whole=True)),
-        memory_MB=int(_number(document, "memory_MB", 4000, 300, 10_000_000, where, whole=True)),
-        minutes=_number(document, "minutes", 60, 0.01, 1e5, where),
-        resin=_word(document, "resin", "elastic-50a-v1", where),
+        count=_checked(document, POINTS, where),
+        **{d.name: _checked(document, d, where) for d in (METHOD, SEED, MEMORY, MINUTES, RESIN)},
         minimize=_words(document, "minimize", where),
         maximize=_words(document, "maximize", where),
     )
-    if plan.size > MOST_POINTS:
-        raise InputError(
-            f"the grid has {plan.size} points", where, f"give fewer steps: {MOST_POINTS} at most"
-        )
     # A setting that is wrong for every point is told before any work, and not as many failures.
     job_with(tables, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
     for v in variables:
@@ -236,8 +236,8 @@ def _unit(document: Mapping[str, Any], folder: Path, where: str) -> Unit:
     if ("preset" in document) == ("unit" in document):
         raise InputError("no unit is given", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
     if "preset" in document:
-        return load_preset(_word(document, "preset", "", where))
-    return read_unit(folder / _word(document, "unit", "", where))
+        return load_preset(_word(document, "preset", where))
+    return read_unit(folder / _word(document, "unit", where))
 
 
 def _protocol(document: Mapping[str, Any], folder: Path) -> Protocol:
@@ -245,8 +245,8 @@ def _protocol(document: Mapping[str, Any], folder: Path) -> Protocol:
     return protocol_of(None if name is None else folder / str(name))
 
 
-def _word(document: Mapping[str, Any], key: str, default: str, where: str) -> str:
-    found = document.get(key, default)
+def _word(document: Mapping[str, Any], key: str, where: str) -> str:
+    found = document[key]
     if not isinstance(found, str):
         raise InputError(f"{key} = {found!r} is not a text", where, "write it in quotes")
     return found
@@ -259,27 +259,8 @@ def _words(document: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]
     return tuple(found)
 
 
-def _one_of(document: Mapping[str, Any], key: str, allowed: tuple[str, ...], default: str, where: str) -> str:
-    found = document.get(key, default)
-    if found not in allowed:
-        raise InputError(f"{key} = {found!r} is not offered", where, f"one of: {', '.join(allowed)}")
-    return str(found)
-
-
-def _number(
-    document: Mapping[str, Any],
-    key: str,
-    default: float,
-    low: float,
-    high: float,
-    where: str,
-    whole: bool = False,
-) -> float:
-    found = document.get(key, default)
-    kinds = int if whole else (int, float)
-    if isinstance(found, bool) or not isinstance(found, kinds) or not low <= found <= high:
-        what = "a whole number" if whole else "a number"
-        raise InputError(
-            f"{key} = {found!r} is out of bounds", where, f"give {what} from {low:g} to {high:g}"
-        )
-    return found
+def _checked(document: Mapping[str, Any], d: Description, where: str) -> Any:
+    try:
+        return d.checked(document.get(d.name, d.default))
+    except InputError as error:
+        raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error

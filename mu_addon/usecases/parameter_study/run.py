@@ -26,6 +26,7 @@ from .found import Found
 from .plan import LAYOUT, PLAN, REPORT, TABLE, Plan, Point, read_plan_of_run
 from .point import Task, run_point, version
 from .report import write_report
+from .settings import ADD, GRID, WORKERS
 
 Array = np.ndarray[Any, Any]
 
@@ -45,13 +46,13 @@ class Job:
 
     plan: Plan
     scheduler: str | None = None
-    workers: int = 2
-    add: int = 0
+    workers: int = WORKERS.field()
+    add: int = ADD.field()
     retry: bool = False
     work: Work = run_point
 
     def __attrs_post_init__(self) -> None:
-        if self.add and self.plan.method == "grid":
+        if self.add and self.plan.method == GRID:
             raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
         _density(self.plan)
 

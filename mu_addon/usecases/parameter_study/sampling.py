@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from .settings import SOBOL
 
-METHODS = ("grid", "latin_hypercube", "sobol")
+Array = np.ndarray[Any, Any]
 
 
 def sample(method: str, count: int, dimensions: int, seed: int, before: Array | None = None) -> Array:
@@ -24,7 +24,7 @@ def sample(method: str, count: int, dimensions: int, seed: int, before: Array | 
     known = np.empty((0, dimensions)) if before is None else before
     if len(known) >= count:
         return known
-    if method == "sobol":
+    if method == SOBOL:
         # A power of two is what the sequence is balanced for; less of it is a beginning.
         whole = qmc.Sobol(dimensions, rng=seed).random_base2(math.ceil(math.log2(max(count, 2))))
         return np.concatenate([known, whole[len(known) : count]])

@@ -16,6 +16,7 @@ from ...reading import file_text, parse_toml
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
+from ..simulate_and_place.settings import WORKERS
 from .values import with_values
 
 TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
@@ -53,7 +54,7 @@ class Settings:
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     # Whether the paper's fourth column is found, too.
     gripper: bool = True
-    workers: int = attrs.field(default=2, validator=between(1, 256))
+    workers: int = WORKERS.field()
 
     @property
     def unit(self) -> Unit:

@@ -31,7 +31,8 @@ from ...run.folder import ALWAYS, OWN
 from ...run.lock import LOCK, FolderLock, holder
 from ...toml_writer import toml_text
 from . import study_file
-from .study_file import FILES, LAYOUT, NAME, STAGES, Tables
+from .settings import STAGES
+from .study_file import FILES, LAYOUT, NAME, Tables
 
 if TYPE_CHECKING:
     from .job import Job

@@ -35,8 +35,8 @@ from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.optics import Optics
 from .named_effects import NamedEffects
-from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STATIONS, TIMES, WORKERS
-from .study_file import FILES, LAYOUT, NAME, STAGES, Tables, compose, holds, read_run
+from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
+from .study_file import FILES, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:

@@ -61,7 +61,8 @@ from .contact_history import history
 from .job import Job
 from .motion import write_model_a
 from .path_motion import keep_motion
-from .study_file import LAYOUT, NAME, STAGES
+from .settings import STAGES
+from .study_file import LAYOUT, NAME
 
 Array = np.ndarray[Any, Any]
 

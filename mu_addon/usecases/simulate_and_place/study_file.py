@@ -12,13 +12,12 @@ from ...reading import file_bytes, parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import digest
 from ...toml_writer import toml_text
+from .settings import STAGES
 
 NAME = "study.toml"
 # The first line, by which a study's folder is known.
 HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
 FORMAT = 2
-# In the order they need each other; a study has the first, the first two or all.
-STAGES = ("design", "simulate", "place")
 # Files of inputs that a stage's table names, each under the key that names it.
 FILES = {
     "unit": "unit.toml",
