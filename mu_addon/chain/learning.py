@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ConvergenceError, InputError
 from .body import PlateBody, PlateState
 from .joint import Joint, fitted
+from .settings import LOADED, PRESSURE_STEP
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
@@ -45,8 +46,7 @@ class Sampling:
     """States from which a joint is learned.
 
     Range about the free state: bend_deg of the tip against the base, twist_deg about the axis, shear and
-    stretch as shares of the height. pressure_step_kPa: largest distance of the pressures of the fit. loaded:
-    whether loaded states are taken at all; without them the potential is quadratic, of the free states'
+    stretch as shares of the height. Without `loaded` states the potential is quadratic, of the free states'
     stiffness alone.
     """
 
@@ -54,8 +54,8 @@ class Sampling:
     twist_deg: float = attrs.field(default=15.0, validator=_share(1.0, 60.0))
     shear: float = attrs.field(default=0.06, validator=_share(0.005, 0.3))
     stretch: float = attrs.field(default=0.04, validator=_share(0.005, 0.3))
-    pressure_step_kPa: float = attrs.field(default=10.0, validator=_share(0.5, 50.0))
-    loaded: bool = True
+    pressure_step_kPa: float = PRESSURE_STEP.field()
+    loaded: bool = LOADED.field()
 
     def size(self, height: float) -> Array:
         """The range (6,) in rad and mm of a unit of a height in mm."""

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, require_out
+from .options import add_report, add_results, help_of, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `chain`."""
+    from ..chain.settings import TIP_MASS
+
     command = commands.add_parser(
         "chain",
         help="Simulate units in series, each with a pressure of its own, under gravity and a load at the "
@@ -33,9 +35,7 @@ def add(commands: Commands[Any]) -> None:
         metavar="MM",
         help="Point x y z that the tip is to reach, in place of the file's protocol or target.",
     )
-    command.add_argument(
-        "--tip-mass", type=float, metavar="G", help="Mass at the tip in g, in place of the file's."
-    )
+    command.add_argument("--tip-mass", type=float, metavar="G", help=help_of(TIP_MASS, "that of the file"))
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

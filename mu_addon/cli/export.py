@@ -6,17 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_unit, modelled_unit
+from .options import add_model, add_setting, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
     from .options import Commands
 
-FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
-
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `export`."""
+    from ..usecases.export.settings import FORMATS, QUALITY, RESIN
+
     command = commands.add_parser(
         "export",
         help="Export a unit as STL, 3MF, STEP and node list. Each file is read back and verified; a "
@@ -42,12 +42,7 @@ def add(commands: Commands[Any]) -> None:
         metavar="F",
         help=f"File formats: {', '.join(FORMATS)} (default: all).",
     )
-    command.add_argument(
-        "--quality",
-        choices=("interactive", "export"),
-        default="export",
-        help="Facet resolution of the solid (default: export).",
-    )
+    add_setting(command, QUALITY)
     command.add_argument(
         "--compensate",
         nargs="?",
@@ -65,11 +60,7 @@ def add(commands: Commands[Any]) -> None:
         help="Vent the cups that trap resin when the unit is built along this direction, away from the "
         "platform: a hole through the wall for each cup, in STL and 3MF, and plug-1.stl, ... to close it.",
     )
-    command.add_argument(
-        "--resin",
-        metavar="NAME|FILE",
-        help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
-    )
+    add_setting(command, RESIN, "NAME|FILE")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

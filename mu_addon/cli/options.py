@@ -19,14 +19,20 @@ Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse g
 def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str | None = None) -> None:
     """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
 
-    Bounds are checked by the job. A text that is empty by default is None without the option.
+    Its name is the setting's without the unit. Bounds are checked by the job. A text that is empty by default
+    is None without the option.
     """
-    option = d.name.replace("_", "-")
-    if d.type is bool:
+    unit = d.unit.replace("/", "_per_")
+    option = (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
+    if d.type is bool and d.default:
         command.add_argument(f"--no-{option}", dest=d.name, action="store_false", help=f"Do not {d.text}.")
+    elif d.type is bool:
+        words = f"{d.text[:1].upper()}{d.text[1:]}."
+        command.add_argument(f"--{option}", dest=d.name, action="store_true", help=words)
     else:
         command.add_argument(
             f"--{option}",
+            dest=d.name,
             type=d.type,
             choices=d.choices or None,
             default=d.default if d.default != "" else None,
@@ -39,7 +45,7 @@ def help_of(d: Description, default: str = "") -> str:
     """Help of a setting's option; default: in words, where it is not the setting's own."""
     own = {True: "yes", False: "no"}.get(d.default, d.default) if d.type is bool else d.default
     text, _, empty = d.text.partition("; empty: ")
-    shown = default or empty or (f"{own:g}" if d.type is float else own)
+    shown = default or empty or f"{f'{own:g}' if d.type is float else own} {d.unit}".rstrip()
     return f"{text[:1].upper()}{text[1:]} (default: {shown})."
 
 
@@ -147,12 +153,9 @@ def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> No
 
 def add_solid(command: argparse.ArgumentParser) -> None:
     """Add the option for the STL's facet resolution."""
-    command.add_argument(
-        "--quality",
-        choices=("interactive", "export"),
-        default="interactive",
-        help="Facet resolution of the STL (default: interactive).",
-    )
+    from ..design.settings import QUALITY
+
+    add_setting(command, QUALITY)
 
 
 def add_body(command: argparse.ArgumentParser) -> None:

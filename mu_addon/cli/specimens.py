@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_unit, unit_if_named
+from .options import add_setting, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `specimens`."""
+    from ..usecases.export.settings import RESIN
+
     command = commands.add_parser(
         "specimens",
         help="Write test specimens as STL: lattice cubes, coupons, a gauge for the printer and a part "
@@ -22,11 +24,7 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py specimens --out out/specimens",
     )
     add_unit(command, required=False)
-    command.add_argument(
-        "--resin",
-        metavar="NAME|FILE",
-        help="Resin: a material of the library or a TOML file (default: elastic-50a-v1).",
-    )
+    add_setting(command, RESIN, "NAME|FILE")
     command.add_argument(
         "--printer",
         default="form-4-elastic-50a",

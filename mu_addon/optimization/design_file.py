@@ -15,6 +15,7 @@ from ..design.body import Body, envelope, read_body
 from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
 from ..design.quantity import Description
+from ..design.settings import USUAL_RESIN
 from ..design.toml_text import nearest
 from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
@@ -250,7 +251,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
         fidelity=_word(document, "fidelity", FIDELITY.default, origin, FIDELITY.choices),
     )
     resin, printer = (
-        _word(document, "resin", "elastic-50a-v1", origin),
+        _word(document, "resin", USUAL_RESIN, origin),
         _word(document, "printer", DEFAULT, origin),
     )
     material = _material(resin, folder, f"{origin}, resin")

@@ -7,13 +7,18 @@ from pathlib import Path
 import pytest
 
 import mu_addon
+from mu_addon.chain import settings as chain
 from mu_addon.cli.main import parser
+from mu_addon.design import settings as design
 from mu_addon.design.quantity import Description
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
+from mu_addon.usecases.export import settings as export
+from mu_addon.usecases.graph.chain_nodes import chain_nodes
 from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
 from mu_addon.usecases.graph.study_nodes import study_nodes
 from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
+from mu_addon.usecases.grip import settings as grip
 from mu_addon.usecases.homogenize import settings as lattice
 from mu_addon.usecases.parameter_study import settings as sweep
 from mu_addon.usecases.simulate_and_place import settings as study
@@ -22,20 +27,31 @@ ROOT = Path(mu_addon.__file__).parent
 STUDY = (mesh, study)
 WHERE = {
     "cli/options.py": STUDY,
+    "cli/chain.py": (chain,),
+    "cli/export.py": (export,),
+    "cli/grip.py": (mesh, design, grip),
     "cli/homogenize.py": (lattice,),
     "cli/optimize.py": (search,),
     "cli/sweep.py": (sweep,),
     "cli/reproduce.py": (study,),
     "cli/place.py": STUDY,
     "cli/simulate.py": STUDY,
+    "blender/gripper/properties.py": (mesh, grip),
     "blender/unit/properties.py": STUDY,
     "blender/optimize/properties.py": (search,),
+    "chain/learning.py": (chain,),
     "meshing/settings.py": (mesh,),
     "optimization/search.py": (search,),
     "optimization/design_file.py": (search,),
     "usecases/homogenize/job.py": (lattice,),
-    "usecases/simulate_and_place/job.py": (study,),
-    "usecases/graph/chain_nodes.py": (mesh,),
+    "usecases/simulate_and_place/job.py": (*STUDY, design),
+    "usecases/chain/job.py": (chain,),
+    "usecases/diagnose/job.py": (mesh,),
+    "usecases/diagnose/design_experiments.py": (mesh,),
+    "usecases/export/job.py": (export,),
+    "usecases/grip/grasp.py": (grip,),
+    "usecases/grip/job.py": (mesh, design, grip),
+    "usecases/graph/chain_nodes.py": (mesh, chain),
     "usecases/graph/sweep_nodes.py": (mesh, sweep),
     "usecases/graph/optimize_nodes.py": (search,),
     "usecases/optimize/job.py": (search,),
@@ -116,17 +132,20 @@ def options(command):
         *(("homogenize", d) for d in (lattice.CELLS, lattice.FRICTION, lattice.STRAIN, lattice.REFINE)),
         *(("sweep", d) for d in (sweep.WORKERS, sweep.ADD)),
         ("optimize", search.WORKERS),
+        *(("grip", d) for d in (grip.DENSITY, grip.FRICTION, grip.BEYOND, design.QUALITY)),
+        ("export", export.QUALITY),
     ],
 )
 def test_an_option_has_default_and_text_of_its_setting(command, d):
     action = options(command)[d.name]
     assert action.default == d.default
     shown = f"{d.default:g}" if d.type is float else d.default
+    shown = f"{shown} {d.unit}" if d.unit else shown
     assert action.help.lower() == f"{d.text} (default: {shown}).".lower()
 
 
 def test_nodes_have_the_settings_themselves():
-    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes(), *optimize_nodes())}
+    nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes(), *optimize_nodes(), *chain_nodes())}
     for kind, d in (
         ("simulate", study.TIMES),
         ("simulate", mesh.STUDY_SELF_CONTACT),
@@ -134,6 +153,9 @@ def test_nodes_have_the_settings_themselves():
         ("sweep", mesh.ORDER),
         ("homogenize", lattice.REFINE),
         ("sweep", sweep.POINTS),
+        ("grip", grip.DENSITY),
+        ("export", export.QUALITY),
+        ("chain", chain.TIP_MASS),
         ("sweep", sweep.MEMORY),
         ("optimize", search.WORKERS),
     ):

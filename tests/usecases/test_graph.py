@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset, preset_names
+from mu_addon.design.settings import QUALITY
+from mu_addon.design.solid import QUALITY as FACETS
 from mu_addon.design.steps import STEPS, Stack, Step, StepInputs
 from mu_addon.errors import InputError
 from mu_addon.graph import Evaluation, Kept, Node, NodeTree, Source, faults, read_tree, tree_text
 from mu_addon.homogenize.compression import Friction
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.export.job import FORMATS
-from mu_addon.usecases.graph import design_nodes, study_nodes
+from mu_addon.usecases.graph import design_nodes
 from mu_addon.usecases.graph.comparison import compare
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.job import Job, job_of_file, read_job
@@ -60,7 +61,7 @@ def test_every_step_of_the_core_is_a_node_a_new_one_by_itself(monkeypatch):
 
 def test_lists_that_stand_in_for_those_of_the_use_cases():
     assert set(FRICTIONS) == set(Friction.__args__)
-    assert study_nodes.FORMATS == FORMATS
+    assert QUALITY.choices == tuple(FACETS)
 
 
 @pytest.mark.parametrize("path", ["", "alpha4"])

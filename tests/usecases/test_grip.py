@@ -168,7 +168,7 @@ def test_the_printable_part_from_the_command_line(tmp_path, capsys):
     [
         (["--preset", "gripper", "--cube", "40"], "does not fit"),
         (["--preset", "mu-1.0x"], "not a gripper"),
-        (["--preset", "gripper", "--friction", "-1"], "friction coefficient of -1"),
+        (["--preset", "gripper", "--friction", "-1"], "friction = -1 is out of bounds"),
         (["--preset", "gripper", "--cube", "25", "25"], "same side"),
     ],
 )

@@ -8,11 +8,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
-from ...design.rigid_body import FRICTION
+from ...meshing.settings import SELF_CONTACT
+from ...usecases.grip.settings import DENSITY, FRICTION
 from ..shared import displays
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.fields import MILLIMETRES, exact, generated_fields, millimetres
+from ..unit.fields import MILLIMETRES, blender_property, exact, generated_fields, millimetres
 from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()
@@ -90,21 +91,8 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             set=_put_cube,
             options={"SKIP_SAVE"},
         ),
-        "density_g_per_ml": FloatProperty(
-            name="Density (g/ml)",
-            description="Of the cube, which decides its weight. The default is solid PLA, assumed",
-            default=1.24,
-            min=0.001,
-            max=25.0,
-        ),
-        "friction": FloatProperty(
-            name="Friction",
-            description="Coefficient of Coulomb friction between fingers and cube. The default is assumed: "
-            "dry elastomers on hard plastics mostly have 0.5 to 1 and above",
-            default=FRICTION,
-            min=0.0,
-            max=5.0,
-        ),
+        "density_g_per_ml": blender_property(DENSITY, name="Density (g/ml)", precision=2),
+        "friction": blender_property(FRICTION, precision=2),
         "detail": EnumProperty(
             name="Job",
             description="What is done",
@@ -124,10 +112,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             description="Simulate the fingers strut by strut, and paths as printed waveguides, in place of a "
             "continuum for the lattice: about ten times the time",
         ),
-        "self_contact": BoolProperty(
-            name="Self-Contact",
-            description="Keep walls and struts apart where they meet under vacuum, in several times the time",
-        ),
+        "self_contact": blender_property(SELF_CONTACT, name="Self-Contact"),
         "folder": StringProperty(
             name="Grasp Folder",
             description="Folder of the results. Empty: beside the .blend file, or the user's folder",

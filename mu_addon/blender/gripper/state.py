@@ -37,28 +37,21 @@ GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", h
 def job_of(root: Any) -> Job:
     """The grasp that a gripper's properties ask for; raises InputError."""
     # Only now: they bring in the solver's packages, which a Blender may lack.
-    from ...meshing.settings import HOMOGENISED, RESOLVED, MeshSettings
-    from ...placement.inclusion import PRINTED, RULES
-    from ...usecases.grip.grasp import OF_FIDELITY, Cube, Grip
-    from ...usecases.grip.job import COARSE, REFINE, Job
+    from ...meshing.settings import HOMOGENISED, RESOLVED
+    from ...usecases.grip.grasp import Cube, Grip
+    from ...usecases.grip.job import Job, detailed
 
     props = root.mu_gripper
-    grasps, quick = props.detail != "part", props.detail == "quick"
-    fidelity = RESOLVED if props.printed_struts else HOMOGENISED
-    rules = (PRINTED,) if props.printed_struts else RULES
-    grip = Grip(
-        friction=exact(props.friction),
-        beyond_mm=gripper_object.beyond_mm(root),
-        step_s=1.0 if quick else 0.5,
-        **OF_FIDELITY[fidelity],
-    )
+    grasps = props.detail != "part"
+    detail = detailed(props.detail == "quick", RESOLVED if props.printed_struts else HOMOGENISED)
+    grip = detail.grip(friction=exact(props.friction), beyond_mm=gripper_object.beyond_mm(root))
     return Job(
         gripper=to_gripper(props),
         cubes=(Cube(_side(props), exact(props.density_g_per_ml)),) if grasps else (),
         grip=grip if grasps else Grip(),
-        mesh=MeshSettings(refine=COARSE if quick else REFINE, fidelity=fidelity),
+        mesh=detail.mesh,
         self_contact=props.printed_struts and props.self_contact,
-        rules=rules if props.detail == "paths" else (),
+        rules=detail.rules if props.detail == "paths" else (),
     )
 
 

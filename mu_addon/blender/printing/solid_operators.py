@@ -8,9 +8,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ...design import settings
 from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
 from ..shared.operators import ValidUnitOperator, reports_errors
+from ..shared.texts import sentence
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 from . import layer
@@ -20,7 +22,7 @@ _QUALITY = [
     (name, name.capitalize(), f"{f.around_axis} facets around the axis, {f.around_strut} around a strut")
     for name, f in QUALITY.items()
 ]
-_FACETS = "How finely round parts are cut into flat ones"
+_FACETS = sentence(settings.QUALITY.text)
 
 
 class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
@@ -30,7 +32,9 @@ class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
     bl_label = "Build Solid"
     bl_options = {"REGISTER", "UNDO"}
 
-    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="interactive")
+    quality: EnumProperty(
+        name="Quality", description=_FACETS, items=_QUALITY, default=settings.QUALITY.default
+    )
 
     @reports_errors
     def execute(self, context):

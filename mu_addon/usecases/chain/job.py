@@ -10,7 +10,9 @@ import attrs
 import numpy as np
 
 from ...chain.learning import Sampling
+from ...chain.settings import GRAVITY, REFINE, TIMES, TIP_MASS
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
+from ...design.settings import USUAL_RESIN
 from ...errors import InputError
 from ...fem.protocol import read_protocol_text
 from ...meshing.settings import MeshSettings
@@ -30,8 +32,6 @@ LAYOUT = FolderLayout(
     optional=(PROTOCOL, *(f"unit_{n}.toml" for n in range(1, 9))),
 )  # fmt: skip
 MOST_UNITS = 8
-REFINE = 0.5
-"""What divides the element sizes of the units' meshes."""
 _ENTRY = ("preset", "file", "turn_deg", "pressure_kPa")
 
 
@@ -105,14 +105,14 @@ class Job:
     units: tuple[ChainUnit, ...]
     protocol: Pressures | None = None
     target: Target | None = None
-    gravity: bool = True
+    gravity: bool = GRAVITY.field()
     orientation_deg: float = 0.0
-    tip_mass_g: float = 0.0
+    tip_mass_g: float = TIP_MASS.field()
     tip_force_N: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tip_couple_N_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    resin: str = "elastic-50a-v1"
-    times: int = 13
-    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE, fraction="full"))
+    resin: str = USUAL_RESIN
+    times: int = TIMES.field()
+    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE.default, fraction="full"))
     joint: Sampling = attrs.field(factory=Sampling)
 
     def __attrs_post_init__(self) -> None:
@@ -129,10 +129,6 @@ class Job:
                 "[[unit]] pressure_kPa",
                 "give pressure_kPa = [low, high] to each unit that is to move",
             )
-        if not 2 <= self.times <= 10_000:
-            raise InputError(f"times = {self.times}", "times", "give 2 to 10000 instants")
-        if not 0.0 <= self.tip_mass_g <= 1e5:
-            raise InputError(f"tip_mass_g = {self.tip_mass_g:g}", "tip_mass_g", "give g, from 0 on")
         numbers = (self.orientation_deg, *self.tip_force_N, *self.tip_couple_N_mm)
         if not np.isfinite(numbers).all():
             raise InputError("a load or the orientation is no number", "chain.toml", "give finite numbers")
@@ -201,7 +197,7 @@ def read_chain(path: Path, changes: Mapping[str, Any] | None = None) -> Job:
     mesh = values.get("mesh")
     if isinstance(mesh, dict):
         mesh.setdefault("fraction", "full")
-        mesh.setdefault("refine", REFINE)
+        mesh.setdefault("refine", REFINE.default)
     return structured(Job, values, str(path), units=units, protocol=protocol)
 
 

@@ -12,6 +12,7 @@ from ...design.anchors import Window, window
 from ...design.body import MOST_MM
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.printer import Printer, printer_text, read_printer
+from ...design.settings import QUALITY
 from ...design.surface import Triangles, Vertices
 from ...design.surface_file import read_surface
 from ...errors import InputError
@@ -48,7 +49,7 @@ class Job:
     printer: Printer
     unit: Unit | None = None
     window: Window | None = None
-    quality: str = "interactive"
+    quality: str = QUALITY.field()
     stl: bytes | None = None
     stl_file: Path | None = None
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)

@@ -20,7 +20,13 @@ from ...evidence.simulator import Composite
 from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
-from ...meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings, require_self_contact_resolvable
+from ...meshing.settings import (
+    FIDELITY,
+    HOMOGENISED,
+    SELF_CONTACT,
+    MeshSettings,
+    require_self_contact_resolvable,
+)
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
@@ -95,8 +101,8 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
-    fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
-    self_contact: bool = False
+    fidelity: str = FIDELITY.field()
+    self_contact: bool = SELF_CONTACT.field()
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)

@@ -16,7 +16,14 @@ from ...evidence.extended import ExtendedModel, load_model
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
 from ...measured.kinds import OF_A_UNIT
-from ...meshing.settings import FIDELITIES, HOMOGENISED, MeshSettings, require_self_contact_resolvable
+from ...meshing.settings import (
+    FIDELITIES,
+    FIDELITY,
+    HOMOGENISED,
+    SELF_CONTACT,
+    MeshSettings,
+    require_self_contact_resolvable,
+)
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
 from ...toml_writer import toml_text
@@ -50,9 +57,9 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
-    fidelity: str = attrs.field(default=HOMOGENISED, validator=attrs.validators.in_(FIDELITIES))
+    fidelity: str = FIDELITY.field()
     known: ExtendedModel | None = None
-    self_contact: bool = False
+    self_contact: bool = SELF_CONTACT.field()
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)

@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 
 from ...design.anchors import Window, window
 from ...design.parameters import Unit, read_unit, to_toml
-from ...design.solid import QUALITY
+from ...design.settings import USUAL_RESIN
 from ...errors import InputError
 from ...materials.library import Material, load_material, material_text, read_material
 from ...reading import file_text, unreadable
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
+from .settings import FORMATS, QUALITY
 
 Array = NDArray[np.float64]
 
 UNIT, RESIN = "unit.toml", "resin.toml"
-USUAL_RESIN = "elastic-50a-v1"
-FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
 MANIFEST = "manifest.json"
 # Characters of a path's points: some ten thousand of them.
 _LONGEST_PATH = 1 << 18
@@ -47,7 +46,7 @@ class Job:
     path: Window | Array | None = None
     path_name: str = ""
     formats: tuple[str, ...] = FORMATS
-    quality: str = "export"
+    quality: str = QUALITY.field()
     take_off: tuple[float, float] = (0.0, 0.0)
     offset_source: str = ""
     vent_along: tuple[float, float, float] | None = None
@@ -61,10 +60,6 @@ class Job:
         if self.vent_along is not None and not 1e-6 < sum(x * x for x in self.vent_along) < 1e12:
             raise InputError(
                 f"{self.vent_along} is not a direction", "--vent-along", "give three numbers, such as 0 0 -1"
-            )
-        if self.quality not in QUALITY:
-            raise InputError(
-                f"there is no quality {self.quality!r}", "--quality", f"one of {', '.join(QUALITY)}"
             )
 
     def texts(self) -> dict[str, str]:
@@ -95,7 +90,7 @@ class _Settings:
     resin: str
     path: str = ""
     formats: tuple[str, ...] = FORMATS
-    quality: str = "export"
+    quality: str = QUALITY.field()
     take_off_mm: tuple[float, float] = (0.0, 0.0)
     offset_source: str = ""
     points_mm: tuple[tuple[float, float, float], ...] = ()

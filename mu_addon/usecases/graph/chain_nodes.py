@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ...graph.definition import FILE, Definition, Input, Output, Outputs, setting
-from .common_settings import ORDER, QUICK_REFINE
+from ...chain import settings as chain
+from ...graph.definition import FILE, Definition, Input, Output, Outputs, Setting, setting
+from .common_settings import ORDER
 from .loading import of_orders
 
 CHAIN = "Chain"
@@ -39,23 +40,16 @@ def chain_nodes() -> tuple[Definition, ...]:
                 ),
                 setting("low_kPa", 0.0, "lowest pressure to reach it by", unit="kPa", low=-99.0, high=1000.0),
                 setting("high_kPa", 30.0, "highest pressure", unit="kPa", low=-99.0, high=1000.0),
-                setting("gravity", True, "whether the units' weight acts"),
+                Setting(chain.GRAVITY),
                 setting(
                     "orientation_deg", 0.0, "of the base about x; 0: hanging", unit="deg", low=-360, high=360
                 ),
-                setting("tip_mass_g", 0.0, "at the middle of the tip", unit="g", low=0.0, high=1e5),
-                setting("times", 13, "instants of the protocol", low=2, high=10_000),
-                setting(
-                    "step_kPa",
-                    10.0,
-                    "pressures between which a joint is interpolated",
-                    unit="kPa",
-                    low=0.5,
-                    high=50.0,
-                ),
-                setting("loaded", True, "learn from loaded states; without: a quick look"),
+                Setting(chain.TIP_MASS),
+                Setting(chain.TIMES),
+                Setting(chain.PRESSURE_STEP._replace(name="step_kPa")),
+                Setting(chain.LOADED),
                 ORDER,
-                QUICK_REFINE,
+                Setting(chain.REFINE),
             ),
             order=of_orders("chain_order", _ORDERS),
             read=of_orders("chain_of", _ORDERS),

@@ -11,13 +11,13 @@ import attrs
 import numpy as np
 
 from ...design.parameters import stated
+from ...design.settings import USUAL_RESIN
 from ...errors import InputError
 from ...files import write_csv
 from ...graph.evaluation import Finished
 from ...materials.library import load_material
 from ...report.charts import BY_LENGTH, BY_START, QUIET, canvas
 from ...report.html import figure, number, table
-from ..export.job import USUAL_RESIN
 from ..parameter_study.csv_columns import figures
 from .orders import Study
 from .parts import Design

@@ -10,7 +10,7 @@ import attrs
 from ...design.anchors import window
 from ...design.lattice import Graph
 from ...design.parameters import from_toml, load_preset, preset_names, read_unit
-from ...design.solid import QUALITY
+from ...design.settings import QUALITY
 from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
@@ -35,9 +35,7 @@ DESIGN, UNIT = "Design", "Unit"
 # Fields of `StepInputs` that are set at the first step which depends on them.
 _CHOSEN = {
     "path": setting("path", "", "path of the waveguide, alpha1 and on; empty: none"),
-    "quality": setting(
-        "quality", "interactive", "how fine the facets of the solid are", choices=tuple(QUALITY)
-    ),
+    "quality": Setting(QUALITY),
     "body": setting(
         "body", "", "closed surface that the lattice fills in place of its box: STL, OBJ or PLY", path=FILE
     ),

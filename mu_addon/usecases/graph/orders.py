@@ -26,9 +26,9 @@ from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..export.job import Job as ExportJob
 from ..export.job import resin_of as export_resin
 from ..export.run import USE_CASE as EXPORT
-from ..grip.grasp import OF_FIDELITY, Cube, Grip
-from ..grip.job import COARSE, REFINE
+from ..grip.grasp import Cube
 from ..grip.job import Job as GripJob
+from ..grip.job import detailed
 from ..grip.run import USE_CASE as GRIP
 from ..homogenize.job import Job as HomogenizeJob
 from ..homogenize.job import frictions_of
@@ -202,22 +202,20 @@ def export_order(call: Call) -> Order:
 def grip_order(call: Call) -> Order:
     """The grasp of a gripper."""
     s = call.settings
-    mesh = MeshSettings(refine=COARSE if s["coarse"] else REFINE, fidelity=s["fidelity"])
-    rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if s["coarse"] else RULES
+    detail = detailed(s["coarse"], s["fidelity"])
     try:
         sides = [float(word) for word in s["cubes_mm"].split()]
     except ValueError:
         raise InputError(
             f"{s['cubes_mm']!r} are no side lengths", "cubes_mm", "give numbers in mm, such as 12.5 25"
         ) from None
-    step_s = 1.0 if s["coarse"] else 0.5
     job = GripJob(
         gripper=call.inputs["gripper"],
         cubes=tuple(Cube(side, s["density_g_per_ml"]) for side in sides),
-        grip=Grip(friction=s["friction"], step_s=step_s, **OF_FIDELITY[s["fidelity"]]),
-        mesh=mesh,
+        grip=detail.grip(friction=s["friction"]),
+        mesh=detail.mesh,
         self_contact=s["self_contact"],
-        rules=rules if s["rank_paths"] else (),
+        rules=detail.rules if s["rank_paths"] else (),
     )
     return Order(GRIP, job)
 

@@ -6,10 +6,13 @@ from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
 from ...design.rigid_body import FRICTION, RigidBody
-from ...design.solid import QUALITY
+from ...design.settings import QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
+from ..export import settings as export
+from ..grip.settings import COARSE, CUBES, DENSITY
+from ..grip.settings import FRICTION as GRIP_FRICTION
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
 from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
@@ -30,9 +33,6 @@ from .parts import refuse_body
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
 BOTH = "both"
-# As the use cases name them, which are not loaded for a look at their nodes; a test compares them.
-FORMATS = ("stl", "3mf", "3mf-beams", "step", "txt")
-_QUALITY = setting("quality", "interactive", "how fine the facets are", choices=tuple(QUALITY))
 
 
 def _gripper(call: Call) -> Outputs:
@@ -194,7 +194,7 @@ def study_nodes() -> tuple[Definition, ...]:
                 setting("up_x", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
                 setting("up_y", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
                 setting("up_z", 1.0, "build direction, away from the platform", low=-1e3, high=1e3),
-                _QUALITY,
+                Setting(QUALITY),
             ),
             order=of_orders("check_order"),
             read=of_orders("check_of"),
@@ -209,9 +209,9 @@ def study_nodes() -> tuple[Definition, ...]:
             (_TAKES_UNIT,),
             (Output("files", "file", "the files"),),
             (
-                setting("formats", " ".join(FORMATS), f"some of {', '.join(FORMATS)}"),
-                setting("quality", "export", "how fine the facets are", choices=tuple(QUALITY)),
-                setting("resin", "", "material of the library or its TOML file; empty: Elastic 50A"),
+                setting("formats", " ".join(export.FORMATS), f"some of {', '.join(export.FORMATS)}"),
+                Setting(export.QUALITY),
+                Setting(export.RESIN),
             ),
             order=of_orders("export_order"),
             read=lambda call, done: {"files": done},
@@ -240,10 +240,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (Input("gripper", ("gripper",), "link a gripper"),),
             (Output("grasp", "grasp", "the grasp"),),
             (
-                setting("cubes_mm", "12.5 25", "side lengths of the cubes in mm"),
-                setting("density_g_per_ml", 1.24, "density of the cubes", unit="g/ml", low=0.01, high=25),
-                setting("friction", 0.5, "coefficient of friction", low=0, high=5),
-                setting("coarse", False, "a coarser mesh, longer time steps, one inclusion rule"),
+                *(Setting(d) for d in (CUBES, DENSITY, GRIP_FRICTION, COARSE)),
                 setting("rank_paths", True, "rank the paths of a finger's sensor"),
                 QUICK_FIDELITY,
                 QUICK_SELF_CONTACT,

@@ -31,6 +31,7 @@ from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
 from .phases import Phases
+from .settings import BEYOND, DENSITY, FRICTION
 
 Array = np.ndarray[Any, Any]
 
@@ -41,17 +42,17 @@ COMES_FROM = 1.5
 # The balance of weight and friction is found to this share of the weight, with so many tries.
 BALANCE = 1e-3
 MOST_SECANTS = 8
+MOST_SIDE_MM = 200.0
 # Steps in mm by which a cube is pulled out of the grasp, and how far at most.
 PULL_STEP_MM = 1.0
 PULL_MOST_MM = 10.0
 
 
-def _above(low: float, high: float, what: str, remedy: str) -> Any:
-    def check(_: object, field: attrs.Attribute[float], value: float) -> None:
-        if not low < value <= high:
-            raise InputError(f"{what} of {value:g}", field.name, f"{remedy}, above {low:g} to {high:g}")
-
-    return check
+def _side(_: object, field: attrs.Attribute[float], value: float) -> None:
+    if not 0.0 < value <= MOST_SIDE_MM:
+        raise InputError(
+            f"a cube with a side length of {value:g}", field.name, f"give mm, above 0 to {MOST_SIDE_MM:g}"
+        )
 
 
 @attrs.frozen
@@ -62,8 +63,8 @@ class Cube:
     lighter.
     """
 
-    side_mm: float = attrs.field(validator=_above(0.0, 200.0, "a cube with a side length", "give mm"))
-    density_g_per_ml: float = attrs.field(default=1.24, validator=_above(0.0, 25.0, "a density", "give g/ml"))
+    side_mm: float = attrs.field(validator=_side)
+    density_g_per_ml: float = DENSITY.field()
 
     @property
     def mass_g(self) -> float:
@@ -80,14 +81,13 @@ class Cube:
 class Grip:
     """How fingers and cube meet.
 
-    friction: Coulomb's coefficient, assumed: dry elastomers on hard plastics mostly have 0.5 to 1 and above,
-    the cautious end is taken. beyond_mm: how far the cube's middle lies beyond the tips at rest, assumed: the
-    tips' edges then meet both cubes near the middle of their sides. pressure_MPa, depth_mm, stick_mm and
-    halvings: of the contact, see `Obstacle`. step_s: longest time between instants.
+    friction: the cautious end of what is known is taken. beyond_mm: assumed, the tips' edges then meet both
+    cubes near the middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see
+    `Obstacle`. step_s: longest time between instants.
     """
 
-    friction: float = 0.5
-    beyond_mm: float = 3.0
+    friction: float = FRICTION.field()
+    beyond_mm: float = BEYOND.field()
     pressure_MPa: float = 0.02
     depth_mm: float = 0.1
     stick_mm: float = 0.1
@@ -95,10 +95,6 @@ class Grip:
     step_s: float = 0.5
 
     def __attrs_post_init__(self) -> None:
-        if not 0.0 <= self.friction <= 5.0:
-            raise InputError(f"a friction coefficient of {self.friction:g}", "--friction", "give 0 to 5")
-        if not -50.0 <= self.beyond_mm <= 50.0:
-            raise InputError(f"a cube {self.beyond_mm:g} mm beyond the tips", "--beyond", "give -50 to 50 mm")
         if not 0.0 < self.step_s <= 2.0:
             raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import attrs
 
 from ...design.gripper import Gripper, read_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
-from ...design.solid import QUALITY
+from ...design.settings import QUALITY
 from ...errors import InputError
-from ...meshing.settings import MeshSettings, require_self_contact_resolvable
+from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
 from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...sensing.optics import Optics
 from ...toml_writer import toml_text
-from .grasp import Cube, Grip
+from .grasp import OF_FIDELITY, Cube, Grip
 from .phases import Phases, read_phases, shipped_phases
+from .settings import COARSE_REFINE, REFINE, SIDES
 
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
@@ -35,9 +37,27 @@ LAYOUT = FolderLayout(
         "report.html",
     ),
 )
-CUBES = (12.5, 25.0)
-REFINE, COARSE = 0.5, 0.4
-"""What divides the element sizes, and for a quick look."""
+
+
+@attrs.frozen
+class Detail:
+    """How finely a grasp is computed: mesh, inclusion rules and the longest time between instants."""
+
+    mesh: MeshSettings
+    rules: tuple[str, ...]
+    step_s: float
+
+    def grip(self, **values: Any) -> Grip:
+        """How fingers and cube meet, with values of `Grip`."""
+        return Grip(step_s=self.step_s, **OF_FIDELITY[self.mesh.fidelity], **values)
+
+
+def detailed(coarse: bool, fidelity: str, refine: float | None = None) -> Detail:
+    """The detail of a quick look, or of a whole run; refine: in place of what belongs to it."""
+    own = COARSE_REFINE if coarse else REFINE.default
+    mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity)
+    rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if coarse else RULES
+    return Detail(mesh, rules, 1.0 if coarse else 0.5)
 
 
 @attrs.frozen
@@ -48,14 +68,14 @@ class Job:
     """
 
     gripper: Gripper
-    cubes: tuple[Cube, ...] = tuple(Cube(side) for side in CUBES)
+    cubes: tuple[Cube, ...] = tuple(Cube(side) for side in SIDES)
     grip: Grip = attrs.field(factory=Grip)
     phases: Phases = attrs.field(factory=shipped_phases)
-    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE))
+    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE.default))
     rules: tuple[str, ...] = RULES
-    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
+    quality: str = QUALITY.field()
     optics: Optics = attrs.field(factory=Optics)
-    self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
+    self_contact: bool = SELF_CONTACT.field()
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(self.mesh, self.self_contact)

@@ -14,9 +14,10 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .grasp import Cube
 from .gripping import Gripping
-from .job import CUBES, LAYOUT, REFINE, Job, read_job
+from .job import LAYOUT, Job, read_job
 from .path_deviation import path_deviations
 from .report import write_report
+from .settings import REFINE, SIDES
 
 
 def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
@@ -28,9 +29,9 @@ def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
 
 
 def gripper_path_deviations(
-    refine: float = REFINE,
+    refine: float = REFINE.default,
     rule: str = "volume_fraction",
-    cube: Cube | None = Cube(CUBES[-1]),  # noqa: B008 - frozen
+    cube: Cube | None = Cube(SIDES[-1]),  # noqa: B008 - frozen
     gripper: Gripper | None = None,
 ) -> dict[str, float]:
     """J_hat in mm by path of a finger of the gripper: on a cube, or closing on nothing with None.

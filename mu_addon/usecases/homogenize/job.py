@@ -7,6 +7,7 @@ from pathlib import Path
 import attrs
 
 from ...design.parameters import Unit, read_unit, to_toml
+from ...design.settings import USUAL_RESIN
 from ...design.strut_cell import StrutCell, strut_cell
 from ...homogenize.cell_mesh import CellMeshSettings
 from ...homogenize.compression import STRAINS, Friction
@@ -34,7 +35,6 @@ LAYOUT = FolderLayout(
         "report.html",
     ),
 )
-RESIN = "elastic-50a-v1"
 # Elements to a strut's diameter in the block: its cell's modulus is within 2 % of a fine mesh's.
 BLOCK_PER_DIAMETER = 1.0
 
@@ -127,6 +127,6 @@ def frictions_of(name: str) -> tuple[Friction, ...]:
 def resin_of(name: str | None, unit: Unit) -> Resin:
     """The resin of a name in the library or of a file; the unit's own without one. Raises InputError."""
     if not name:
-        return Resin.of_unit(unit, load_material(RESIN))
+        return Resin.of_unit(unit, load_material(USUAL_RESIN))
     path = Path(name)
     return Resin.of(read_material(path) if path.suffix == ".toml" else load_material(name))

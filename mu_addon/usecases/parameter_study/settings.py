@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...design.quantity import described
+from ...design.settings import USUAL_RESIN
 from ..simulate_and_place.settings import STAGES
 from ..simulate_and_place.settings import WORKERS as PROCESSES
 
@@ -14,6 +15,6 @@ POINTS = described("points", 16, "number of points; a grid has that of its steps
 SEED = described("seed", 0, "seed of a method that draws", low=0, high=2**31)
 MEMORY = described("memory_MB", 4000, "largest memory of a study", unit="MB", low=300, high=10_000_000)
 MINUTES = described("minutes", 60.0, "longest time of a study", unit="min", low=0.01, high=1e5)
-RESIN = described("resin", "elastic-50a-v1", "material whose density gives the mass")
+RESIN = described("resin", USUAL_RESIN, "material whose density gives the mass")
 WORKERS = PROCESSES._replace(text="number of studies run in parallel on this machine; it decides no result")
 ADD = described("add", 0, "number of points to add to the study", low=0, high=MOST_POINTS)

@@ -16,8 +16,8 @@ from ...errors import ConvergenceError
 from ...placement.inclusion import RULES
 from ...run.cache import Cache, key
 from ..grip.grasp import Cube
-from ..grip.job import CUBES
 from ..grip.run import gripper_path_deviations
+from ..grip.settings import SIDES
 from .published import GRIPPER
 from .values import RULE, with_values
 
@@ -64,5 +64,5 @@ def solved(task: Task, cache: Cache) -> Array | str:
 
 def tasks(values: Mapping[str, Any], paths: Sequence[str], refine: float) -> list[Task]:
     """On nothing by both rules, on each cube by the one that decides."""
-    columns = [(rule, 0.0) for rule in RULES] + [(RULE, side) for side in CUBES]
+    columns = [(rule, 0.0) for rule in RULES] + [(RULE, side) for side in SIDES]
     return [Task(values, rule, side, refine, tuple(paths)) for rule, side in columns]

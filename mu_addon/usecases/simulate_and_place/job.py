@@ -16,7 +16,7 @@ from ...design.assets import asset_root
 from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
-from ...design.solid import QUALITY
+from ...design.settings import QUALITY
 from ...errors import InputError
 from ...fem.newton_settings import (
     CONTACT_NEWTON,
@@ -27,7 +27,7 @@ from ...fem.newton_settings import (
 )
 from ...fem.protocol import Protocol, read_protocol
 from ...fem.solver import SolverChoice
-from ...meshing.settings import MeshSettings, require_self_contact_resolvable
+from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
 from ...placement.graph import Limits
 from ...placement.inclusion import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
@@ -71,7 +71,7 @@ class Job:
     times: int = TIMES.field()
     stations: int = STATIONS.field()
     rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
-    quality: str = attrs.field(default="interactive", validator=attrs.validators.in_(tuple(QUALITY)))
+    quality: str = QUALITY.field()
     workers: int = WORKERS.field()
     mesh_check: bool = MESH_CHECK.field()
     paths: str = PATHS.field()
@@ -88,7 +88,7 @@ class Job:
     # What measured data named beside what the unit has parameters for, and the direction of gravity.
     effects: NamedEffects = attrs.field(factory=NamedEffects)
     # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
-    self_contact: bool = attrs.field(default=False, validator=attrs.validators.instance_of(bool))
+    self_contact: bool = SELF_CONTACT.field()
     self_friction: float = SELF_FRICTION.field()
     # How linear systems are solved: within their tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
