@@ -23,7 +23,6 @@ NAMES = (
     "sweep",
     "optimize",
     "graph",
-    "reproduce",
     "homogenize",
     "grip",
     "chain",

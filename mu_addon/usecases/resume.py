@@ -32,7 +32,6 @@ MODULES = {
     "motion.toml": ".sensor.measured_motion",
     "sweep.toml": ".parameter_study.run",
     "design.toml": ".optimize.run",
-    "reproduce.toml": ".reproduce.run",
     "graph.toml": ".graph.run",
 }
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.paper.table.settings import read_set
 from mu_addon import reading
 from mu_addon.cli.main import main
 from mu_addon.design.gripper import load_gripper, read_gripper
@@ -41,7 +42,6 @@ from mu_addon.usecases.export.job import path_of
 from mu_addon.usecases.export.print_offsets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
-from mu_addon.usecases.reproduce.settings import read_set
 from mu_addon.usecases.track_video.run import read_bench, read_pixels, read_pressure
 
 ASSETS = Path(__file__).parents[2] / "assets"

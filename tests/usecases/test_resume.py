@@ -35,7 +35,6 @@ from mu_addon.usecases.homogenize import job as homogenize
 from mu_addon.usecases.optimize import job as optimize
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.run import Job as ParameterStudyJob
-from mu_addon.usecases.reproduce.settings import Settings
 from mu_addon.usecases.resume import MODULES, resume, use_case_of
 from mu_addon.usecases.sensor import record
 from mu_addon.usecases.simulate_and_place import job as study
@@ -93,12 +92,6 @@ def jobs(folder):
     yield design_experiments.Job(paper, noise={**design_experiments.NOISE, "angle": 1 / 3})
     yield fit.Job(measured, ("yeoh", "neo-hooke"), ("uniaxial",), "relative")
     yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
-    yield Settings(
-        values={"chambers.wall_mm": 0.95},
-        values_name="mine",
-        held_cells=1 / 3,
-        gripper=False,
-    )
     yield chain.read_chain(asset_root() / "examples/trunk/chain.toml")
     yield optimize.job_from(asset_root() / "examples/graded-finger/design.toml")
     yield record.Job(simulated=True, seconds=1 / 3, take=2)

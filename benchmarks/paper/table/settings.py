@@ -1,4 +1,4 @@
-"""What `reproduce` is asked to do, and the sets of values that it knows."""
+"""Settings of a reproduction of the paper's table, and its sets of values."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 import attrs
 
-from ...design.assets import asset_root
-from ...design.parameters import Unit, load_preset
-from ...errors import InputError
-from ...meshing.settings import MeshSettings
-from ...reading import file_text, parse_toml
-from ...run.folder import FolderLayout
-from ...run.inputs import FORMAT, read_inputs, structured
-from ...toml_writer import toml_text
-from ..simulate_and_place.settings import WORKERS
+from mu_addon.design.parameters import Unit, load_preset
+from mu_addon.errors import InputError
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.reading import file_text, parse_toml
+from mu_addon.run.folder import FolderLayout
+from mu_addon.run.inputs import FORMAT, read_inputs, structured
+from mu_addon.toml_writer import toml_text
+from mu_addon.usecases.simulate_and_place.settings import WORKERS
+
 from .values import with_values
 
 TABLE, AGREEMENT, STATEMENTS, BENDING = "table.csv", "agreement.csv", "statements.csv", "bending.csv"
@@ -27,7 +27,7 @@ LAYOUT = FolderLayout(
     results=(TABLE, AGREEMENT, STATEMENTS, BENDING, REPORT),
 )
 DEFAULT = "default"
-FOLDER = "reproduce"
+SETS = Path(__file__).parents[1] / "sets"
 
 
 def between(low: int, high: int) -> Any:
@@ -78,14 +78,14 @@ class Settings:
 
 
 def read_settings(folder: Path) -> Settings:
-    """The settings that a folder of `reproduce` describes; raises InputError."""
+    """Settings that a reproduction's folder describes; raises InputError."""
     path = folder / LAYOUT.inputs
     values, _ = read_inputs(path)
     if any(key in values for key in ("long", "meshes", "points")):
         raise InputError(
             "the folder belongs to the long studies of random meshes and open values",
             str(path),
-            "run `python -m benchmarks.reproduce` with this folder as --out, or `reproduce` in a new one",
+            "run `python -m benchmarks.paper.long` with this folder as --out, or choose a new folder",
         )
     name, given = values.pop("set", DEFAULT), values.pop("values", {})
     if not isinstance(name, str) or not isinstance(given, dict):
@@ -94,17 +94,17 @@ def read_settings(folder: Path) -> Settings:
 
 
 def read_set(name: str) -> dict[str, Any]:
-    """`values` and `held_cells` of Settings from a set that comes with the package, or a TOML file.
+    """`values` and `held_cells` of Settings from a set of `SETS`, or a TOML file.
 
     Raises InputError.
     """
     if name == DEFAULT:
         return {}
-    path = Path(name) if name.endswith(".toml") else asset_root() / FOLDER / f"{name}.toml"
+    path = Path(name) if name.endswith(".toml") else SETS / f"{name}.toml"
     try:
         tables = parse_toml(file_text(path), str(path))
     except OSError:
-        names = ", ".join([DEFAULT, *sorted(p.stem for p in (asset_root() / FOLDER).glob("*.toml"))])
+        names = ", ".join([DEFAULT, *sorted(p.stem for p in SETS.glob("*.toml"))])
         raise InputError(
             f"there is no set of values {name!r}", "--set", f"choose one of {names}, or give a TOML file"
         ) from None

@@ -6,25 +6,25 @@ import attrs
 import numpy as np
 import pytest
 
-from benchmarks.reproduce import open_study, scatter
-from benchmarks.reproduce.__main__ import main
-from benchmarks.reproduce.open_study import objective
-from benchmarks.reproduce.open_values import BESIDE, OPEN, design, scaled
-from benchmarks.reproduce.report import sections
-from benchmarks.reproduce.run import LongFound, LongSettings, shipped
-from benchmarks.reproduce.surrogate import fit, shares
-from benchmarks.reproduce.unstructured import Recipe, unstructured_mesh
+from benchmarks.paper.long import open_study, scatter
+from benchmarks.paper.long.__main__ import main
+from benchmarks.paper.long.open_study import objective
+from benchmarks.paper.long.open_values import BESIDE, OPEN, design, scaled
+from benchmarks.paper.long.report import sections
+from benchmarks.paper.long.run import LongFound, LongSettings, shipped
+from benchmarks.paper.long.surrogate import fit, shares
+from benchmarks.paper.long.unstructured import Recipe, unstructured_mesh
+from benchmarks.paper.table.published import published
+from benchmarks.paper.table.report import report
+from benchmarks.paper.table.settings import Settings
+from benchmarks.paper.table.values import unit_of_table_column, with_values
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.meshing.mesh import LATTICE, TET_FACES
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.inclusion import RULES
-from mu_addon.usecases.reproduce.published import published
-from mu_addon.usecases.reproduce.report import report
-from mu_addon.usecases.reproduce.settings import Settings
-from mu_addon.usecases.reproduce.values import unit_of_table_column, with_values
-from tests.usecases.test_reproduce import shown
+from tests.benchmarks.test_paper_table import shown
 
 PAPER = published()
 COARSE = MeshSettings(order=1, refine=0.4)
@@ -236,7 +236,7 @@ def test_the_page_has_the_long_studies_between_the_tables_own_sections():
 
 
 @pytest.mark.nightly(
-    "tests/usecases/test_reproduce.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
+    "tests/benchmarks/test_paper_table.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
 )
 def test_the_command_makes_the_table_and_the_page(tmp_path):
     out = tmp_path / "out"

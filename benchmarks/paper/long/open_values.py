@@ -16,8 +16,9 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.cache import Cache, key
 from mu_addon.usecases.parameter_study.variable import Variable
-from mu_addon.usecases.reproduce.table_column import ENDS_KPA, Paths, motion, paths, with_fixed_base
-from mu_addon.usecases.reproduce.values import RULE, unit_of_table_column, with_values
+
+from ..table.table_column import ENDS_KPA, Paths, motion, paths, with_fixed_base
+from ..table.values import RULE, unit_of_table_column, with_values
 
 Array = np.ndarray[Any, Any]
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...report.charts import GRID, INK, QUIET, WIDTH, canvas, label
-from ...report.results import Path
+from mu_addon.report.charts import GRID, INK, QUIET, WIDTH, canvas, label
+from mu_addon.report.results import Path
+
 from .published import Published
 from .table_columns import TableColumn
 

@@ -1,14 +1,14 @@
-"""`run.py reproduce` from the command line: the coarse run that CI does, its files, and its resumption."""
+"""`python -m benchmarks.paper`: its coarse run, its files, and its resumption."""
 
 import csv
 import json
 
 import pytest
 
-from mu_addon.cli.main import main
+from benchmarks.paper.__main__ import main
 
 pytestmark = pytest.mark.nightly(
-    "tests/usecases/test_reproduce.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
+    "tests/benchmarks/test_paper_table.py::test_the_table_hardly_depends_on_the_pressures_that_are_left_out"
 )
 
 
@@ -20,7 +20,7 @@ def rows(path):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("reproduce") / "out"
-    assert main(["reproduce", "--coarse", "--out", str(out), "--json"]) == 0
+    assert main(["--coarse", "--out", str(out), "--json"]) == 0
     return out
 
 
@@ -57,6 +57,6 @@ def test_a_second_run_takes_what_is_there(folder):
     before = (folder / "table.csv").read_bytes()
     (folder / "table.csv").unlink()
     kept = {p.name: p.stat().st_mtime_ns for p in (folder / "cache").iterdir()}
-    assert main(["reproduce", "--coarse", "--out", str(folder), "--json"]) == 0
+    assert main(["--coarse", "--out", str(folder), "--json"]) == 0
     assert (folder / "table.csv").read_bytes() == before
     assert {p.name: p.stat().st_mtime_ns for p in (folder / "cache").iterdir()} == kept

@@ -8,14 +8,15 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchor_points
-from ...design.parameters import Unit
-from ...errors import ConvergenceError
-from ...meshing.settings import MeshSettings
-from ...meshing.unit import mesh_unit
-from ...placement.deviation import Deviation, deviation_of
-from ...placement.inclusion import RULES
-from ...run.cache import Cache, key
+from mu_addon.design.anchors import anchor_points
+from mu_addon.design.parameters import Unit
+from mu_addon.errors import ConvergenceError
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.unit import mesh_unit
+from mu_addon.placement.deviation import Deviation, deviation_of
+from mu_addon.placement.inclusion import RULES
+from mu_addon.run.cache import Cache, key
+
 from .table_column import SOLVED_KPA, STATIONS, motion, paths, with_fixed_base
 
 Array = np.ndarray[Any, Any]

@@ -6,6 +6,21 @@ import attrs
 import numpy as np
 import pytest
 
+from benchmarks.paper.table.agreement import (
+    HELD,
+    NOT_HELD,
+    UNDECIDED,
+    agreement,
+    spearman,
+    statements,
+)
+from benchmarks.paper.table.published import GRIPPER, name_of, published
+from benchmarks.paper.table.report import report, weightings
+from benchmarks.paper.table.run import Found, OtherTableColumn, summary
+from benchmarks.paper.table.settings import Settings, read_set, read_settings
+from benchmarks.paper.table.table_column import STATIONS, motion, paths, with_fixed_base
+from benchmarks.paper.table.table_columns import BENDING_KPA, Solved, TableColumn
+from benchmarks.paper.table.values import unit_of_table_column
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
@@ -18,22 +33,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.placement.inclusion import RULES
+from mu_addon.run.folder import keep_inputs
 from mu_addon.run.pool import each
-from mu_addon.usecases.reproduce.agreement import (
-    HELD,
-    NOT_HELD,
-    UNDECIDED,
-    agreement,
-    spearman,
-    statements,
-)
-from mu_addon.usecases.reproduce.published import GRIPPER, name_of, published
-from mu_addon.usecases.reproduce.report import report, weightings
-from mu_addon.usecases.reproduce.run import Found, OtherTableColumn, summary
-from mu_addon.usecases.reproduce.settings import Settings, read_set
-from mu_addon.usecases.reproduce.table_column import STATIONS, motion, paths, with_fixed_base
-from mu_addon.usecases.reproduce.table_columns import BENDING_KPA, Solved, TableColumn
-from mu_addon.usecases.reproduce.values import unit_of_table_column
 from mu_addon.usecases.simulate_and_place.job import grasp
 
 PAPER = published()
@@ -111,6 +112,12 @@ def test_settings_refuse_what_is_out_of_bounds(tmp_path):
         mine.write_text(wrong, encoding="utf-8")
         with pytest.raises(InputError, match=words):
             read_set(str(mine))
+
+
+def test_settings_are_read_back_from_their_folder(tmp_path):
+    settings = Settings({"chambers.wall_mm": 0.95}, "mine", held_cells=1 / 3, gripper=False)
+    keep_inputs(tmp_path, settings.texts())
+    assert read_settings(tmp_path).texts() == settings.texts()
 
 
 def test_samplings_weigh_the_same_motion():

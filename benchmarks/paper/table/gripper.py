@@ -11,13 +11,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.gripper import load_gripper
-from ...errors import ConvergenceError
-from ...placement.inclusion import RULES
-from ...run.cache import Cache, key
-from ..grip.grasp import Cube
-from ..grip.run import gripper_path_deviations
-from ..grip.settings import SIDES
+from mu_addon.design.gripper import load_gripper
+from mu_addon.errors import ConvergenceError
+from mu_addon.placement.inclusion import RULES
+from mu_addon.run.cache import Cache, key
+from mu_addon.usecases.grip.grasp import Cube
+from mu_addon.usecases.grip.run import gripper_path_deviations
+from mu_addon.usecases.grip.settings import SIDES
+
 from .published import GRIPPER
 from .values import RULE, with_values
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from mu_addon.report.charts import INK, canvas, label, signed
 from mu_addon.report.results import Path
-from mu_addon.usecases.reproduce.charts import SCALE_STYLE, WIDE
 
+from ..table.charts import SCALE_STYLE, WIDE
 from .open_study import Effect
 from .open_values import OPEN
 from .scatter import Scatter

@@ -8,10 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.assets import asset_root
-from ...errors import InputError
-from ...reading import file_text, parse_toml
-from ...report.results import Path
+from mu_addon.design.assets import asset_root
+from mu_addon.errors import InputError
+from mu_addon.reading import file_text, parse_toml
+from mu_addon.report.results import Path
 
 Array = np.ndarray[Any, Any]
 

@@ -8,22 +8,22 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchor_points, windows
-from ...design.parameters import Unit
-from ...design.quantity import in_kPa
-from ...fem.equilibrium import Equilibrium
-from ...fem.kinematics import TipSection, probe
-from ...fem.model import Model
-from ...fem.self_intersection import first_self_intersection
-from ...fem.state import State, rest
-from ...fem.trajectory import simulate
-from ...fem.unit import materials_of
-from ...meshing.mesh import Mesh
-from ...placement.batch import CandidateBatch
-from ...placement.candidates import candidate_paths, roi
-from ...placement.deviation import Deviation, centreline, centreline_deviation
-from ...placement.inclusion import RULES, sensor_share
-from ...placement.sampling import polynomials
+from mu_addon.design.anchors import anchor_points, windows
+from mu_addon.design.parameters import Unit
+from mu_addon.design.quantity import in_kPa
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.kinematics import TipSection, probe
+from mu_addon.fem.model import Model
+from mu_addon.fem.self_intersection import first_self_intersection
+from mu_addon.fem.state import State, rest
+from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.unit import materials_of
+from mu_addon.meshing.mesh import Mesh
+from mu_addon.placement.batch import CandidateBatch
+from mu_addon.placement.candidates import candidate_paths, roi
+from mu_addon.placement.deviation import Deviation, centreline, centreline_deviation
+from mu_addon.placement.inclusion import RULES, sensor_share
+from mu_addon.placement.sampling import polynomials
 
 Array = np.ndarray[Any, Any]
 

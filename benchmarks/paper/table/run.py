@@ -10,16 +10,17 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.parameters import Unit
-from ...files import write_csv
-from ...placement.inclusion import RULES
-from ...run.cache import Cache
-from ...run.context import RunContext
-from ...run.pool import each
-from ...run.progress import Progress
-from ...run.usecase import UseCase
-from ...run.versions import package_versions
-from ..simulate_and_place.job import grasp
+from mu_addon.design.parameters import Unit
+from mu_addon.files import write_csv
+from mu_addon.placement.inclusion import RULES
+from mu_addon.run.cache import Cache
+from mu_addon.run.context import RunContext
+from mu_addon.run.pool import each
+from mu_addon.run.progress import Progress
+from mu_addon.run.usecase import UseCase
+from mu_addon.run.versions import package_versions
+from mu_addon.usecases.simulate_and_place.job import grasp
+
 from . import gripper
 from .found import Found, OtherTableColumn
 from .published import Published, name_of, published

@@ -20,14 +20,14 @@ from mu_addon.run.folder import begin
 from mu_addon.run.pool import each
 from mu_addon.run.progress import Progress
 from mu_addon.toml_writer import toml_text
-from mu_addon.usecases.reproduce.found import Found
-from mu_addon.usecases.reproduce.published import Published
-from mu_addon.usecases.reproduce.report import write_report
-from mu_addon.usecases.reproduce.run import solve, summary, write_tables
-from mu_addon.usecases.reproduce.settings import LAYOUT as TABLE_LAYOUT
-from mu_addon.usecases.reproduce.settings import REPORT, Settings, between
-from mu_addon.usecases.reproduce.values import unit_of_table_column
 
+from ..table.found import Found
+from ..table.published import Published
+from ..table.report import write_report
+from ..table.run import solve, summary, write_tables
+from ..table.settings import LAYOUT as TABLE_LAYOUT
+from ..table.settings import REPORT, Settings, between
+from ..table.values import unit_of_table_column
 from . import open_study, scatter
 from .open_study import OpenPoint, point
 from .open_values import BESIDE, Beside, PointResult, design, kept

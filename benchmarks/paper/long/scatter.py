@@ -17,9 +17,9 @@ from mu_addon.errors import InputError, MuError
 from mu_addon.meshing.mesh import Mesh
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key
-from mu_addon.usecases.reproduce.agreement import spearman
-from mu_addon.usecases.reproduce.table_column import ENDS_KPA, motion, paths
 
+from ..table.agreement import spearman
+from ..table.table_column import ENDS_KPA, motion, paths
 from .unstructured import Recipe, unstructured_mesh
 
 Array = np.ndarray[Any, Any]

@@ -6,10 +6,10 @@ import numpy as np
 
 from mu_addon.report.charts import label, signed
 from mu_addon.report.html import figure, table
-from mu_addon.usecases.reproduce.agreement import agreement
-from mu_addon.usecases.reproduce.published import name_of
-from mu_addon.usecases.reproduce.report import GOALS, Section, angle_words
 
+from ..table.agreement import agreement
+from ..table.published import name_of
+from ..table.report import GOALS, Section, angle_words
 from . import charts
 from .open_study import OpenPoint, best, distance, effects
 from .open_values import MOTION_KPA, OPEN

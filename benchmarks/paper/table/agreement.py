@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...report.results import Path
+from mu_addon.report.results import Path
 
 Array = np.ndarray[Any, Any]
 

@@ -1,34 +1,20 @@
-"""`reproduce`: the paper's table and bending ranges beside this simulation's."""
+"""Options of both commands on the paper's table."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, add_setting, require_out
+from mu_addon.cli.options import add_report, add_results, add_setting, require_out
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.usecases.simulate_and_place.settings import WORKERS
 
-if TYPE_CHECKING:
-    from ..run.context import RunContext
-    from ..usecases.reproduce.settings import Settings
-    from .options import Commands
+from .table.settings import Settings, read_set
 
 
-def add(commands: Commands[Any]) -> None:
-    """Add the parser of `reproduce`."""
-    command = commands.add_parser(
-        "reproduce",
-        help="Reproduce the paper: compare its Table I and bending angles at three scales with this "
-        "simulation.",
-        epilog="example: run.py reproduce --out out/reproduce",
-    )
-    add_options(command)
-
-
-def add_options(command: argparse.ArgumentParser) -> None:
-    """Folder, meshes and values of a reproduction."""
-    from ..usecases.simulate_and_place.settings import WORKERS
-
+def parser(name: str, page: str) -> argparse.ArgumentParser:
+    """A parser with folder, meshes and values of the table; page: the command's docstring."""
+    command = argparse.ArgumentParser(name, description=page.splitlines()[0])
     add_results(command)
     add_report(command)
     command.add_argument(
@@ -56,13 +42,11 @@ def add_options(command: argparse.ArgumentParser) -> None:
         help="Leave out the gripper's column, as --coarse does.",
     )
     add_setting(command, WORKERS, "N")
+    return command
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
-    """Settings that the options ask for; raises InputError."""
-    from ..meshing.settings import MeshSettings
-    from ..usecases.reproduce.settings import Settings, read_set
-
+    """Settings of the table that the options ask for; raises InputError."""
     require_out(options)
     coarse = options.coarse
     return Settings(
@@ -72,10 +56,3 @@ def settings_of(options: argparse.Namespace) -> Settings:
         gripper=options.gripper and not coarse,
         workers=options.workers,
     )
-
-
-def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Do the paper's table again."""
-    from ..usecases.reproduce.run import USE_CASE
-
-    USE_CASE.start(settings_of(options), Path(options.out), context)

@@ -9,9 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.parameters import Unit
-from ...fem.protocol import Protocol
-from ..parameter_study.variable import Inputs, changed_inputs
+from mu_addon.design.parameters import Unit
+from mu_addon.fem.protocol import Protocol
+from mu_addon.usecases.parameter_study.variable import Inputs, changed_inputs
 
 # The rule that keeps the sensor's volume: what the other gives is its mesh's.
 RULE = "volume_fraction"

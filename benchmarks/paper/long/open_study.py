@@ -13,9 +13,9 @@ import numpy as np
 
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
-from mu_addon.usecases.reproduce.agreement import spearman
-from mu_addon.usecases.reproduce.published import Published, name_of
 
+from ..table.agreement import spearman
+from ..table.published import Published, name_of
 from .open_values import MOTION_KPA, OPEN, PointResult
 from .surrogate import Shares, Surrogate, fit, shares
 
