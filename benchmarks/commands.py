@@ -54,7 +54,6 @@ ROWS = (
     "graph assets/graphs/unit.toml",
     "grip --preset gripper --coarse --no-paths --refine 0.3",
     "chain chain.toml",
-    "reproduce --coarse --refine 0.3",
     "ports",
     "stream --simulate --seconds 5",
     "record --simulate --seconds 5",

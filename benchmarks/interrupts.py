@@ -118,7 +118,6 @@ COMMANDS = {
     "chain": ["chain", "chain.toml"],
     "diagnose": ["diagnose", str(ROOT / "assets/examples/paper-moduli")],
     "fit-material": ["fit-material", str(ROOT / "tests/data/treloar")],
-    "reproduce": ["reproduce", "--coarse", "--refine", "0.3"],
 }
 # What a run took is another thing than what it found.
 TOOK = ("seconds", "memory_MB", "worker")

@@ -33,7 +33,6 @@ WHERE = {
     "cli/homogenize.py": (lattice,),
     "cli/optimize.py": (search,),
     "cli/sweep.py": (sweep,),
-    "cli/reproduce.py": (study,),
     "cli/place.py": STUDY,
     "cli/simulate.py": STUDY,
     "blender/gripper/properties.py": (mesh, grip),
@@ -57,7 +56,6 @@ WHERE = {
     "usecases/optimize/job.py": (search,),
     "usecases/parameter_study/plan.py": (sweep,),
     "usecases/parameter_study/run.py": (sweep,),
-    "usecases/reproduce/settings.py": (study,),
 }
 
 
