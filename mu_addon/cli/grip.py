@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `grip`."""
+    from ..design.settings import FRICTION
     from ..usecases.grip.settings import (
         BEYOND,
         COARSE,
         COARSE_REFINE,
         CUBES,
         DENSITY,
-        FRICTION,
         REFINE,
         SIDES,
     )

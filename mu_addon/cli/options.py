@@ -170,6 +170,8 @@ def add_body(command: argparse.ArgumentParser) -> None:
 
 def add_obstacles(command: argparse.ArgumentParser) -> None:
     """Rigid bodies that the unit may touch, each with its friction."""
+    from ..design.settings import FRICTION
+
     command.add_argument(
         "--obstacle",
         action=_Obstacle,
@@ -184,7 +186,7 @@ def add_obstacles(command: argparse.ArgumentParser) -> None:
         action=_Friction,
         type=float,
         metavar="MU",
-        help="Coulomb friction coefficient of the preceding --obstacle (default: 0.5, assumed).",
+        help=f"Friction coefficient of the preceding --obstacle (default: {FRICTION.default}, assumed).",
     )
 
 
@@ -244,7 +246,7 @@ def fidelity_of(options: argparse.Namespace) -> str:
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
     from ..meshing.settings import ORDER, REFINE
-    from ..usecases.simulate_and_place.settings import PROTOCOL, SELF_FRICTION, TIMES
+    from ..usecases.simulate_and_place.settings import MESHER, PROTOCOL, SELF_FRICTION, TIMES
 
     add_setting(command, PROTOCOL, "CSV")
     add_setting(command, ORDER, "P")
@@ -259,12 +261,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
         "and lattice_poisson).",
     )
     add_setting(command, TIMES, "K")
-    command.add_argument(
-        "--mesher",
-        choices=("auto", "gmsh", "pytetwild"),
-        default="auto",
-        help="Mesh generator (default: auto).",
-    )
+    add_setting(command, MESHER)
     add_solver(command)
 
 

@@ -13,15 +13,7 @@ from ..errors import InputError
 from ..reading import file_text
 from .body import Body, flaws, half, overlaps, require_sound
 from .dimensions import Dimensions
-
-FRICTION = 0.5
-"""Assumed: published coefficients of dry elastomers on hard plastics are mostly 0.5 to 1 and above, and the
-cautious end is taken."""
-
-
-def _coefficient(_: object, field: attrs.Attribute[float], value: float) -> None:
-    if not 0.0 <= value <= 5.0:
-        raise InputError(f"a friction coefficient of {value:g}", field.name, "give 0 to 5")
+from .settings import FRICTION
 
 
 @attrs.frozen(eq=False)
@@ -32,7 +24,7 @@ class RigidBody:
     """
 
     body: Body
-    friction: float = attrs.field(default=FRICTION, validator=_coefficient)
+    friction: float = FRICTION.field()
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""Settings that many jobs share, stated once: facets of a solid, and the resin where none is named."""
+"""Settings that many jobs share, stated once: facets of a solid, friction, the resin where none is named."""
 
 from __future__ import annotations
 
@@ -7,4 +7,13 @@ from .quantity import described
 USUAL_RESIN = "elastic-50a-v1"
 QUALITY = described(
     "quality", "interactive", "facet resolution of the printable surface", choices=("interactive", "export")
+)
+# Published coefficients of dry elastomers on hard plastics; the cautious end is taken.
+FRICTION = described(
+    "friction",
+    0.5,
+    "Coulomb friction coefficient between unit and body, assumed: dry elastomers on hard plastics mostly "
+    "have 0.5 to 1 and above",
+    low=0.0,
+    high=5.0,
 )

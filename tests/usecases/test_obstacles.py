@@ -11,7 +11,8 @@ from mu_addon.cli.main import main
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
 from mu_addon.design.parameters import load_preset, to_toml
-from mu_addon.design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, to_obj
+from mu_addon.design.rigid_body import RigidBody, mirrored, read_rigid_bodies, to_obj
+from mu_addon.design.settings import FRICTION
 from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import InputError
 from mu_addon.report.unit_pictures import _behind
@@ -46,8 +47,8 @@ def simulate(files, *more):
 def test_bodies_survive_their_file(tmp_path):
     given = (RigidBody(WALL, 0.25), RigidBody(block((1, 40, 0), (2, 41, 3), "a b.stl")))
     (tmp_path / "o.obj").write_text(to_obj(given))
-    found = read_rigid_bodies(tmp_path / "o.obj", [0.25, FRICTION])
-    assert [f.friction for f in found] == [0.25, FRICTION]
+    found = read_rigid_bodies(tmp_path / "o.obj", [0.25, FRICTION.default])
+    assert [f.friction for f in found] == [0.25, FRICTION.default]
     assert [f.name for f in found] == ["wall.stl", "a b.stl"]
     assert [f.body.hash for f in found] == [g.body.hash for g in given]
     assert mirrored(given[:1])
@@ -57,7 +58,7 @@ def test_bodies_survive_their_file(tmp_path):
     (tmp_path / "o.obj").write_text("o 1 x\nv 0 0 zero\n")
     with pytest.raises(InputError, match="cannot be read"):
         read_rigid_bodies(tmp_path / "o.obj", [0.25])
-    with pytest.raises(InputError, match="friction coefficient of 7"):
+    with pytest.raises(InputError, match="friction = 7 is out of bounds"):
         RigidBody(WALL, 7.0)
 
 
@@ -139,7 +140,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     [
         (["--obstacle", "none.stl"], "no body can be read from it"),
         (["--obstacle", "inside.stl"], "it overlaps the unit by up to"),
-        (["--obstacle", "wall.stl", "--friction", "-1"], "a friction coefficient of -1"),
+        (["--obstacle", "wall.stl", "--friction", "-1"], "friction = -1 is out of bounds"),
     ],
 )
 def test_what_cannot_be_an_obstacle_ends_with_what_to_do(files, words, expected, capsys):

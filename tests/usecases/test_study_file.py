@@ -111,7 +111,7 @@ GOOD = compose(JOB.tables())
         (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "study.toml, .*times"),
         (GOOD.replace("times = 3", "times = 3\nhook = 1"), "unknown key 'hook'"),
         (GOOD.replace("times = 3", "times = 1000000000"), "1000000000"),
-        (GOOD.replace('"gmsh"', '"sh -c true"'), "not offered"),
+        (GOOD.replace('"gmsh"', '"sh -c true"'), "mesher = 'sh -c true' is not known"),
         (GOOD.replace('["intersect"]', '["eval"]'), "eval"),
         (GOOD.replace('["intersect"]', "[{}]"), "rules"),
         (GOOD.replace("refine = 0.4", "refine = nan"), "refine"),

@@ -8,8 +8,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
+from ...design.settings import FRICTION
 from ...meshing.settings import SELF_CONTACT
-from ...usecases.grip.settings import DENSITY, FRICTION
+from ...usecases.grip.settings import DENSITY
 from ..shared import displays
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal

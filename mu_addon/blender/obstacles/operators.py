@@ -8,13 +8,13 @@ from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 from mathutils import Vector
 
 from ...design.body import require_sound
-from ...design.rigid_body import FRICTION
+from ...design.settings import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
 from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
 from ..unit import object as unit_object
-from ..unit.fields import exact
+from ..unit.fields import blender_property, exact
 from ..unit.properties import to_unit
 from . import state as obstacles
 
@@ -56,9 +56,7 @@ class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
     bl_label = "Use as Obstacle"
     bl_options = {"REGISTER", "UNDO"}
 
-    friction: FloatProperty(
-        name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
-    )
+    friction: blender_property(FRICTION, precision=2)
 
     @reports_errors
     def execute(self, context):
@@ -92,9 +90,7 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
     gap: FloatProperty(
         name="Gap (mm)", description="Distance between unit and box in mm", default=5.0, min=0.0
     )
-    friction: FloatProperty(
-        name="Friction", description="Coefficient of Coulomb friction", default=FRICTION, min=0.0, max=5.0
-    )
+    friction: blender_property(FRICTION, precision=2)
 
     @reports_errors
     def execute(self, context):

@@ -16,10 +16,11 @@ from bpy.props import FloatProperty, StringProperty
 
 from ...design.body import Body, Flaw, flaws, overlaps, require_sound
 from ...design.parameters import Unit
-from ...design.rigid_body import FRICTION, RigidBody
+from ...design.rigid_body import RigidBody
+from ...design.settings import FRICTION
 from ..body import state as bodies
 from ..shared.registration import property_group_factory
-from ..unit.fields import exact
+from ..unit.fields import blender_property, exact
 
 ODD_SIZE_MM = (0.1, 2000.0)
 """An obstacle smaller or larger than that is more likely in another unit of length."""
@@ -34,17 +35,7 @@ class MU_PG_obstacle(bpy.types.PropertyGroup):
         description="Length of a millimetre in the scene that the object's size is right for; 0: not known",
         options={"HIDDEN"},
     )
-    friction: FloatProperty(
-        name="Friction",
-        description="Coefficient of Coulomb friction between unit and obstacle; 0: none. The default is "
-        "assumed: dry elastomers on hard plastics mostly have 0.5 to 1 and above",
-        default=FRICTION,
-        min=0.0,
-        soft_max=1.0,
-        max=5.0,
-        precision=2,
-        step=5,
-    )
+    friction: blender_property(FRICTION, soft_max=1.0, precision=2, step=5)
 
 
 @attrs.frozen(eq=False)

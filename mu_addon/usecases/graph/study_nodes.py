@@ -5,14 +5,13 @@ from __future__ import annotations
 from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
-from ...design.rigid_body import FRICTION, RigidBody
-from ...design.settings import QUALITY
+from ...design.rigid_body import RigidBody
+from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.inclusion import RULES
 from ..export import settings as export
 from ..grip.settings import COARSE, CUBES, DENSITY
-from ..grip.settings import FRICTION as GRIP_FRICTION
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
 from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
@@ -114,7 +113,7 @@ def study_nodes() -> tuple[Definition, ...]:
             outputs=(Output("obstacle", "obstacle", "the body"),),
             settings=(
                 setting("file", "", "closed surface in mm: STL, OBJ or PLY", path=FILE),
-                setting("friction", FRICTION, "coefficient of friction with the unit", low=0, high=5),
+                Setting(FRICTION),
             ),
             make=_obstacle,
             remark=lambda outputs: outputs["obstacle"].name,
@@ -240,7 +239,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (Input("gripper", ("gripper",), "link a gripper"),),
             (Output("grasp", "grasp", "the grasp"),),
             (
-                *(Setting(d) for d in (CUBES, DENSITY, GRIP_FRICTION, COARSE)),
+                *(Setting(d) for d in (CUBES, DENSITY, FRICTION, COARSE)),
                 setting("rank_paths", True, "rank the paths of a finger's sensor"),
                 QUICK_FIDELITY,
                 QUICK_SELF_CONTACT,

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...design.gripper import Gripper
+from ...design.settings import FRICTION
 from ...errors import ConvergenceError, InputError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection, probe
@@ -31,7 +32,7 @@ from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
 from .phases import Phases
-from .settings import BEYOND, DENSITY, FRICTION
+from .settings import BEYOND, DENSITY
 
 Array = np.ndarray[Any, Any]
 

@@ -15,14 +15,6 @@ SIDES = tuple(map(float, CUBES.default.split()))
 DENSITY = described(
     "density_g_per_ml", 1.24, "density of the cubes; solid PLA is assumed", unit="g/ml", low=0.001, high=25.0
 )
-FRICTION = described(
-    "friction",
-    0.5,
-    "Coulomb friction coefficient of fingers and cube, assumed: dry elastomers on hard plastics mostly have "
-    "0.5 to 1 and above",
-    low=0.0,
-    high=5.0,
-)
 BEYOND = described(
     "beyond_mm",
     3.0,

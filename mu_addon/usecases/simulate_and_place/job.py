@@ -15,8 +15,8 @@ from ...design.anchors import window, windows
 from ...design.assets import asset_root
 from ...design.body import Body, envelope, read_body, require_path_inside
 from ...design.parameters import Unit, read_unit, to_toml
-from ...design.rigid_body import FRICTION, RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
-from ...design.settings import QUALITY
+from ...design.rigid_body import RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
+from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
 from ...fem.newton_settings import (
     CONTACT_NEWTON,
@@ -35,7 +35,7 @@ from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.optics import Optics
 from .named_effects import NamedEffects
-from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
+from .settings import CHECKS, MESH_CHECK, MESHER, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
 from .study_file import FILES, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
@@ -67,7 +67,7 @@ class Job:
     unit: Unit
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    mesher: str = attrs.field(default="auto", validator=attrs.validators.in_(("auto", "gmsh", "pytetwild")))
+    mesher: str = MESHER.field()
     times: int = TIMES.field()
     stations: int = STATIONS.field()
     rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
@@ -515,7 +515,7 @@ def obstacles_for(
     own: the unit's body where it is not the lattice's box. Raises InputError, also where a body stands in
     the unit at rest.
     """
-    found = [RigidBody(read_body(file), FRICTION if mu is None else mu) for file, mu in files]
+    found = [RigidBody(read_body(file), FRICTION.default if mu is None else mu) for file, mu in files]
     require_beside(found, unit.dimensions, own)
     return tuple(found)
 
