@@ -93,7 +93,7 @@ class Progress:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
         with self._one_at_a_time:
             self._stage, self._start, self._expected = name, self._clock(), expected_s
-            self._fraction, self._updated_s = (0.0 if expected_s else None), self._start
+            self._fraction, self._updated_s = None, self._start
         try:
             self._emit_progress("start", self._fraction)
             yield

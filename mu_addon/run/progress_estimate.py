@@ -15,6 +15,8 @@ MOST_BY_CLOCK = 0.95
 """How much of a stage is taken for done by the clock alone: it has not ended."""
 SURE = 0.1
 """Share of a stage from which on it alone tells of its rest: first steps may be many times slower."""
+OVERDUE = 0.2
+"""Share of its time that a stage beyond its plan is taken to need still: nothing says that it ends now."""
 UNPLANNED_S = 20.0
 """Seconds that a stage which no plan has is taken for."""
 
@@ -22,13 +24,13 @@ UNPLANNED_S = 20.0
 def own_left(elapsed: float, since: float, fraction: float | None, expected: float | None) -> float | None:
     """Seconds left of a stage, by the share done where it is known, else by what was expected; None without.
 
-    since: seconds since the share was known, from when on it counts down. What is overdue takes a fifth of
-    its time still, since nothing says that it ends now.
+    since: seconds since the share was known, from when on it counts down. What is overdue by a share takes a
+    fifth of its time still, since nothing says that it ends now; by what was expected nothing is known then.
     """
     if fraction:
         rest = (1.0 - fraction) / fraction
         return max((elapsed - since) * rest - since, min(0.2, rest / 2.0) * elapsed)
-    return max(expected - elapsed, 0.2 * elapsed) if expected is not None else None
+    return expected - elapsed if expected is not None and expected > elapsed else None
 
 
 class ProgressEstimate:
@@ -87,8 +89,9 @@ class ProgressEstimate:
         self._own_left = float(left) if isinstance(left, int | float) else None
         self._share = float(share) if isinstance(share, int | float) else 0.0
         if self._planned and self._share < SURE:
-            expected = self._expected[stage]
-            by_plan = own_left(self._spent, 0.0, None, expected) or 0.0
+            # At the pace of what is done, as the stages to come, else it would jump where one begins.
+            expected = self._expected[stage] * self._pace()
+            by_plan = max(expected - self._spent, OVERDUE * self._spent)
             if not self._share:
                 # By the clock, as long as the stage itself says nothing.
                 self._share = min(self._spent / expected, MOST_BY_CLOCK) if expected > 0.0 else 0.0

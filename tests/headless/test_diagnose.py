@@ -24,7 +24,7 @@ def overcured(tmp_path_factory):
 def test_it_leaves_verdict_model_and_report(overcured):
     out, done = overcured
     assert "verdict: named: overcure" in done.stdout
-    assert "single effects: done" in done.stderr
+    assert "effects: done" in done.stderr
     assert json.loads((out / "summary.json").read_text())["status"] == "complete"
     for name in ("verdict.json", "model.toml", "residuals.csv", "report.html"):
         assert (out / name).stat().st_size > 100

@@ -235,7 +235,9 @@ def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path):
         time.sleep(0.5)
     beats = [m for m in messages if m.get("beat")]
     assert len(beats) >= 3
-    assert all(m["stage"] == "mesh" and m["seconds_left"] > 0.0 for m in beats)
+    assert all(m["stage"] == "mesh" for m in beats)
+    # Of a stage that takes longer than expected nothing is known: a time that grows would be none.
+    assert all((m["seconds_left"] is None) == (m["seconds"] >= 0.1) for m in beats)
     assert [m["seconds"] for m in beats] == sorted(m["seconds"] for m in beats)
     assert messages[-1]["state"] == "end"
     assert len((tmp_path / "log.ndjson").read_text().splitlines()) == 2

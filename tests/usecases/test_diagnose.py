@@ -104,7 +104,7 @@ def test_the_terminal_is_told_in_a_few_lines(overcured):
 
 def test_every_stage_is_told(overcured):
     stages = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "start"]
-    assert stages[:3] == ["noise", "sensitivities", "single effects"]
+    assert stages[:3] == ["noise", "sensitivities", "effects"]
     assert stages[-2:] == ["gain", "report"]
     ended = [m["stage"] for m in overcured[3] if m["type"] == "progress" and m["state"] == "end"]
     assert ended == stages

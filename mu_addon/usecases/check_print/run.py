@@ -16,6 +16,7 @@ from ...design.solid import build_solid
 from ...design.surface import Triangles, Vertices, stl_bytes
 from ...files import write_bytes, write_json
 from ...run.context import RunContext
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .job import LAYOUT, Job, read_job
 from .report import write_report
@@ -173,4 +174,10 @@ def _where(places: np.ndarray[Any, Any]) -> str:
     return f"({x:.2f}, {y:.2f}, {z:.2f}) mm{more}"
 
 
-USE_CASE = UseCase("check", LAYOUT, read_job, check_print, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of a check with the seconds that each is expected to take on two cores."""
+    stages = {"part": 4.0, "faces": 2.0, "thickness and gaps": 2.5, "chambers and drains": 2.0}
+    return [*stages.items(), ("layers", 1.0), ("build directions", 2.5), ("report", 5.0)]
+
+
+USE_CASE = UseCase("check", LAYOUT, read_job, check_print, console_summary, plan=plan_of)

@@ -36,7 +36,7 @@ from ...run.versions import package_versions
 from ...toml_writer import toml_text
 from ..measured_data import described, experiments_digest, require_same_data
 from .job import UNIT, fidelity_in, unit_behind
-from .simulators import simulators_of
+from .simulators import simulations_plan, simulators_of
 from .words import bare, listed, readable
 
 Array = np.ndarray[Any, Any]
@@ -56,6 +56,7 @@ NOISE = {
     "tip_deflection": 0.1,
     "voltage": 0.002,
 }
+SENSITIVITIES_S = 5.0
 # Half of the variance wanders, as slowly as a tenth of the longest record.
 SLOW = 0.1
 # Effects that look as much alike as this cannot be told apart.
@@ -155,7 +156,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
         measured.experiments, job.subject, folder / "cache", progress, settings
     )
     simulator = Composite(simulators)
-    with progress.stage("sensitivities", expected_s=5.0):
+    with progress.stage("sensitivities", expected_s=SENSITIVITIES_S):
         found = plan(measured.experiments, simulator, job.noise)
     _write(found, folder / "limits.csv")
     context.summary |= summary(found)
@@ -302,4 +303,14 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("design-experiments", LAYOUT, read_job, design_experiments, console_summary)
+USE_CASE = UseCase(
+    "design-experiments",
+    LAYOUT,
+    read_job,
+    design_experiments,
+    console_summary,
+    plan=lambda job: [
+        *simulations_plan(job.measured.experiments, job.fidelity),
+        ("sensitivities", SENSITIVITIES_S),
+    ],
+)

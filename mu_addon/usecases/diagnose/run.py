@@ -28,15 +28,18 @@ from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .diagnosis import Diagnosis, curves
 from .job import LAYOUT, Job, read_job
 from .report import write_report
-from .simulators import simulators_of
+from .simulators import simulations_plan, simulators_of
 from .words import advice, readable, sentence, to_do
 
 # Of a unit, but not before its weight, or the place of what holds it, is simulated.
 LATER = ("unit_pose", "blocked_force")
+SET = 3
+"""Experiments of the data whose verdict takes as long as the plan says."""
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -84,7 +87,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     )
     simulator = Composite(simulators, known=known)
     notes += _known_before(job, simulator)
-    with _stages(progress, simulator) as on_model:
+    with _stages(progress) as on_model:
         verdict = diagnose(measured.experiments, simulator, on_model)
     model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
@@ -130,7 +133,7 @@ def _first_look(
     settings = attrs.evolve(job.unit_settings, effects=())
     simulators, _ = simulators_of(experiments, job.subject, folder / "cache", progress, settings)
     simulator = Composite(simulators, known=known)
-    with _stages(progress, simulator) as on_model:
+    with _stages(progress) as on_model:
         verdict = diagnose(experiments, simulator, on_model)
     headline, words = sentence(verdict)
     with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
@@ -217,23 +220,22 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
 
 
 @contextmanager
-def _stages(progress: Progress, simulator: Composite) -> Iterator[Callable[[str], None]]:
-    """What the engine says of its work, as stages."""
-    many = max(len(simulator.effects), 1)
+def _stages(progress: Progress) -> Iterator[Callable[[str], None]]:
+    """What the engine says of its work, as stages.
+
+    All trials of effects are one: how many it needs is known to nobody, so that its share goes by the clock.
+    """
     with ExitStack() as stack:
-        now, done = "", 0
+        now = ""
 
         def on_model(what: str) -> None:
-            nonlocal now, done
-            stage = what
-            if what not in ("noise", "sensitivities", "gain"):
-                stage = ("single", "pairs of", "triples of")[min(what.count(" and "), 2)] + " effects"
+            nonlocal now
+            stage = what if what in ("noise", "sensitivities", "gain") else "effects"
             if stage != now:
                 stack.close()
                 stack.enter_context(progress.stage(stage))
-            now, done = stage, done + 1 if stage == now else 0
-            # Later steps try up to four models with each effect.
-            progress.update(done / (many if stage == "single effects" else 4 * many))
+            now = stage
+            progress.update(0.0, what if stage == "effects" else "")
 
         yield on_model
 
@@ -288,4 +290,18 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return [*lines, f"next: {summary['next']}"] if summary["next"] else lines
 
 
-USE_CASE = UseCase("diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis)
+def plan_of(job: Job) -> Plan:
+    """Stages of a diagnosis with the seconds that each is expected to take on two cores."""
+    experiments = job.measured.experiments
+    a_set = len(experiments) / SET
+    judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 30.0, "gain": 0.5}
+    return [
+        *simulations_plan(experiments, job.fidelity),
+        *((name, s * a_set) for name, s in judged.items()),
+        ("report", 6.0),
+    ]
+
+
+USE_CASE = UseCase(
+    "diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis, plan=plan_of
+)

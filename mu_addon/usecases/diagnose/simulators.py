@@ -14,17 +14,31 @@ from ...evidence.prediction.bench import bench_simulators
 from ...evidence.simulator import Simulator
 from ...measured import Experiment
 from ...measured.kinds import OF_A_UNIT
+from ...meshing.settings import HOMOGENISED
 from ...run.progress import Progress
+from ...run.progress_estimate import Plan
+from ..simulate_and_place.expected import PACE
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
+LATTICE_S, UNIT_S = 40.0, 150.0
+"""Seconds that the simulations of blocks, and of a homogenised unit with all effects, take about."""
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
     unit_pressure.KIND: unit_pressure.UnitPressure,
     step.KIND: step.PressureStep,
     pose.KIND: pose.UnitPose,
 }
+
+
+def simulations_plan(experiments: Sequence[Experiment], fidelity: str) -> Plan:
+    """Stages of `simulators_of` with the seconds that each is expected to take on two cores."""
+    kinds = {e.kind for e in experiments}
+    unit = UNIT_S * PACE["full" if fidelity == HOMOGENISED else "resolved"]
+    lattice = [("lattice", LATTICE_S)] if any(e.cells for e in experiments) else []
+    free = [("unit", unit)] if kinds & set(FREE) else []
+    return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
 
 
 def simulators_of(

@@ -23,12 +23,16 @@ from ...errors import MeshingError, OutputError
 from ...files import write_bytes, write_json
 from ...run.context import RunContext
 from ...run.progress import Progress
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .job import LAYOUT, MANIFEST, Job, read_job
 
 Array = NDArray[np.float64]
 
 MESH_TOLERANCE = 1e-4
+SOLID_S = {"interactive": 3.0, "export": 20.0}
+FORMAT_S = {"stl": 3.0, "3mf": 12.0, "3mf-beams": 14.0, "step": 15.0, "txt": 0.5}
+"""Seconds that writing a format and reading it back takes about."""
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
 STEP_TOLERANCE = 5e-3
 """The same of a STEP file, through its mesh."""
@@ -61,14 +65,14 @@ class Export:
     def run(self) -> None:
         """Build the solid, write every format, read each back, and leave the manifest."""
         job = self.job
-        with self.progress.stage("solid", 12.0 if job.quality == "export" else 3.0):
+        with self.progress.stage("solid", SOLID_S[job.quality]):
             solid = build_solid(job.unit, job.path, job.quality, take_off=job.take_off)
             self.progress.made(f"{len(solid.triangles)} triangles")
         if job.vent_along is not None:
             with self.progress.stage("vents", 10.0):
                 solid = self._vent(solid, job.vent_along)
         for name in job.formats:
-            with self.progress.stage(name, 8.0):
+            with self.progress.stage(name, FORMAT_S[name]):
                 {
                     "stl": self._stl,
                     "3mf": self._3mf,
@@ -304,4 +308,10 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("export", LAYOUT, read_job, export, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of an export with the seconds that each is expected to take on two cores."""
+    vents = [("vents", 10.0)] if job.vent_along is not None else []
+    return [("solid", SOLID_S[job.quality]), *vents, *((name, FORMAT_S[name]) for name in job.formats)]
+
+
+USE_CASE = UseCase("export", LAYOUT, read_job, export, console_summary, plan=plan_of)

@@ -26,6 +26,7 @@ from ...report.html import page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
 from .job import RESIN, UNIT, read_resin
@@ -322,4 +323,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     ]
 
 
-USE_CASE = UseCase("specimens", LAYOUT, read_job, make_specimens, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of the specimens with the seconds that each is expected to take on two cores."""
+    return [("specimens", 10.0)]
+
+
+USE_CASE = UseCase("specimens", LAYOUT, read_job, make_specimens, console_summary, plan=plan_of)

@@ -17,11 +17,15 @@ from ...materials.fit import POISSON, TOLERANCE, Fit, fit_coupons, leave_one_mod
 from ...materials.library import Material, write_material
 from ...measured import Measured
 from ...run.context import RunContext
+from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .charts import mode_chart
 from .fitting import Fitting, modes, tested
 from .job import LAYOUT, Job, read_job
 from .report import write_report
+
+FIT_S = 2.0
+"""Seconds that fitting a law takes about."""
 
 
 def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
@@ -33,7 +37,7 @@ def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
     fitted, held = job.coupons
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
-    with progress.stage("fit", expected_s=2.0 * len(forms)):
+    with progress.stage("fit", expected_s=FIT_S * len(forms)):
         fits, unseen = [], {}
         for i, one in enumerate(forms):
             fits.append(fit_coupons(one, fitted, held, weights, profile=True))
@@ -184,4 +188,9 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("fit-material", LAYOUT, read_job, fit_material, console_summary)
+def plan_of(job: Job) -> Plan:
+    """Stages of a fit with the seconds that each is expected to take on two cores."""
+    return [("fit", FIT_S * len(job.forms)), ("report", 4.0)]
+
+
+USE_CASE = UseCase("fit-material", LAYOUT, read_job, fit_material, console_summary, plan=plan_of)

@@ -20,6 +20,7 @@ from ...run.cache import Cache
 from ...run.context import RunContext
 from ...run.progress import Progress
 from ...run.usecase import UseCase
+from ..simulate_and_place.expected import plan_of
 from .cluster import Work, cluster_at
 from .csv_columns import Row, cell, column_names, figures
 from .found import Found
@@ -34,6 +35,8 @@ Array = np.ndarray[Any, Any]
 LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
 # Seconds between two writings of the table.
 EVERY_S = 10.0
+# What the process of a point takes before its first stage and after its last.
+BEGIN_S = 3.0
 
 
 @attrs.frozen(eq=False)
@@ -76,6 +79,7 @@ def sweep(job: Job, folder: Path, context: RunContext) -> Found:
     run = Run(plan, plan.points(values), folder, places, _density(plan))
     run.look(job.retry)
     run.write()
+    progress.plan([("points", run.expected_s(job.workers)), ("report", 5.0)])
     try:
         with progress.stage("points"):
             run.solve(progress, job.scheduler, job.workers, job.work)
@@ -122,9 +126,19 @@ class Run:
                 if not (retry and row["status"] == "failed"):
                     self.known[point.number] = row
 
+    @property
+    def todo(self) -> list[Point]:
+        """The points that break no rule, and of which nothing is known."""
+        return [p for p in self.points if p.job is not None and p.number not in self.known]
+
+    def expected_s(self, workers: int) -> float:
+        """Seconds that the points still take about, on two cores at most."""
+        stages = [plan_of(point.job)[:-1] for point in self.todo if point.job is not None]
+        return sum(BEGIN_S + sum(seconds for _, seconds in one) for one in stages) / min(max(workers, 1), 2)
+
     def solve(self, progress: Progress, scheduler: str | None, workers: int, work: Work) -> None:
         """Run the points of which nothing is known; what each finds is kept at once."""
-        todo = [p for p in self.points if p.job is not None and p.number not in self.known]
+        todo = self.todo
         if not todo:
             return
         tasks = [self.task(point) for point in todo]

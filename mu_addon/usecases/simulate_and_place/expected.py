@@ -23,7 +23,7 @@ SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 # Pressures other than 0 of the shipped protocol at the default number of times.
 _PRESSURES = 6
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
-_BY_REFINEMENT = 3.5
+BY_REFINEMENT = 3.5
 
 
 def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
@@ -39,13 +39,16 @@ def plan_of(job: Job) -> Plan:
     """The stages of a study with the seconds that each is expected to take on two cores."""
     place, simulates = "place" in job.stages, "simulate" in job.stages
     names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
+    if job.path:
+        names.insert(1, f"solid with {job.path}")
     if not simulates:
         return _scaled(names, 1.0)
     _, pressure = job.samples
     states = np.count_nonzero(np.unique(pressure)) if not job.in_time else len(pressure)
     pace = PACE["resolved" if job.mesh.resolved else "full" if job.mesh.order == 2 else "quick"]
-    return _scaled(names, pace * job.mesh.refine**_BY_REFINEMENT * max(states, 1) / _PRESSURES)
+    return _scaled(names, pace * job.mesh.refine**BY_REFINEMENT * max(states, 1) / _PRESSURES)
 
 
 def _scaled(names: Iterable[str], factor: float) -> Plan:
-    return [(name, FULL_S[name] * (factor if name in SOLVED else 1.0)) for name in names]
+    seconds = {name: FULL_S[name.partition(" with ")[0]] for name in names}
+    return [(name, s * (factor if name in SOLVED else 1.0)) for name, s in seconds.items()]
