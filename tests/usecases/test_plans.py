@@ -1,4 +1,4 @@
-"""Plans of runs: the stages that a command tells at its start are those that come, and its share only grows."""
+"""Plans of runs: the stages that a command tells at its start are those that come, and its share grows."""
 
 import pytest
 
