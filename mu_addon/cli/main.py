@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from . import all_commands
+from .completion import SHELLS, Complete
 
 if TYPE_CHECKING:
     from ..run.progress import Sink
@@ -65,6 +66,12 @@ def parser() -> argparse.ArgumentParser:
         epilog=STATUSES,
     )
     top.add_argument("--version", action="version", version=f"mu_addon {__version__}")
+    top.add_argument(
+        "--completion",
+        choices=SHELLS,
+        action=Complete,
+        help='Print a script that completes commands, options and choices: eval "$(... --completion bash)".',
+    )
     commands = top.add_subparsers(
         dest="command", required=True, metavar="COMMAND", parser_class=_Parser, action=_Commands
     )
