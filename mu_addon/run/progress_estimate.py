@@ -37,7 +37,7 @@ class ProgressEstimate:
     """The whole of a run as it goes on; `tell` it each progress message.
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
-    why: why the time left grew last, or nothing. Without a plan there are only the stages so far, and no
+    why: why the time left grew, for as long as it is more than before, or nothing. Without a plan there are only the stages so far, and no
     time left but the present stage's.
     """
 
@@ -54,6 +54,7 @@ class ProgressEstimate:
         self._at = self._began = clock()
         self.fraction = 0.0
         self.why = ""
+        self._grown_from = 0.0
 
     @property
     def number(self) -> int:
@@ -153,8 +154,11 @@ class ProgressEstimate:
         shown = self.seconds_left
         if shown is not None and left > shown:
             if left <= LONGER * shown + SLACK_S:
+                if shown < self._grown_from:
+                    self.why = ""
                 return
             self.why = f"{added} was added" if added else f"{self._stage} takes longer than expected"
+            self._grown_from = shown
         elif shown is not None:
             self.why = ""
         self._left, self._at = left, self._clock()

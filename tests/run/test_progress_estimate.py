@@ -89,6 +89,35 @@ def test_without_a_plan_there_is_the_stage_alone():
     assert 0.0 <= run.fraction < 1.0
 
 
+def test_the_reason_goes_once_no_more_is_left_than_before():
+    run, clock = estimate()
+    run.tell(message("report", None, 0.0))
+    assert run.seconds_left == 10.0
+    run.tell(message("report", 0.5, 30.0, 30.0))
+    assert (run.seconds_left, run.why) == (30.0, "report takes longer than expected")
+    clock.now = 15.0
+    run.tell(message("report", 0.5, 30.0, 16.0))
+    assert (run.seconds_left, run.why) == (15.0, "report takes longer than expected")
+    clock.now = 21.0
+    run.tell(message("report", 0.6, 36.0, 9.5))
+    assert (run.seconds_left, run.why) == (9.0, "")
+
+
+def test_a_stage_begins_at_the_pace_of_those_before():
+    """On a machine half as fast the last stage would else be told at half, and then grow."""
+    run, clock = estimate()
+    clock.now = 20.0
+    run.tell(message("mesh", 1.0, 20.0, state="end"))
+    clock.now = 140.0
+    run.tell(message("Model A", 1.0, 120.0, state="end"))
+    assert run.seconds_left == 20.0
+    run.tell(message("report", None, 0.0, state="start"))
+    assert run.seconds_left == 20.0
+    clock.now = 150.0
+    run.tell(message("report", None, 10.0))
+    assert (run.seconds_left, run.why) == (10.0, "")
+
+
 STAGES = st.sampled_from(["mesh", "Model A", "report", "light"])
 NUMBER = st.one_of(st.none(), st.floats(0.0, 1e4))
 MESSAGE = st.tuples(STAGES, st.one_of(st.none(), st.floats(0.0, 1.0)), NUMBER, NUMBER, st.floats(0.0, 60.0))

@@ -177,7 +177,7 @@ def _where(places: np.ndarray[Any, Any]) -> str:
 def plan_of(job: Job) -> Plan:
     """Stages of a check with the seconds that each is expected to take on two cores."""
     stages = {"part": 4.0, "faces": 2.0, "thickness and gaps": 2.5, "chambers and drains": 2.0}
-    return [*stages.items(), ("layers", 1.0), ("build directions", 2.5), ("report", 5.0)]
+    return [*stages.items(), ("layers", 1.0), ("build directions", 2.5), ("report", 9.0)]
 
 
 USE_CASE = UseCase("check", LAYOUT, read_job, check_print, console_summary, plan=plan_of)

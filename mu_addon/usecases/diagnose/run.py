@@ -294,11 +294,11 @@ def plan_of(job: Job) -> Plan:
     """Stages of a diagnosis with the seconds that each is expected to take on two cores."""
     experiments = job.measured.experiments
     a_set = len(experiments) / SET
-    judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 30.0, "gain": 0.5}
+    judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 15.0, "gain": 0.5}
     return [
         *simulations_plan(experiments, job.fidelity),
         *((name, s * a_set) for name, s in judged.items()),
-        ("report", 6.0),
+        ("report", 4.0),
     ]
 
 

@@ -22,7 +22,7 @@ from ..simulate_and_place.expected import PACE
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S = 40.0, 150.0
+LATTICE_S, UNIT_S = 10.0, 150.0
 """Seconds that the simulations of blocks, and of a homogenised unit with all effects, take about."""
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
