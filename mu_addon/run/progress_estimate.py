@@ -37,8 +37,8 @@ class ProgressEstimate:
     """The whole of a run as it goes on; `tell` it each progress message.
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
-    why: why the time left grew, for as long as it is more than before, or nothing. Without a plan there are only the stages so far, and no
-    time left but the present stage's.
+    why: why the time left grew, for as long as it is more than before, or nothing. Without a plan there are
+    only the stages so far, and no time left but the present stage's.
     """
 
     def __init__(self, plan: Plan = (), clock: Callable[[], float] = time.monotonic) -> None:
