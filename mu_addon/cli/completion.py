@@ -43,7 +43,7 @@ def script(parser: argparse.ArgumentParser) -> str:
     presets = {"grip": gripper_names()}
     choices, options = [], []
     for name, command in _commands(parser):
-        flags = []
+        flags: list[str] = []
         for action in command._actions:
             flags += action.option_strings
             given = [*map(str, action.choices or ())]
