@@ -36,7 +36,7 @@ def unit(tmp_path_factory):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, unit, with_light):
     folder = with_light(tmp_path_factory.mktemp("place") / "out")
-    done = run("place", *unit, "--out", folder, *COARSE)
+    done = run("place", *unit, "--out", folder, *COARSE, "--refine", "0.4")
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -44,6 +44,8 @@ def finished(tmp_path_factory, unit, with_light):
 # Linear elements, one rule and no pictures show as well that a run comes to the same digits by another way.
 SMALL = (*COARSE, "--order", "1", "--rule", "volume_fraction", "--no-mesh-check")
 QUICK = (*SMALL, "--no-report")
+# Its motion alone.
+MOTION = (*COARSE[: COARSE.index("--stations")], "--order", "1", "--no-report")
 
 
 @pytest.fixture(scope="module")
@@ -213,6 +215,9 @@ def searched(tmp_path_factory, unit, with_light):
     return folder, done
 
 
+@pytest.mark.nightly(
+    "tests/placement/test_search.py::test_the_search_finds_the_best_of_all_and_checks_only_some"
+)
 def test_the_whole_lattice_is_searched_for_the_best_path(searched):
     folder, done = searched
     found = json.loads((folder / "summary.json").read_text())["search"]
@@ -228,6 +233,7 @@ def test_the_whole_lattice_is_searched_for_the_best_path(searched):
     assert all(low - 1e-6 <= float(p["length_mm"]) <= high + 1e-6 for p in paths)
 
 
+@pytest.mark.nightly("tests/placement/test_search.py::test_the_half_mesh_predicts_what_the_whole_one_does")
 def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     """The same path by two ways: the half mesh for windows, the whole one for the lattice's."""
     folder, _ = searched
@@ -287,7 +293,9 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
     assert json.loads((out / "summary.json").read_text())["status"] == "running"
 
 
-def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, unit, with_light, tmp_path):
+@pytest.fixture
+def interrupted(tmp_path, unit, with_light):
+    """Folder of a run that was stopped among its candidates, and what it said."""
     out = with_light(tmp_path / "out")
     process = started(out, unit)
     wait_for_a_state_swept(process, out)
@@ -295,7 +303,12 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, 
     os.killpg(process.pid, signal.SIGINT)
     output, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130, errors
-    assert "Traceback" not in output + errors
+    return out, output + errors
+
+
+def test_interrupted_it_keeps_what_it_has(interrupted):
+    out, said = interrupted
+    assert "Traceback" not in said
     summary = json.loads((out / "summary.json").read_text())
     assert summary["status"] == "partial"
     assert "Ctrl-C" in summary["reason"]["what"]
@@ -305,6 +318,11 @@ def test_interrupted_it_keeps_what_it_has_and_resumes_to_the_same_digits(quick, 
     assert "This report has no pictures" in report
     assert "image/png" not in report
     assert (out / "unit.stl").exists()
+
+
+@pytest.mark.nightly("tests/headless/test_resume.py::test_killed_at_any_stage_it_goes_on_to_the_same_digits")
+def test_interrupted_it_resumes_to_the_same_digits(interrupted, quick, unit):
+    out, _ = interrupted
     assert run("place", *unit, "--out", out, *QUICK).returncode == 0
     assert same_delta(out, quick)
 
@@ -315,17 +333,21 @@ def same_delta(one, other):
         return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
 
 
-def test_it_is_the_same_inside_bpy(quick, unit, with_light, tmp_path):
+@pytest.mark.parametrize(
+    "job", ["simulate", pytest.param("place", marks=pytest.mark.nightly("test_it_is_the_same_inside_bpy"))]
+)
+def test_it_is_the_same_inside_bpy(quick, unit, with_light, tmp_path, job):
     pytest.importorskip("bpy", reason="the bpy wheel is for Python 3.11 only")
     out = with_light(tmp_path / "out")
     script = f"""
 import bpy, runpy, sys
-sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", "place", "--unit", {str(unit[1])!r}]
-sys.argv += ["--out", {str(out)!r}, *{list(QUICK)!r}]
+sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", {job!r}, "--unit", {str(unit[1])!r}]
+sys.argv += ["--out", {str(out)!r}, *{list(QUICK if job == "place" else MOTION)!r}]
 runpy.run_path({str(RUN)!r}, run_name="__main__")
 """
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, cwd=ROOT.parent
     )
     assert done.returncode == 0, done.stderr
-    assert same_delta(out, quick)
+    assert (out / "angle.csv").read_bytes() == (quick / "angle.csv").read_bytes()
+    assert job == "simulate" or same_delta(out, quick)

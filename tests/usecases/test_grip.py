@@ -180,9 +180,13 @@ def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
 
 @pytest.mark.slow
 def test_a_grasp_with_friction_from_the_command_line(tmp_path):
-    """Grasp, hold, lift, release: forces, energy, light, files; and a second run finds it all done."""
+    """Grasp, hold, lift, release: forces, energy, light, files; and a second run finds it all done.
+
+    By fingers of three chambers, which hold a lighter cube that is as smooth as to slide.
+    """
     out = tmp_path / "out"
-    line = ["grip", "--preset", "gripper", "--out", str(out), "--cube", "25", "--no-paths", "--coarse"]
+    line = ["grip", "--gripper", str(short_gripper(tmp_path)), "--out", str(out), "--cube", "25"]
+    line += ["--density", "0.6", "--friction", "0.3", "--no-paths", "--coarse"]
     assert main([*line, "--refine", "0.3"]) == 0
     summary = json.loads((out / "summary.json").read_text())
     g = summary["grasps"]["25"]
@@ -190,7 +194,7 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     assert g["margin"] > 1.0
     assert g["carried_after_lift_N"] == pytest.approx(g["weight_N"], rel=0.1)
     # Sliding at the plateau: friction is at its bound, and drags the cube down.
-    assert g["down_at_hold_N"] == pytest.approx(0.5 * g["normal_at_hold_N"], rel=0.05)
+    assert g["down_at_hold_N"] == pytest.approx(0.3 * g["normal_at_hold_N"], rel=0.05)
     # What pressure and the cube's way put in over the cycle is what friction took.
     put_in = g["pressure_work_mJ"] + g["cube_work_mJ"]
     assert put_in == pytest.approx(g["lost_to_friction_mJ"], rel=0.15)

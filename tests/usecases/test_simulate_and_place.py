@@ -22,8 +22,10 @@ from mu_addon.usecases.simulate_and_place.motion import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 
+UNIT = load_preset("mu-1.0x")
+# Four chambers, three paths: as many stages as six and ten have.
 JOB = Job(
-    unit=load_preset("mu-1.0x"),
+    unit=attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4)),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
     mesh=MeshSettings(refine=0.4, order=1),
     times=3,
@@ -49,8 +51,8 @@ def read_rows(path):
 
 
 @pytest.fixture(scope="module")
-def placed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study") / "placed"
+def placed(tmp_path_factory, with_light):
+    folder = with_light(tmp_path_factory.mktemp("study") / "placed")
     return folder, ran(JOB, folder)
 
 
@@ -207,11 +209,12 @@ def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
 
 
 def test_room_is_asked_for_as_the_study_grows():
-    coarse, fine = (attrs.evolve(JOB, mesh=MeshSettings(refine=r)) for r in (0.4, 1.8))
+    job = attrs.evolve(JOB, unit=UNIT)
+    coarse, fine = (attrs.evolve(job, mesh=MeshSettings(refine=r)) for r in (0.4, 1.8))
     assert module._expected_nodes(coarse) < module._expected_nodes(fine)
     # Known meshes of mu-1.0x, see the numbers in its docstring.
     for refine, nodes in ((0.4, 5_014), (1.0, 18_477), (1.8, 71_082)):
-        expected = module._expected_nodes(attrs.evolve(JOB, mesh=MeshSettings(refine=refine)))
+        expected = module._expected_nodes(attrs.evolve(job, mesh=MeshSettings(refine=refine)))
         assert 0.8 * nodes < expected < 1.8 * nodes
 
 
