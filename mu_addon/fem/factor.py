@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -39,12 +40,41 @@ def nested_dissection(pattern: sparse.csr_matrix) -> Array:
 def _minimum_degree(graph: sparse.csr_matrix) -> Array:
     """Order (n,) of the nodes of a graph by approximate minimum degree, or as given without cvxopt."""
     try:
+        _load_cvxopt()
         from cvxopt import amd, matrix, spmatrix
     except ImportError:
         return np.arange(graph.shape[0])
     lower = sparse.tril(graph).tocoo()
     rows, columns = (matrix(part.astype(np.int64)) for part in (lower.row, lower.col))
     return np.array(amd.order(spmatrix(1.0, rows, columns, graph.shape))).ravel().astype(np.int64)
+
+
+@cache
+def _load_cvxopt() -> None:
+    """Load cvxopt, whose own OpenBLAS reads these variables meanwhile. Raises ImportError."""
+    # Its threads spin while they wait for each other on the small dense blocks here: two made Model A four
+    # times slower than one.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    name, chosen = "OPENBLAS_CORETYPE", "OPENBLAS_CORETYPE" in os.environ
+    if not chosen:
+        # Its version, 0.3.15, takes processors younger than itself for one of 2004.
+        os.environ[name] = _kernels()
+    try:
+        import cvxopt.cholmod  # noqa: F401
+    finally:
+        if not chosen:
+            # numpy's OpenBLAS, which other processes load, is newer and knows them.
+            del os.environ[name]
+
+
+def _kernels() -> str:
+    """OpenBLAS's name of the kernels for what this processor can do; empty where it may choose itself."""
+    known: Any = np.show_config(mode="dicts")
+    simd = known["SIMD Extensions"]
+    able = {*simd["baseline"], *simd["found"]}
+    if able & {"AVX512_SKX", "X86_V4"}:
+        return "SkylakeX"
+    return "Haswell" if able & {"AVX2", "X86_V3"} else ""
 
 
 class Cholesky:
@@ -55,9 +85,7 @@ class Cholesky:
     """
 
     def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
-        # Read when cvxopt loads its own OpenBLAS. Its threads spin while they wait for each other on
-        # the small dense blocks here: two made Model A four times slower than one.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        _load_cvxopt()
         from cvxopt import cholmod, matrix, spmatrix
 
         n = len(indptr) - 1

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import importlib.util
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,3 +52,20 @@ def test_without_metis_minimum_degree_still_saves_fill(monkeypatch: pytest.Monke
     as_given = fill(matrix, np.arange(12**3))
     monkeypatch.setitem(sys.modules, "pymetis", None)
     assert best < fill(matrix, nested_dissection(matrix)) < 0.75 * as_given
+
+
+def test_the_factors_use_what_the_processor_can_do() -> None:
+    """The OpenBLAS of cvxopt does not know processors of after 2021, and takes them for one of 2004."""
+    known = np.show_config(mode="dicts")["SIMD Extensions"]
+    if not {"AVX2", "X86_V3"} & {*known["found"], *known["baseline"]}:
+        pytest.skip("no AVX2")
+    # Imported, it would have chosen.
+    found = importlib.util.find_spec("cvxopt")
+    assert found is not None and found.origin is not None
+    libraries = list((Path(found.origin).parents[1] / "cvxopt.libs").glob("libopenblas*"))
+    if not libraries:
+        pytest.skip("this cvxopt brings no OpenBLAS of its own")
+    Cholesky(np.array([0, 1]), np.array([0]), np.array([0]))
+    library = ctypes.CDLL(str(libraries[0]))
+    library.openblas_get_corename.restype = ctypes.c_char_p
+    assert library.openblas_get_corename() in (b"SkylakeX", b"Haswell")
