@@ -61,7 +61,8 @@ def test_the_factors_use_what_the_processor_can_do() -> None:
         pytest.skip("no AVX2")
     # Imported, it would have chosen.
     found = importlib.util.find_spec("cvxopt")
-    assert found is not None and found.origin is not None
+    assert found is not None
+    assert found.origin is not None
     libraries = list((Path(found.origin).parents[1] / "cvxopt.libs").glob("libopenblas*"))
     if not libraries:
         pytest.skip("this cvxopt brings no OpenBLAS of its own")
