@@ -69,8 +69,9 @@ def _load_cvxopt() -> None:
 
 def _kernels() -> str:
     """OpenBLAS's name of the kernels for what this processor can do; empty where it may choose itself."""
-    known: Any = np.show_config(mode="dicts")
-    simd = known["SIMD Extensions"]
+    # numpy 1.26 has types for less.
+    show: Any = np.show_config
+    simd = show(mode="dicts")["SIMD Extensions"]
     able = {*simd["baseline"], *simd["found"]}
     if able & {"AVX512_SKX", "X86_V4"}:
         return "SkylakeX"

@@ -6,6 +6,7 @@ import ctypes
 import importlib.util
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,7 +57,8 @@ def test_without_metis_minimum_degree_still_saves_fill(monkeypatch: pytest.Monke
 
 def test_the_factors_use_what_the_processor_can_do() -> None:
     """The OpenBLAS of cvxopt does not know processors of after 2021, and takes them for one of 2004."""
-    known = np.show_config(mode="dicts")["SIMD Extensions"]
+    show: Any = np.show_config
+    known = show(mode="dicts")["SIMD Extensions"]
     if not {"AVX2", "X86_V3"} & {*known["found"], *known["baseline"]}:
         pytest.skip("no AVX2")
     # Imported, it would have chosen.
