@@ -94,6 +94,7 @@ def test_other_inputs_set_the_old_results_aside(lattice):
     [
         (("--cells", "0"), 2, "cells = 0 is out of bounds"),
         (("--strain", "2"), 2, "strain = 2 is out of bounds"),
+        (("--refine", "0.4"), 2, "refine = 0.4 is too coarse for the specimen"),
         (("--resin", "no-such-resin"), 2, "no-such-resin"),
     ],
 )

@@ -78,7 +78,7 @@ def jobs(folder):
     )
     yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
     yield specimens.Job(UNIT, resin)
-    yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 1 / 3)
+    yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 2 / 3)
     yield homogenize.Job(UNIT, homogenize.resin_of(None, load_preset("mu-1.5x")), frictions=())
     yield grip.Job(
         load_gripper("gripper"),

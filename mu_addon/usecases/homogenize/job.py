@@ -9,6 +9,7 @@ import attrs
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.settings import USUAL_RESIN
 from ...design.strut_cell import StrutCell, strut_cell
+from ...errors import InputError
 from ...homogenize.cell_mesh import CellMeshSettings
 from ...homogenize.compression import STRAINS, Friction
 from ...materials.library import Material, load_material, read_material
@@ -37,6 +38,8 @@ LAYOUT = FolderLayout(
 )
 # Elements to a strut's diameter in the block: its cell's modulus is within 2 % of a fine mesh's.
 BLOCK_PER_DIAMETER = 1.0
+# Below it less than half an element to a diameter, which no cell is meshed with.
+SPECIMEN_REFINE = 0.5
 
 
 @attrs.frozen
@@ -71,6 +74,14 @@ class Job:
     frictions: tuple[Friction, ...] = FRICTIONS
     strain: float = STRAIN.field()
     refine: float = REFINE.field()
+
+    def __attrs_post_init__(self) -> None:
+        if self.frictions and self.refine < SPECIMEN_REFINE:
+            raise InputError(
+                f"refine = {self.refine:g} is too coarse for the specimen",
+                "refine",
+                f"give {SPECIMEN_REFINE:g} or more, or leave the specimen out",
+            )
 
     @property
     def cell(self) -> StrutCell:
