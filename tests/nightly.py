@@ -27,10 +27,14 @@ def marked(file):
     """Nightly tests of a file: name -> test that guards by day."""
     found = {}
     tree = ast.parse(file.read_text(encoding="utf-8"))
-    of_all = _quick_test([n for n in tree.body if isinstance(n, ast.Assign) and _is_pytestmark(n)])
+    assigned = [n for n in tree.body if isinstance(n, ast.Assign)]
+    of_all = _quick_test(filter(_is_pytestmark, assigned))
+    constants = {t.id: n.value for n in assigned for t in n.targets if isinstance(t, ast.Name)}
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-            quick = _quick_test(node.decorator_list) or of_all
+            named = [n.id for d in node.decorator_list for n in ast.walk(d) if isinstance(n, ast.Name)]
+            marks = [constants[name] for name in named if name in constants]
+            quick = _quick_test([*node.decorator_list, *marks]) or of_all
             if quick:
                 found[node.name] = quick
     return found

@@ -55,7 +55,15 @@ def test_two_causes_are_found_though_neither_looks_best_alone():
 TWO = {"effect": ["wall_thickness", "strain_stiffening"]}
 
 
-@pytest.mark.parametrize(("effect", "times"), [("resonance", 4.0), ("resonance", 10.0)])
+@pytest.mark.parametrize(
+    ("effect", "times"),
+    [
+        ("resonance", 4.0),
+        pytest.param(
+            "resonance", 10.0, marks=pytest.mark.nightly("test_what_is_outside_the_library_gets_no_name")
+        ),
+    ],
+)
 def test_what_is_outside_the_library_gets_no_name(effect, times):
     row = judged(SMALL | {"seed": 6, "effect": effect, "times": times})
     assert (row["verdict"], row["names"]) == ("unexplained", [])

@@ -27,7 +27,12 @@ def digest(s):
     return hashlib.sha256(surface.stl_bytes(s.vertices, s.triangles)).hexdigest()
 
 
-@pytest.mark.parametrize("path", [None, "alpha4"])
+WITH_A_WAVEGUIDE = pytest.mark.nightly(
+    "tests/design/test_waveguide.py::test_every_gate_holds_with_a_waveguide"
+)
+
+
+@pytest.mark.parametrize("path", [None, pytest.param("alpha4", marks=WITH_A_WAVEGUIDE)])
 @pytest.mark.parametrize("name", PRESETS)
 def test_presets_pass_every_gate(name, path):
     g = built(name, path).gates

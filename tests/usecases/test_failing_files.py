@@ -61,9 +61,9 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [31, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
+@pytest.mark.parametrize("step", [61, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    """Each 31st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    """Each 61st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
     assert inject_each(placement(monkeypatch), tmp_path, failing, 5, PARTIAL, step=step) == []
 
 

@@ -11,7 +11,7 @@ from mu_addon.cli.main import main, parser
 from mu_addon.cli.options import modelled, modelled_unit
 from mu_addon.design import shapes
 from mu_addon.design.body import body_of
-from mu_addon.design.parameters import load_preset
+from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import ExtendedModel, Fitted
@@ -316,14 +316,16 @@ def test_a_clog_is_refused_where_the_whole_lattice_is_searched():
         with_effects(job=attrs.evolve(JOB, paths="graph"), clogged_chamber=0.5)
 
 
-def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys, mesh):
+def test_the_command_line_simulates_what_a_diagnosis_found(tmp_path, capsys):
     path = model_file(tmp_path / "model.toml", gravity=1300.0, strain_stiffening=0.4)
     (tmp_path / "up.csv").write_text("time_s,pressure_kPa\n0,0\n1,-10\n2,0\n3,20\n")
-    line = ["simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--json", "--times", 4]
+    (tmp_path / "unit.toml").write_text(to_toml(SHORT.unit))
+    line = ["simulate", "--unit", tmp_path / "unit.toml", "--out", tmp_path / "out", "--json", "--times", 4]
     line += ["--protocol", tmp_path / "up.csv", "--order", 1, "--refine", 0.4]
     assert main([str(word) for word in [*line, "--model", path, "--orientation", 90]]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    _, angles = moved(with_effects(90.0, gravity=1300.0, strain_stiffening=0.4), mesh)
+    job = with_effects(90.0, job=SHORT, gravity=1300.0, strain_stiffening=0.4)
+    _, angles = moved(job, mesh_unit(SHORT.unit, ROUGH))
     assert list(summary["angle_deg"].values()) == pytest.approx(angles, rel=1e-9)
     assert summary["study"]["orientation_deg"] == 90.0
     assert summary["study"]["effects"] == named(gravity=1300.0, strain_stiffening=0.4)
