@@ -41,21 +41,21 @@ ROWS = (
     f"export {UNIT} --path alpha4",
     "specimens",
     f"simulate {UNIT} {QUICK}",
-    f"simulate {UNIT} --refine 0.5 --times 3",
-    f"place {UNIT} --fidelity homogenised --refine 0.5 --times 5 --stations 11",
+    f"simulate {UNIT} --refine 0.4 --times 3",
+    f"place {UNIT} {QUICK} --stations 11",
     "resume FOLDER",
-    f"homogenize {UNIT} --cells 2 --refine 0.5",
+    f"homogenize {UNIT} --no-specimen --refine 0.5",
     "fit-material tests/data/treloar",
     "import tension.csv --set kind=coupon --set mode=uniaxial --set section_mm=12.5x3 --set length_mm=40",
     "diagnose assets/examples/paper-moduli",
-    "design-experiments assets/examples/paper-bending --noise angle=0.5",
+    "design-experiments assets/examples/paper-moduli",
     "optimize design.toml",
     "sweep sweep.toml",
     "graph assets/graphs/unit.toml",
-    "grip --preset gripper --coarse --no-paths --refine 0.3",
+    "grip --preset gripper --coarse --no-paths --cube 25 --refine 0.25",
     "chain chain.toml",
     "ports",
-    "stream --simulate --seconds 5",
+    "stream --simulate --seconds 20",
     "record --simulate --seconds 5",
     "replay RECORDING",
     "calibrate SWEEPS --channel light_V --dark dark_V --angles assets/examples/bench/angles.csv",
@@ -137,7 +137,9 @@ def prepare(work: Path) -> None:
     for name in ("assets", "tests"):
         (work / name).symlink_to(ROOT / name)
     (work / "sweep.toml").write_text(SWEEP)
-    (work / "design.toml").write_text(DESIGN)
+    (work / "design.toml").write_text(
+        DESIGN.replace("evaluations = 6", "evaluations = 4").replace("0.4", "0.3")
+    )
     (work / "chain.toml").write_text(CHAIN)
     (work / "chain.csv").write_text(CHAIN_PROTOCOL)
     rows = "".join(f"{0.1 * n:.1f},{0.05 * n:.3f},{0.02 * n:.3f}\n" for n in range(200))
@@ -164,7 +166,7 @@ def main() -> None:
             if given.commands and name not in given.commands:
                 continue
             out = f"out{number}"
-            if name not in ("presets", "ports", "resume", "replay"):
+            if name not in ("presets", "ports", "resume"):
                 words += ["--out", out]
             found = ran(words, work)
             told, silent, factor, faults = judged(found)

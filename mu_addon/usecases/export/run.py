@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 MESH_TOLERANCE = 1e-4
 SOLID_S = {"interactive": 3.0, "export": 20.0}
-FORMAT_S = {"stl": 3.0, "3mf": 12.0, "3mf-beams": 14.0, "step": 15.0, "txt": 0.5}
+FORMAT_S = {"stl": 2.0, "3mf": 12.0, "3mf-beams": 14.0, "step": 22.0, "txt": 0.5}
 """Seconds that writing a format and reading it back takes about."""
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
 STEP_TOLERANCE = 5e-3
