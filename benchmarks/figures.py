@@ -4,7 +4,8 @@
     python benchmarks/figures.py fill                      write every table of the pages anew
 
 A page marks the place of a table with `<!-- figures/NAME.csv -->`; `<!-- figures/NAME.csv last -->` keeps the
-last of the rows that agree in their first two cells, such as the finest mesh of each element.
+last of the rows that agree in their first two cells, such as the finest mesh of each element. Of
+`<!-- figures/NAME.csv linked -->` the page has only a link.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 PAGES = Path(__file__).parents[1] / "docs" / "engineering"
 FIGURES = PAGES / "figures"
 # A mark, and the table and its source that stand below it.
-MARK = re.compile(r"(<!-- figures/([\w-]+)\.csv( last)? -->\n)((?:\|.*\n)*)(\n\*.*\*\n)?")
+MARK = re.compile(r"(<!-- figures/([\w-]+)\.csv( last| linked)? -->\n)((?:\|.*\n)*)(\n\*.*\*\n)?")
 
 
 def tables(text: str) -> list[tuple[str, list[list[str]]]]:
@@ -74,6 +75,8 @@ def filled(page: str, figures: Path = FIGURES) -> str:
     """A page with every table that it marks made from its CSV file."""
 
     def one(match: re.Match[str]) -> str:
+        if match[3] == " linked":
+            return match[0]
         return match[1] + "".join(table(figures / f"{match[2]}.csv", bool(match[3])))
 
     return MARK.sub(one, page)

@@ -14,7 +14,7 @@ SLACK_S = 5.0
 MOST_BY_CLOCK = 0.95
 """How much of a stage is taken for done by the clock alone: it has not ended."""
 SURE = 0.1
-"""Share of a stage from which on it alone tells of its rest: first steps may be many times slower."""
+"""Share of a stage, or of all, from which on it alone tells of the rest: first steps may be many times slower."""
 OVERDUE = 0.2
 """Share of its time that a stage beyond its plan is taken to need still: nothing says that it ends now."""
 UNPLANNED_S = 20.0
@@ -145,9 +145,16 @@ class ProgressEstimate:
             self._set_left(own, "")
 
     def _pace(self) -> float:
-        """By what factor finished stages took longer than expected, within what one can believe."""
+        """By what factor finished stages took longer than expected, within what one can believe.
+
+        Four seconds say little of ten minutes: what is less than SURE of the whole counts by its share of that.
+        """
         expected = sum(self._expected[name] for name in self._taken)
-        return min(max(sum(self._taken.values()) / expected, 0.2), 5.0) if expected > 1.0 else 1.0
+        if expected <= 1.0:
+            return 1.0
+        factor = min(max(sum(self._taken.values()) / expected, 0.2), 5.0)
+        weight = min(expected / (SURE * sum(self._expected.values())), 1.0)
+        return 1.0 + weight * (factor - 1.0)
 
     def _set_left(self, left: float, added: str) -> None:
         """The time left: it shrinks, or grows by so much that the reason is told."""

@@ -105,6 +105,14 @@ def test_the_reason_goes_once_no_more_is_left_than_before():
     assert (run.seconds_left, run.why) == (8.0, "")
 
 
+def test_a_short_stage_says_little_of_a_long_run():
+    """A solid that took 13 s instead of 4 s made half an hour of nine minutes."""
+    run, clock = estimate((("solid", 4.0), ("Model A", 500.0), ("report", 36.0)))
+    clock.now = 13.0
+    run.tell(message("solid", 1.0, 13.0, state="end"))
+    assert 536.0 - 9.0 <= run.seconds_left < 1.2 * 536.0
+
+
 def test_a_stage_begins_at_the_pace_of_those_before():
     """On a machine half as fast the last stage would else be told at half, and then grow."""
     run, clock = estimate()

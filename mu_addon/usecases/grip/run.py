@@ -12,6 +12,7 @@ from ...meshing.unit import mesh_unit
 from ...run.context import RunContext
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
+from ..simulate_and_place.expected import BY_REFINEMENT
 from .grasp import Cube
 from .gripping import Gripping
 from .job import LAYOUT, Job, read_job
@@ -64,7 +65,8 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 def plan_of(job: Job) -> Plan:
     """Stages of a grasp with the seconds that each is expected to take on two cores."""
-    grasps = [(f"grasp of {cube.side_mm:g} mm", 280.0) for cube in job.cubes]
+    seconds = 280.0 * (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
+    grasps = [(f"grasp of {cube.side_mm:g} mm", seconds) for cube in job.cubes]
     return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]
 
 
