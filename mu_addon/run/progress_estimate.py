@@ -14,7 +14,7 @@ SLACK_S = 5.0
 MOST_BY_CLOCK = 0.95
 """How much of a stage is taken for done by the clock alone: it has not ended."""
 SURE = 0.1
-"""Share of a stage, or of all, from which on it alone tells of the rest: first steps may be many times slower."""
+"""Share of a stage, or of all, from which on it alone tells of the rest: first steps may be far slower."""
 OVERDUE = 0.2
 """Share of its time that a stage beyond its plan is taken to need still: nothing says that it ends now."""
 UNPLANNED_S = 20.0
@@ -147,7 +147,7 @@ class ProgressEstimate:
     def _pace(self) -> float:
         """By what factor finished stages took longer than expected, within what one can believe.
 
-        Four seconds say little of ten minutes: what is less than SURE of the whole counts by its share of that.
+        Four seconds say little of ten minutes: less than SURE of the whole counts by its share of that.
         """
         expected = sum(self._expected[name] for name in self._taken)
         if expected <= 1.0:
