@@ -54,7 +54,7 @@ class ProgressEstimate:
         self._at = self._began = clock()
         self.fraction = 0.0
         self.why = ""
-        self._grown_from = self._grown_to = 0.0
+        self._grown_from = 0.0
 
     @property
     def number(self) -> int:
@@ -164,12 +164,12 @@ class ProgressEstimate:
                 self._forget_reason(shown)
                 return
             self.why = f"{added} was added" if added else f"{self._stage} takes longer than expected"
-            self._grown_from, self._grown_to = shown, left
+            self._grown_from = shown
         else:
             self._forget_reason(left)
         self._left, self._at = left, self._clock()
 
     def _forget_reason(self, left: float) -> None:
-        """Forget why the time left grew once it is back where it was, or half of what it had become."""
-        if left <= max(self._grown_from, self._grown_to / 2.0):
+        """Forget why the time left grew once it is about what it was before."""
+        if left <= LONGER * self._grown_from + SLACK_S:
             self.why = ""

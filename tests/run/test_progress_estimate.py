@@ -97,9 +97,9 @@ def test_the_reason_goes_once_no_more_is_left_than_before():
     assert (run.seconds_left, run.why) == (30.0, "report takes longer than expected")
     run.tell(message("report", 0.5, 30.0, 29.0))
     assert run.why, "no line may have shown it yet"
-    clock.now = 12.0
-    run.tell(message("report", 0.5, 30.0, 18.0))
-    assert (run.seconds_left, run.why) == (17.0, "report takes longer than expected")
+    clock.now = 10.0
+    run.tell(message("report", 0.5, 30.0, 19.5))
+    assert (run.seconds_left, run.why) == (19.0, "report takes longer than expected")
     clock.now = 21.0
     run.tell(message("report", 0.6, 36.0, 9.5))
     assert (run.seconds_left, run.why) == (8.0, "")
