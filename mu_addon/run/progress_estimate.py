@@ -92,7 +92,9 @@ class ProgressEstimate:
         if self._planned and self._share < SURE:
             # At the pace of what is done, as the stages to come, else it would jump where one begins.
             expected = self._expected[stage] * self._pace()
-            by_plan = max(expected - self._spent, OVERDUE * self._spent)
+            # Of the last one beyond its time nothing is known, and a time that grows and grows is none.
+            last = stage == [*self._expected][-1]
+            by_plan = max(expected - self._spent, 0.0 if last else OVERDUE * self._spent)
             if not self._share:
                 # By the clock, as long as the stage itself says nothing.
                 self._share = min(self._spent / expected, MOST_BY_CLOCK) if expected > 0.0 else 0.0

@@ -105,6 +105,17 @@ def test_the_reason_goes_once_no_more_is_left_than_before():
     assert (run.seconds_left, run.why) == (8.0, "")
 
 
+def test_no_time_is_told_of_a_last_stage_beyond_its_own():
+    """A report at 96 % said 9 s, 16 s, 11 s for half a minute."""
+    run, clock = estimate()
+    for second in range(40):
+        clock.now = float(second)
+        run.tell(message("report", None, float(second)))
+        assert run.seconds_left == max(10.0 - second, 0.0)
+        assert run.why == ""
+    assert run.fraction < 1.0
+
+
 def test_a_short_stage_says_little_of_a_long_run():
     """A solid that took 13 s instead of 4 s made half an hour of nine minutes."""
     run, clock = estimate((("solid", 4.0), ("Model A", 500.0), ("report", 36.0)))
