@@ -1,9 +1,15 @@
 """Plans of runs: the stages that a command tells at its start are those that come, and its share grows."""
 
+import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
+from mu_addon.design.parameters import Unit
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.placement.inclusion import PRINTED, RULES
 from mu_addon.run import progress
+from mu_addon.usecases.simulate_and_place import job as study
+from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work
 
 STUDY = ["--fidelity", "homogenised", "--order", "1", "--refine", "0.3", "--times", "3"]
 SWEEP = """
@@ -51,3 +57,12 @@ def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
     assert shares == sorted(shares)
     left = [m["whole_seconds_left"] for m in told if not m.get("why")]
     assert all(seconds is not None for seconds in left)
+
+
+@pytest.mark.parametrize(("printed", "suction"), [(False, 1.0), (True, TOUCHING)])
+def test_suction_takes_longest_where_walls_touch(printed, suction):
+    mesh = MeshSettings(fidelity="resolved" if printed else "homogenised")
+    rules = (PRINTED,) if printed else RULES
+    job = study.Job(Unit(), study.grasp(), mesh, rules=rules, self_contact=printed)
+    assert work(job, np.array([-20.0, 0.0, 40.0])).tolist() == [suction, 0.0, 1.0]
+    assert work(job, np.unique(job.samples[1])).sum() == 2 * suction + 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,17 +11,21 @@ if TYPE_CHECKING:
     from ...run.progress_estimate import Plan
     from .job import Job
 
+Array = np.ndarray[Any, Any]
+
 FULL_S = {
     "solid": 4.0, "mesh": 4.0, "Model A": 100.0, "candidates": 200.0, "mesh check": 100.0, "map": 5.0,
     "light": 20.0, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
     "motion of the best path": 60.0, "report": 30.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
-PACE = {"full": 1.0, "resolved": 5.0, "quick": 0.1}
+PACE = {"full": 1.0, "resolved": 3.5, "quick": 0.1}
 """How a study's equilibria take longer or shorter by its detail."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-# Pressures other than 0 of the shipped protocol at the default number of times.
-_PRESSURES = 6
+TOUCHING = 7.0
+"""How many times as long as others a state under suction takes where the printed body's walls touch."""
+# Pressures in kPa other than 0 of the shipped protocol at the default number of times.
+_SHIPPED = np.array([-20.0, -10.0, 10.0, 20.0, 30.0, 40.0])
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5
 
@@ -35,6 +39,12 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
     return [*names, "report"]
 
 
+def work(job: Job, pressure_kPa: Array) -> Array:
+    """Work of a state at each pressure (k,), in that of one under pressure; of the rest, at 0 kPa, none."""
+    touching = job.mesh.resolved and job.self_contact
+    return np.where(pressure_kPa < 0, TOUCHING if touching else 1.0, np.where(pressure_kPa > 0, 1.0, 0.0))
+
+
 def plan_of(job: Job) -> Plan:
     """The stages of a study with the seconds that each is expected to take on two cores."""
     place, simulates = "place" in job.stages, "simulate" in job.stages
@@ -44,9 +54,10 @@ def plan_of(job: Job) -> Plan:
     if not simulates:
         return _scaled(names, 1.0)
     _, pressure = job.samples
-    states = np.count_nonzero(np.unique(pressure)) if not job.in_time else len(pressure)
+    states = np.sum(work(job, np.unique(pressure))) if not job.in_time else len(pressure)
+    shipped = np.sum(work(job, _SHIPPED))
     pace = PACE["resolved" if job.mesh.resolved else "full" if job.mesh.order == 2 else "quick"]
-    return _scaled(names, pace * job.mesh.refine**BY_REFINEMENT * max(states, 1) / _PRESSURES)
+    return _scaled(names, pace * job.mesh.refine**BY_REFINEMENT * max(states, 1) / shipped)
 
 
 def _scaled(names: Iterable[str], factor: float) -> Plan:

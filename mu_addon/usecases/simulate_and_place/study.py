@@ -58,6 +58,7 @@ from ...run.versions import package_versions
 from .candidate_states import CandidateSolver
 from .candidates_in_time import evaluations
 from .contact_history import history
+from .expected import work
 from .job import Job
 from .motion import write_model_a
 from .path_motion import keep_motion
@@ -304,17 +305,16 @@ class Study:
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
-        total = len(np.union1d(visited, 0.0))
-        done = 0
+        total, done = float(np.sum(work(self.job, visited))), 0.0
         body = Equilibrium(model, materials, self.job.newton)
 
         def keep(state: State) -> None:
             nonlocal done
-            done += 1
+            done += float(np.sum(work(self.job, np.array([state.pressure_kPa]))))
             least, _ = model.smallest_jacobian(state.u, body.parameters)
             words = f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}"
             words += f", {state.iterations} iterations, smallest det F {least:.2f}"
-            self.progress.update(done / total, words)
+            self.progress.update(done / total if total else 1.0, words)
             on_state(state)
 
         return simulate(
