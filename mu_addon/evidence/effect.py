@@ -48,6 +48,10 @@ LIBRARY = {
         "a record at rest; pressure and vacuum",
     ),
     "pressure_gain": ("the pressure gauge has a gain error", "a dead load, or a second gauge"),
+    "pressure_nonlinearity": (
+        "the gauge's reading is not proportional to the pressure, by at most 5 % of its largest",
+        "the gauge beside another one, in steps up to the largest pressure",
+    ),
     "pressure_drift": (
         "the zero of the pressure gauge drifts while it records",
         "the same hold at another pressure; the gauge read at rest for as long",

@@ -36,6 +36,7 @@ OF_THE_BENCH = CAMERA.union(
     (
         "pressure_offset",
         "pressure_gain",
+        "pressure_nonlinearity",
         "pressure_drift",
         "force_scale",
         "force_nonlinearity",

@@ -31,9 +31,9 @@ PRESSURES = np.linspace(-25.0, 50.0, 61)
 # Faults of what measures and holds: naming one of them blames no part of the unit or its resin.
 INSTRUMENTS = frozenset(
     (
-        "pressure_offset", "pressure_gain", "pressure_drift", "force_scale", "force_nonlinearity",
-        "force_drift", "force_lag", "angle_offset", "angle_drift", "camera_scale", "camera_tilt",
-        "camera_perspective", "lens_distortion", "clock_offset", "line_lag", "led_drift", "ambient_light",
+        "pressure_offset", "pressure_gain", "pressure_nonlinearity", "pressure_drift", "force_scale",
+        "force_nonlinearity", "force_drift", "force_lag", "angle_offset", "angle_drift", "camera_scale",
+        "camera_tilt", "camera_perspective", "lens_distortion", "clock_offset", "line_lag", "led_drift", "ambient_light",
         "seating", "frame_compliance", "marker_slip",
     )
 )  # fmt: skip

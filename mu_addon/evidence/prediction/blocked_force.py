@@ -16,6 +16,7 @@ from ..effect import Effect, Parameter
 from .amplifier import amplified, amplifier, filtered
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
+from .gauge import before_the_gauge
 from .unit import (
     GAUGE_SHARE,
     REFERENCE_C,
@@ -38,6 +39,7 @@ ACTING = (
     "temperature_drift",
     "pressure_offset",
     "pressure_gain",
+    "pressure_nonlinearity",
     "line_lag",
     "leak",
     "clock_offset",
@@ -69,7 +71,7 @@ class BlockedForce:
         static = [e for e in self._driven.effects if e.name in responses[0].variants]
         self._sizes = {e.name: e.keys[0] for e in static}
         self._most = most = largest_reading(FORCE, KIND, here)
-        gauge = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, here)
+        self._largest_kPa = largest_reading("pressure_kPa", KIND, here)
         self.effects = (
             *(
                 Effect(e.name, e.parameters, (KIND,), e.mechanism, refines=e.refines)
@@ -77,7 +79,7 @@ class BlockedForce:
                 if e.name in ACTING
             ),
             *(Effect(e.name, e.parameters, (KIND,)) for e in static),
-            *drifts("pressure_drift", "kPa", gauge, KIND, here),
+            *drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, KIND, here),
             *drifts("force_drift", "N", ZERO_SHARE * most, KIND, here),
             *amplifier(KIND),
             *([Effect("frame_compliance", (STAND,), (KIND,))] if "seating" in self._sizes else []),
@@ -100,7 +102,7 @@ class BlockedForce:
         if delay := get("clock_offset.offset_s", 0.0):
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
-        p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
+        p = before_the_gauge(p, values, self._largest_kPa)
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)
         kelvin = experiment.temperature_C - REFERENCE_C

@@ -15,7 +15,8 @@ from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import first_order_lag
-from .unit import GAUGE_SHARE, TIMED
+from .gauge import as_read, gauge
+from .unit import GAUGE_SHARE
 
 Array = np.ndarray[Any, Any]
 
@@ -150,7 +151,7 @@ EFFECTS = (
         "the gas cools to the temperature of the wall, and more slowly with the wall to that of the room",
         refines=True,
     ),
-    *(Effect(e.name, e.parameters, (KIND,)) for e in TIMED if e.name in ("pressure_offset", "pressure_gain")),
+    *gauge(KIND),
 )
 
 
@@ -164,10 +165,10 @@ class ChamberPressure:
 
     def __init__(self, experiments: Sequence[Experiment], compliance_per_kPa: float = 0.0) -> None:
         self._compliance = compliance_per_kPa
-        most = GAUGE_SHARE * largest_reading("pressure_kPa", KIND, experiments)
+        self._largest_kPa = largest_reading("pressure_kPa", KIND, experiments)
         self.effects = (
             *zeroed(map(partial(_warmed, experiments), EFFECTS), KIND, experiments),
-            *drifts("pressure_drift", "kPa", most, KIND, experiments),
+            *drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, KIND, experiments),
         )
         nuisances = []
         for e in experiments:
@@ -226,7 +227,7 @@ class ChamberPressure:
         if warm.any():
             # What leaks away meanwhile is that of the room as it was.
             p = (p + ATMOSPHERE_kPa) * (1.0 + warm / ROOM_K) - ATMOSPHERE_kPa
-        p = p * (1 + get("pressure_gain.gain", 0.0)) + get("pressure_offset.offset_kPa", 0.0)
+        p = as_read(p, values, self._largest_kPa)
         p = p + drift("pressure_drift", experiment["time_s"], values)
         return p[None]
 

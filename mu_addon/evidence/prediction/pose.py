@@ -12,6 +12,8 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
+from .drift import largest_reading
+from .gauge import before_the_gauge
 from .unit import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
 
 Array = np.ndarray[Any, Any]
@@ -22,7 +24,7 @@ KIND = "unit_pose"
 STATIONS = tuple(np.arange(0.0, 360.0, 45.0).tolist())
 # Of the fixture's protractor, or of how upright its base stands.
 TILT = Parameter("pose_tilt_deg", "deg", -10.0, 10.0, 0.0, (), "fixtures set by eye or level", spread=1.0)
-ACTING = ("temperature_drift", "pressure_offset", "pressure_gain")
+ACTING = ("temperature_drift", "pressure_offset", "pressure_gain", "pressure_nonlinearity")
 ANGLE = "angle_deg"
 
 
@@ -46,6 +48,7 @@ class UnitPose:
         here = [attrs.evolve(e, kinds=(KIND,)) for e in TIMED if e.name in ACTING]
         self.effects = (*here, *(attrs.evolve(e, kinds=(KIND,)) for e in static))
         self._driven = driven
+        self._largest_kPa = largest_reading("pressure_kPa", KIND, experiments)
         self._sizes = {e.name: e.keys[0] for e in static}
         self._around = _around(responses)
         curved = tuple(p for p in driven.nuisances if not p.linear)
@@ -65,8 +68,8 @@ class UnitPose:
         modulus = get("modulus_factor", 1.0)
         kelvin = experiment.temperature_C - REFERENCE_C
         modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
-        p = experiment["pressure_kPa"] - get("pressure_offset.offset_kPa", 0.0)
-        p = self._driven.discrepant(p / (1.0 + get("pressure_gain.gain", 0.0)) / modulus, values)
+        p = before_the_gauge(experiment["pressure_kPa"], values, self._largest_kPa)
+        p = self._driven.discrepant(p / modulus, values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
         if "gravity" in static:
             static["gravity"] = static["gravity"] / modulus

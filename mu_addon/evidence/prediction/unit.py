@@ -20,6 +20,7 @@ from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
+from .gauge import before_the_gauge, gauge
 from .marker_slip import Recordings, slip_effects, slipped
 
 Array = np.ndarray[Any, Any]
@@ -271,12 +272,7 @@ TIMED = (
         (Parameter("per_K", "1/K", -0.05, 0.05, 0.0, (-0.005,), "modulus lost a kelvin"),),
         (KIND,),
     ),
-    Effect(
-        "pressure_offset",
-        (Parameter("offset_kPa", "kPa", -10.0, 10.0, 0.0, (-1.0, 1.0), "gauge pressures of benches"),),
-        (KIND,),
-    ),
-    Effect("pressure_gain", (Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "gauge's sheet"),), (KIND,)),
+    *gauge(KIND),
     Effect(
         "line_lag",
         (Parameter("time_s", "s", 0.0, 5.0, 0.0, (0.05, 0.5), "resistance times the chambers' volume"),),
@@ -377,13 +373,22 @@ class UnitPressure:
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
             static[CONTACT] = contact_effect(walls, self.kind)
-        most = GAUGE_SHARE * largest_reading("pressure_kPa", self.kind, experiments)
-        gauge = drifts("pressure_drift", "kPa", most, self.kind, experiments)
+        self._largest_kPa = largest_reading("pressure_kPa", self.kind, experiments)
+        drifting = drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, self.kind, experiments)
         camera = camera_effects(self.channels_known, self.kind, experiments)
         self._recordings = Recordings(experiments)
         slips = slip_effects(self.channels_known, self.kind, self._recordings)
         timed = zeroed(TIMED, self.kind, experiments)
-        self.effects = (*timed, RELAXING, SPREADING, TWO_VOLUMES, *static.values(), *gauge, *camera, *slips)
+        self.effects = (
+            *timed,
+            RELAXING,
+            SPREADING,
+            TWO_VOLUMES,
+            *static.values(),
+            *drifting,
+            *camera,
+            *slips,
+        )
         self._sizes = {e.name: e.keys[0] for e in static.values()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
@@ -431,9 +436,9 @@ class UnitPressure:
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
 
-        values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset and gain of the
-        gauge, leak and line lag (with an open valve), modulus with temperature and fatigue, viscoelasticity,
-        hysteresis, Mullins softening.
+        values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
+        of the gauge, leak and line lag (with an open valve), modulus with temperature and fatigue,
+        viscoelasticity, hysteresis, Mullins softening.
         """
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, PressureHistory())
@@ -441,7 +446,7 @@ class UnitPressure:
         if delay := get("clock_offset.offset_s", 0.0):
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
-        p = (p - get("pressure_offset.offset_kPa", 0.0)) / (1.0 + get("pressure_gain.gain", 0.0))
+        p = before_the_gauge(p, values, self._largest_kPa)
         # With a valve shut nothing flows between gauge and chambers: what leaks is seen by both.
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)

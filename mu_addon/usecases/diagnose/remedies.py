@@ -22,6 +22,9 @@ TO_DO = {
     "wall_thickness": f"{_MODEL}; cut one unit and measure its wall",
     "pressure_offset": f"set the gauge's zero, or take the offset off the readings; {_INSTRUMENT}",
     "pressure_gain": f"have the gauge calibrated, or divide its readings by the gain; {_INSTRUMENT}",
+    "pressure_nonlinearity": (
+        f"compare the gauge with another one in steps up to the largest pressure; {_INSTRUMENT}"
+    ),
     "pressure_drift": f"let the gauge warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_scale": "hang a dead weight from the load cell, measure the section, and clamp the specimen anew",
     "force_nonlinearity": f"calibrate the load cell by dead weights up to its largest force; {_INSTRUMENT}",

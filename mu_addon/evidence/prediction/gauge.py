@@ -1,0 +1,59 @@
+"""What a pressure gauge does to what it reads: its zero is off, its gain is off or changes with pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..effect import Effect, Parameter
+
+Array = np.ndarray[Any, Any]
+
+BOW = Parameter(
+    "bow",
+    "",
+    -0.05,
+    0.05,
+    0.0,
+    (0.01,),
+    "off straight at half pressure, of the largest; gauges 0.0025, cheap ones 0.03",
+    spread=0.01,
+)
+
+
+def gauge(kind: str) -> tuple[Effect, ...]:
+    """Effects, for a kind, of the gauge: offset, gain and curve."""
+    return (
+        Effect(
+            "pressure_offset",
+            (Parameter("offset_kPa", "kPa", -10.0, 10.0, 0.0, (-1.0, 1.0), "gauge pressures of benches"),),
+            (kind,),
+        ),
+        Effect("pressure_gain", (Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "gauge's sheet"),), (kind,)),
+        Effect("pressure_nonlinearity", (BOW,), (kind,)),
+    )
+
+
+def as_read(p: Array, values: Mapping[str, float], largest_kPa: float) -> Array:
+    """Reading (n,) in kPa of a gauge at pressures (n,) in kPa.
+
+    values: by "effect.parameter", see `gauge`. largest_kPa: pressure at which its curve is straight again; 0
+    where none is known.
+    """
+    if (bow := values.get("pressure_nonlinearity.bow", 0.0)) and largest_kPa > 0.0:
+        p = p * (1.0 + 4.0 * bow * (1.0 - np.abs(p) / largest_kPa))
+    return p * (1.0 + values.get("pressure_gain.gain", 0.0)) + values.get("pressure_offset.offset_kPa", 0.0)
+
+
+def before_the_gauge(reading: Array, values: Mapping[str, float], largest_kPa: float) -> Array:
+    """Pressure (n,) in kPa of a gauge's reading (n,) in kPa, the inverse of `as_read`."""
+    p = reading - values.get("pressure_offset.offset_kPa", 0.0)
+    p = p / (1.0 + values.get("pressure_gain.gain", 0.0))
+    if (bow := values.get("pressure_nonlinearity.bow", 0.0)) and largest_kPa > 0.0:
+        # The root of x (1 + 4 b (1 - x / L)) = |p| that is |p| at b = 0.
+        slope = 1.0 + 4.0 * bow
+        root = np.sqrt(np.maximum(slope**2 - 16.0 * bow * np.abs(p) / largest_kPa, 0.0))
+        p = 2.0 * p / (slope + root)
+    return p

@@ -1,0 +1,66 @@
+"""A gauge off a straight line is found, or left open with it in the set, and no straight one is called so."""
+
+import numpy as np
+import pytest
+
+from mu_addon.evidence.prediction.gauge import as_read, before_the_gauge
+from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.verdict import diagnose
+from tests.evidence import analytic
+
+RANGE_kPa = 40.0
+
+
+def parabola(p, share):
+    """What a gauge reads that is right at rest and at `RANGE_kPa`, and off by a share of it half-way."""
+    return p + 4.0 * share * p * (1.0 - np.abs(p) / RANGE_kPa)
+
+
+def sine(p, share):
+    return p + share * RANGE_kPa * np.sin(np.pi * p / RANGE_kPa)
+
+
+def measured(law, share, seed=0):
+    rng = np.random.default_rng(seed)
+    tests = []
+    for name, t, p, how in analytic.protocols(0.2, 4):
+        y = analytic.channels(p)
+        y += np.array([0.1, *[0.05] * 6])[:, None] * rng.normal(size=y.shape)
+        read = law(p, share) + 0.02 * rng.normal(size=len(p))
+        observed = dict(zip(analytic.CHANNELS, y, strict=True))
+        tests.append(analytic.experiment(name, t, read, observed, **how))
+    return tests
+
+
+def judged(tests):
+    return diagnose(tests, Composite({"unit_pressure": UnitPressure([analytic.response()], tests)}))
+
+
+def test_a_curved_gauge_is_straight_at_rest_and_at_its_range_and_undone_in_between():
+    p = np.linspace(-30.0, RANGE_kPa, 71)
+    for bow in (-0.05, 0.03):
+        values = {
+            "pressure_nonlinearity.bow": bow,
+            "pressure_gain.gain": 0.02,
+            "pressure_offset.offset_kPa": 0.3,
+        }
+        read = as_read(p, values, RANGE_kPa)
+        assert before_the_gauge(read, values, RANGE_kPa) == pytest.approx(p, abs=1e-9)
+        alone = as_read(np.array([0.0, 20.0, 40.0]), {"pressure_nonlinearity.bow": bow}, RANGE_kPa)
+        assert alone == pytest.approx([0.0, 20.0 + bow * RANGE_kPa, 40.0])
+
+
+@pytest.mark.parametrize("share", [-0.03, 0.02])
+@pytest.mark.parametrize("law", [parabola, sine])
+def test_a_curved_gauge_is_told_or_a_rival(law, share):
+    found = judged(measured(law, share))
+    assert found.kind in ("named", "ambiguous")
+    assert "pressure_nonlinearity" in found.ambiguity
+    if "pressure_nonlinearity" in found.names:
+        assert found.selection.chosen.values["pressure_nonlinearity.bow"] == pytest.approx(share, rel=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_straight_gauge_is_not_called_curved(seed):
+    assert judged(measured(parabola, 0.0, seed)).kind == "none"
