@@ -6,6 +6,7 @@ is that of scale 1 with offset o/s, enlarged; its modulus is the resin's times a
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -51,14 +52,22 @@ class OffsetResponse:
         range.
         """
         at = self._at(scale, offset_mm)
-        return resin_MPa * np.exp(_through(self.offsets_mm, np.log(self.modulus), at))
+        return np.asarray(resin_MPa * np.exp(self._log_modulus(at)))
 
     def relative_density(self, scale: Any, offset_mm: Any) -> Array:
         """Share (...) of the volume that is solid at scales (...) with print offsets (...) in mm.
 
         Raises InputError where offset over scale is outside the range.
         """
-        return _through(self.offsets_mm, self.density, self._at(scale, offset_mm))
+        return np.asarray(self._density(self._at(scale, offset_mm)))
+
+    @cached_property
+    def _log_modulus(self) -> Any:
+        return _through(self.offsets_mm, np.log(self.modulus))
+
+    @cached_property
+    def _density(self) -> Any:
+        return _through(self.offsets_mm, self.density)
 
     def _at(self, scale: Any, offset_mm: Any) -> Array:
         at = np.asarray(offset_mm, float) / np.asarray(scale, float)
@@ -72,9 +81,9 @@ class OffsetResponse:
         return at
 
 
-def _through(x: Array, y: Array, at: Array) -> Array:
-    """Values at `at` of the cubic spline through y (k,) at x (k,)."""
+def _through(x: Array, y: Array) -> Any:
+    """The cubic spline through y (k,) at x (k,)."""
     # Only now: what merely names an effect must not load it.
     from scipy.interpolate import CubicSpline
 
-    return np.asarray(CubicSpline(x, y)(at))
+    return CubicSpline(x, y)
