@@ -14,6 +14,7 @@ from ..measured import Experiment
 from .drive import denoised_drives
 from .effect import Effect, Parameter
 from .fit import Fit, Fitter
+from .fitted_zeros import FittedZeros, fitted_zeros
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
@@ -82,7 +83,8 @@ class Verdict:
     models that were tried have no prediction, by the titles of their effects. share_taken: of the base
     model's misfit by the chosen one; a verdict `named` or `ambiguous` may leave structure
     (`selection.mainly`). nearest: title of the best single explanation, named or not, and its share of the
-    misfit. far: nuisances that are far from what was known of them, the farthest first.
+    misfit. far: nuisances that are far from what was known of them, the farthest first. zeros: of a load
+    cell, where they hide an error.
     `as_json` is the content of verdict.json.
     """
 
@@ -101,6 +103,7 @@ class Verdict:
     share_taken: float = 0.0
     nearest: tuple[str, float] | None = None
     far: tuple[Parameter, ...] = ()
+    zeros: FittedZeros | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -355,6 +358,7 @@ def diagnose(
         share_taken(fitter, chosen.base, chosen.chosen),
         _nearest(fitter, chosen),
         tuple(unlikely(fitter.curved, chosen.base)),
+        fitted_zeros(fitter, chosen.base),
     )
 
 

@@ -33,8 +33,8 @@ INSTRUMENTS = frozenset(
     (
         "pressure_offset", "pressure_gain", "pressure_nonlinearity", "pressure_drift", "force_scale",
         "force_nonlinearity", "force_drift", "force_lag", "angle_offset", "angle_drift", "camera_scale",
-        "camera_tilt", "camera_perspective", "lens_distortion", "clock_offset", "line_lag", "led_drift", "ambient_light",
-        "seating", "frame_compliance", "marker_slip",
+        "camera_tilt", "camera_perspective", "lens_distortion", "clock_offset", "line_lag", "led_drift",
+        "ambient_light", "seating", "frame_compliance", "marker_slip",
     )
 )  # fmt: skip
 WEIGHT = Parameter("density_kg_m3", "kg/m3", 0.0, 2500.0, 0.0, (1000.0,))

@@ -23,7 +23,7 @@ from ...run.context import RunContext
 from ...run.versions import package_versions
 from . import charts as pictures
 from .diagnosis import Curve, Diagnosis, curves
-from .words import advice, bare, between, listed, readable, sentence, to_do
+from .words import advice, bare, between, in_a_table, listed, readable, sentence, to_do
 
 FILES = {
     "diagnose.toml": "inputs of this run",
@@ -87,13 +87,12 @@ def _notes(found: Diagnosis) -> str:
 def _headline(found: Diagnosis) -> str:
     verdict = found.verdict
     headline, words = sentence(verdict)
-    html = (
-        f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p>'
-        + (f"<p><strong>What to do.</strong> {escape(do)}</p>" if (do := to_do(verdict)) else "")
-        + f"<p>{escape(signed(words))}</p>"
+    html = f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p>' + (
+        f"<p><strong>What to do.</strong> {escape(do)}</p>" if (do := to_do(verdict)) else ""
     )
     if next_ := advice(verdict):
         html += f"<p><strong>Next measurement.</strong> {escape(next_)}</p>"
+    html += f"<p>{escape(signed(words))}</p>{_sizes(found)}"
     judged = verdict.gain.held_out or verdict.gain.fit
     facts = [("verdict", verdict.kind)]
     if found.extends:
@@ -113,6 +112,21 @@ def _headline(found: Diagnosis) -> str:
         )
     facts.append(("effects tested", str(len(verdict.selection.singles))))
     return html + cards(facts)
+
+
+def _sizes(found: Diagnosis) -> str:
+    """Values of the causes with their intervals, where they are too many for a sentence."""
+    verdict = found.verdict
+    if not (verdict.names and in_a_table(verdict)):
+        return ""
+    rows = []
+    for c in verdict.selection.causes:
+        for key, p in zip(c.effect.keys, c.effect.parameters, strict=True):
+            value = _figures(verdict.selection.chosen.values[key])
+            ends = signed(between(*verdict.intervals.get(key, (math.nan, math.nan))))
+            rows.append(([readable(c.effect.title), bare(p), value, ends, p.unit], False))
+    head = [("effect", ""), ("parameter", ""), ("value", "n"), ("95 %", "n"), ("unit", "")]
+    return table("", head, rows)
 
 
 def _extended_words(found: Diagnosis) -> str:

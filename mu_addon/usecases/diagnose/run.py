@@ -200,8 +200,8 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
             else:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
-        f"{column} was read with white noise of up to {sd:.2g}; this noise was removed by averaging "
-        "over straight stretches, and no effect is named for its remainder"
+        f"the noise of {column}, up to {sd:.2g}, was averaged out over straight stretches, and no effect is "
+        "named for what remains of it"
         for column, sd in noise.items()
     ] + [
         f"{column} was read in steps of {step:.2g}; the model is driven by lines from change to change"

@@ -25,6 +25,10 @@ _INSTEAD = {
 }
 # Share of a misfit from which on what takes it is worth a sentence.
 LEAST_SHARE = 0.1
+# So many intervals are a table.
+TABLE = 6
+# Most measurements that are proposed for what the data cannot show.
+MOST_SHOWN = 3
 
 
 def readable(name: str) -> str:
@@ -98,11 +102,19 @@ def _slipped(verdict: Verdict, cause: Cause) -> str:
     return f"{', '.join(words)}, in {record.name} at {second:.4g} s (95 %: {ends})"
 
 
+def in_a_table(verdict: Verdict) -> bool:
+    """Whether the values of the causes, with their intervals, are too many for a sentence."""
+    return sum(1 if c.effect.among else len(c.effect.keys) for c in verdict.selection.causes) >= TABLE
+
+
 def sentence(verdict: Verdict) -> tuple[str, str]:
-    """The verdict in words: its headline, and one plain sentence."""
-    found = verdict.selection
+    """The verdict in words: its headline, and one plain sentence; without values that are `in_a_table`."""
+    found, tabled = verdict.selection, in_a_table(verdict)
     if verdict.kind == "named":
-        sizes = [f"{_upper(c.effect.mechanism)}{_of_one_only(c)}; {sized(verdict, c)}." for c in found.causes]
+        sizes = [
+            f"{_upper(c.effect.mechanism)}{_of_one_only(c)}{'' if tabled else f'; {sized(verdict, c)}'}."
+            for c in found.causes
+        ]
         names = listed([readable(c.effect.title) for c in found.causes])
         if not found.left:
             return names, " ".join(sizes)
@@ -110,9 +122,8 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     if verdict.kind == "ambiguous":
         choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
-        message = (
-            "Each of these effects explains the data, and these data do not "
-            f"distinguish them. Fitted values: {'; '.join(sizes)}."
+        message = "Each of these effects explains the data, and these data do not distinguish them." + (
+            "" if tabled else f" Fitted values: {'; '.join(sizes)}."
         )
         if not found.left:
             return " and ".join(choices), message
@@ -122,7 +133,8 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         return (
             "no model error detected",
             f"The error, {_error(verdict)}, is no larger than the noise that the readings themselves show. "
-            "An effect larger than its limit in the table below would have been detected.",
+            f"{_zeros(verdict)}"
+            "An effect larger than its limit (“Identifiability of each effect”) would have been detected.",
         )
     if verdict.kind == "unidentifiable":
         return (
@@ -147,6 +159,17 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 def _error(verdict: Verdict) -> str:
     """Root mean square error of the base model on fitted data, with its unit."""
     return f"{verdict.gain.fit.before:.3g} {verdict.gain.fit.unit}".rstrip()
+
+
+def _zeros(verdict: Verdict) -> str:
+    """What zeros of the load cell hide, in a sentence and a space; empty where they hide nothing."""
+    z = verdict.zeros
+    if z is None:
+        return ""
+    return (
+        f"That is with the load cell's zero fitted to each test, {z.low:.2g} to {z.high:.2g} {z.unit}; as it "
+        f"was read, the error would be {z.error_without:.3g} {z.unit}. "
+    )
 
 
 def _far(verdict: Verdict) -> str:
@@ -204,18 +227,24 @@ def _asked(verdict: Verdict) -> str:
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
         return ""
-    shown = dict.fromkeys(s.effect.reveals for s in hidden)
-    some = list(shown)[:3]
-    return (
-        f"These data cannot identify {listed([readable(s.effect.name) for s in hidden])}. To identify "
-        f"more: {'; or '.join(some)}."
-    )
+    shows: dict[str, list[str]] = {}
+    for s in hidden:
+        shows.setdefault(s.effect.reveals, []).append(s.effect.name)
+    some = list(shows.items())[:MOST_SHOWN]
+    words = []
+    for what, names in some:
+        what = what.replace("; or ", " or ").replace("; ", ", ")
+        words.append(f"{what} ({listed([readable(n) for n in dict.fromkeys(names)])})")
+    rest = len({s.effect.name for s in hidden} - {n for _, names in some for n in names})
+    more = f" {rest} more are hidden: see “Identifiability of each effect” in the report." if rest else ""
+    return f"To see effects that these data hide: {'; '.join(words)}.{more}"
 
 
 def to_do(verdict: Verdict) -> str:
     """What to do about what was found, in words; empty where nothing was named."""
     if verdict.kind == "none":
-        return "Trust the simulation for experiments like these."
+        trust = "Trust the simulation for experiments like these"
+        return f"{trust}, and set the load cell to zero before each test." if verdict.zeros else f"{trust}."
     if verdict.kind == "ambiguous":
         return "Make the next measurement below before anything is changed."
     if verdict.kind == "unexplained":
