@@ -1,4 +1,4 @@
-"""Zeros of a load cell that were fitted are told where an error would be seen without them, and only there."""
+"""Zeros of a load cell that were fitted are told where an error would be seen without them."""
 
 import numpy as np
 import pytest
