@@ -150,8 +150,10 @@ class Composite:
             f"experiment {experiment.name}",
         )
         for key, value in values.items():
+            if OF not in key or key in own:
+                continue
             plain, _, whose = key.partition(OF)
-            if key in own or not (whose in owners or experiment.name in self.groups.get(whose, ())):
+            if not (whose in owners or experiment.name in self.groups.get(whose, ())):
                 continue
             name = plain.partition(".")[0]
             if plain in knows or name in (GEOMETRY, THICKNESS):
