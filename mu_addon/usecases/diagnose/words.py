@@ -167,8 +167,8 @@ def _zeros(verdict: Verdict) -> str:
     if z is None:
         return ""
     return (
-        f"That is with the load cell's zero fitted to each test, {z.low:.2g} to {z.high:.2g} {z.unit}; as it "
-        f"was read, the error would be {z.error_without:.3g} {z.unit}. "
+        f"That is with the load cell's zero fitted to each test, {z.low:.2g} to {z.high:.2g} {z.unit}; "
+        f"without that, it would be {z.error_without:.3g} {z.unit}. "
     )
 
 
@@ -236,7 +236,7 @@ def _asked(verdict: Verdict) -> str:
         what = what.replace("; or ", " or ").replace("; ", ", ")
         words.append(f"{what} ({listed([readable(n) for n in dict.fromkeys(names)])})")
     rest = len({s.effect.name for s in hidden} - {n for _, names in some for n in names})
-    more = f" {rest} more are hidden: see “Identifiability of each effect” in the report." if rest else ""
+    more = f" Hidden, too: {rest} more, see “Identifiability of each effect” in the report." if rest else ""
     return f"To see effects that these data hide: {'; '.join(words)}.{more}"
 
 
