@@ -11,7 +11,7 @@ from ..errors import MuError
 from .fit import Fit, Fitter
 
 # Times as large an error must be with all zeros at 0 for the zeros to be told.
-TOLD = 2.0
+LARGER = 2.0
 
 
 @attrs.frozen
@@ -26,7 +26,7 @@ class FittedZeros:
 
 
 def fitted_zeros(fitter: Fitter, base: Fit) -> FittedZeros | None:
-    """The zeros of a fit without effects whose loss would make its error `TOLD` times as large; else None.
+    """The zeros of a fit without effects whose loss would make its error `LARGER` times as large; else None.
 
     Known zeros alone: those of which something was known before, one an experiment.
     """
@@ -45,7 +45,7 @@ def fitted_zeros(fitter: Fitter, base: Fit) -> FittedZeros | None:
     if not rows:
         return None
     error, error_without = (_error(fitter, fit, rows) for fit in (base, without))
-    if error_without < TOLD * error:
+    if error_without < LARGER * error:
         return None
     values = [base.values[p.name] for p in zeros]
     return FittedZeros(min(values), max(values), error, error_without, unit)
