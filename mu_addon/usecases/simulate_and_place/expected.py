@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from ...run.progress_estimate import Plan
     from .job import Job
-
-Array = np.ndarray[Any, Any]
 
 FULL_S = {
     "solid": 4.0, "mesh": 4.0, "Model A": 100.0, "candidates": 200.0, "mesh check": 100.0, "map": 5.0,
@@ -25,7 +23,7 @@ SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 TOUCHING = 7.0
 """How many times as long as others a state under suction takes where the printed body's walls touch."""
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.
-_SHIPPED = np.array([-20.0, -10.0, 10.0, 20.0, 30.0, 40.0])
+_SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5
 
@@ -39,10 +37,10 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
     return [*names, "report"]
 
 
-def work(job: Job, pressure_kPa: Array) -> Array:
-    """Work of a state at each pressure (k,), in that of one under pressure; of the rest, at 0 kPa, none."""
-    touching = job.mesh.resolved and job.self_contact
-    return np.where(pressure_kPa < 0, TOUCHING if touching else 1.0, np.where(pressure_kPa > 0, 1.0, 0.0))
+def work(job: Job, pressures_kPa: Iterable[float]) -> float:
+    """Work of the states at these pressures, in that of one under pressure; at 0 kPa there is none."""
+    suction = TOUCHING if job.mesh.resolved and job.self_contact else 1.0
+    return sum(suction if p < 0 else 1.0 for p in pressures_kPa if p)
 
 
 def plan_of(job: Job) -> Plan:
@@ -54,8 +52,8 @@ def plan_of(job: Job) -> Plan:
     if not simulates:
         return _scaled(names, 1.0)
     _, pressure = job.samples
-    states = np.sum(work(job, np.unique(pressure))) if not job.in_time else len(pressure)
-    shipped = np.sum(work(job, _SHIPPED))
+    states = work(job, np.unique(pressure)) if not job.in_time else len(pressure)
+    shipped = work(job, _SHIPPED)
     pace = PACE["resolved" if job.mesh.resolved else "full" if job.mesh.order == 2 else "quick"]
     return _scaled(names, pace * job.mesh.refine**BY_REFINEMENT * max(states, 1) / shipped)
 

@@ -305,12 +305,12 @@ class Study:
         # A state's last digits depend on the pressures visited before it.
         visited = np.unique(pressure)
         name = key(model.mesh.hash(), materials.hash(), visited, self.job.newton, *self.job.effects.parts)
-        total, done = float(np.sum(work(self.job, visited))), 0.0
+        total, done = work(self.job, visited), 0.0
         body = Equilibrium(model, materials, self.job.newton)
 
         def keep(state: State) -> None:
             nonlocal done
-            done += float(np.sum(work(self.job, np.array([state.pressure_kPa]))))
+            done += work(self.job, [state.pressure_kPa])
             least, _ = model.smallest_jacobian(state.u, body.parameters)
             words = f"{state.pressure_kPa:.4g} kPa, residual {state.residual:.1e}"
             words += f", {state.iterations} iterations, smallest det F {least:.2f}"
