@@ -167,6 +167,8 @@ def select(
         taken = base.chi2 - chosen.chi2
         ps.append(p)
         levels.append(pool)
+    if len(chosen.effects) > 2:
+        chosen = _without_superfluous(fitter, seen, base, chosen)
     doubted = (
         doubted
         or sudden(table_base, base, chosen)
@@ -253,6 +255,21 @@ def _hidden_pair(
     if p >= FALSE_ALARM_RATE or loss(fitter, base, best) <= 0.0:
         return None
     return p, best
+
+
+def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit, chosen: Fit) -> Fit:
+    """A fit without the effect that the others make needless: it came first, and they took its place.
+
+    Its gain beside them is no more than noise or an error of their law would be.
+    """
+    found = []
+    for e in chosen.effects:
+        less = fitter.best([o for o in chosen.effects if o.keys != e.keys], [chosen.values])
+        found.append((less.chi2, less, attrs.evolve(chosen, effects=(*less.effects, e))))
+    _, less, last = min(found, key=lambda f: f[0])
+    gain = gain_of(fitter, less, last)
+    p = false_alarm_probability(fitter, less, seen, gain)
+    return less if p >= FALSE_ALARM_RATE or _of_the_law(less, last, base.chi2 - chosen.chi2) else chosen
 
 
 def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
