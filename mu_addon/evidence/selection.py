@@ -169,12 +169,7 @@ def select(
         levels.append(pool)
     if len(chosen.effects) > 2:
         chosen = _without_superfluous(fitter, seen, base, chosen)
-    doubted = (
-        doubted
-        or sudden(table_base, base, chosen)
-        or _too_large(chosen)
-        or curved_reading(fitter, base, chosen)
-    )
+    doubted = doubted or _doubts(fitter, table_base, base, chosen)
     causes = causes_of(fitter, effects, base, chosen, ps, levels)
     if len(causes) == 1 and CAMERA.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
@@ -460,11 +455,7 @@ def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
     effects = [f.effects[0] for f in found.singles]
     ps = [c.p_value for c in found.causes[:-1]]
     causes = causes_of(fitter, effects, found.base, chosen, ps, [found.singles])
-    doubted = (
-        _too_large(chosen)
-        or sudden(found.table_base, found.base, chosen)
-        or curved_reading(fitter, found.base, chosen)
-    )
+    doubted = _doubts(fitter, found.table_base, found.base, chosen)
     table = tuple(strict_table(fitter, chosen))
     return attrs.evolve(found, chosen=chosen, causes=causes, table=table, doubted=doubted)
 
@@ -531,6 +522,11 @@ def _bounded(p: Parameter, value: float) -> bool:
         near = 1e-3 * math.log(p.high / p.low)
         return any(abs(math.log(value / b)) < near for b in ends)
     return any(abs(value - b) < 1e-3 * (p.high - p.low) for b in ends)
+
+
+def _doubts(fitter: Fitter, table_base: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
+    """Why a fit's effects are not believed though they fit, in words; empty without a reason."""
+    return sudden(table_base, base, chosen) or _too_large(chosen) or curved_reading(fitter, base, chosen)
 
 
 def _too_large(chosen: Fit) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from mu_addon.report.charts import INK, canvas, label, signed
 from mu_addon.report.results import Path
 
-from ..table.charts import SCALE_STYLE, WIDE
+from ..table.charts import SCALE_STYLE, WIDE, panels
 from .open_study import Effect
 from .open_values import OPEN
 from .scatter import Scatter
@@ -17,9 +17,7 @@ from .scatter import Scatter
 
 def mesh_scatter(found: Mapping[str, Scatter], paths: Sequence[Path]) -> str:
     """J_hat of every path on every mesh as dots, the paper's as crosses, a panel a column."""
-    with canvas(WIDE, 2.7) as (figure, svg):
-        grid = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
-        figure.subplots_adjust(left=0.07, right=0.99, top=0.88, bottom=0.17, wspace=0.08)
+    with panels([*found], paths, 2.7) as (grid, svg):
         for axes, (name, s) in zip(grid, found.items(), strict=True):
             at = np.arange(len(paths))
             # Side by side, so that meshes that agree do not hide each other.
@@ -27,11 +25,6 @@ def mesh_scatter(found: Mapping[str, Scatter], paths: Sequence[Path]) -> str:
             for dx, J in zip(aside, s.J_hat, strict=True):
                 axes.plot(at + dx, J, "o", color=SCALE_STYLE[name]["color"], markersize=2, alpha=0.6)
             axes.plot(at, s.theirs, "x", color=INK, markersize=7, markeredgewidth=1.4, label="paper")
-            axes.set_title(name, fontsize=9, pad=3)
-            axes.set_xticks(at, [label(p.name) for p in paths], fontsize=7)
-        grid[0].set_ylim(bottom=0, auto=True)
-        grid[0].legend(loc="upper left")
-        grid[0].set_ylabel("Ĵ [mm]")
     return svg()
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -49,22 +50,32 @@ def deviations(columns: Sequence[TableColumn], rule: str, paths: Sequence[Path],
     return svg()
 
 
+@contextmanager
+def panels(
+    names: Sequence[str], paths: Sequence[Path], height: float
+) -> Iterator[tuple[list[Any], Callable[[], str]]]:
+    """Axes side by side, one a column of the table, J_hat over its paths; and what gives them as SVG text."""
+    with canvas(WIDE, height) as (figure, svg):
+        grid = list(figure.subplots(1, len(names), sharey=True, squeeze=False)[0])
+        figure.subplots_adjust(left=0.07, right=0.99, top=0.88, bottom=0.17, wspace=0.08)
+        yield grid, svg
+        for axes, name in zip(grid, names, strict=True):
+            axes.set_title(name, fontsize=9, pad=3)
+            axes.set_xticks(np.arange(len(paths)), [label(p.name) for p in paths], fontsize=7)
+        grid[0].set_ylim(bottom=0, auto=True)
+        grid[0].legend(loc="upper left")
+        grid[0].set_ylabel("Ĵ [mm]")
+
+
 def against_paper(table: Mapping[str, Array], paper: Published, paths: Sequence[Path]) -> str:
     """J_hat of every path, ours as a line with dots and the paper's as crosses, a panel a column."""
-    with canvas(WIDE, 2.6) as (figure, svg):
-        grid = figure.subplots(1, len(table), sharey=True, squeeze=False)[0]
-        figure.subplots_adjust(left=0.07, right=0.99, top=0.88, bottom=0.17, wspace=0.08)
+    with panels([*table], paths, 2.6) as (grid, svg):
         at = np.arange(len(paths))
         for axes, (name, ours) in zip(grid, table.items(), strict=True):
             style = SCALE_STYLE[name]
             axes.plot(at, paper.J_hat[name], "x", color=INK, markersize=6, label="paper")
             axes.plot(at, ours, "o", color=style["color"], markersize=4.5, label="here")
             axes.vlines(at, paper.J_hat[name], ours, color=GRID, linewidth=2, zorder=0)
-            axes.set_title(name, fontsize=9, pad=3)
-            axes.set_xticks(at, [label(p.name) for p in paths], fontsize=7)
-        grid[0].set_ylim(bottom=0, auto=True)
-        grid[0].legend(loc="upper left")
-        grid[0].set_ylabel("Ĵ [mm]")
     return svg()
 
 

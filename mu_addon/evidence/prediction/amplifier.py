@@ -9,21 +9,13 @@ import numpy as np
 
 from ..effect import Effect, Parameter
 from ..ringing import swinging
+from .curve import bow, curved
 from .effective_pressure import first_order_lag
 
 Array = np.ndarray[Any, Any]
 
 GAIN = Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "calibrations of load cells")
-BOW = Parameter(
-    "bow",
-    "",
-    -0.05,
-    0.05,
-    0.0,
-    (0.01,),
-    "off straight at half load, of the largest; load cells 0.0005, film sensors 0.03",
-    spread=0.01,
-)
+BOW = bow("off straight at half load, of the largest; load cells 0.0005, film sensors 0.03")
 FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
 # Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.
 FILTER_OF_TWO = (
@@ -55,9 +47,8 @@ def amplified(force: Array, values: Mapping[str, float], largest: float) -> Arra
 
     largest: reading at which its curve is straight again, in the unit of force; 0 where none is known.
     """
-    gain, bow = values.get("force_scale.gain", 0.0), values.get("force_nonlinearity.bow", 0.0)
-    if bow and largest > 0.0:
-        force = force * (1.0 + 4.0 * bow * (1.0 - np.abs(force) / largest))
+    gain = values.get("force_scale.gain", 0.0)
+    force = curved(force, values.get("force_nonlinearity.bow", 0.0), largest)
     return force * (1.0 + gain) if gain else force
 
 

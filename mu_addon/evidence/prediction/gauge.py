@@ -8,19 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..effect import Effect, Parameter
+from .curve import bow, curved, straightened
 
 Array = np.ndarray[Any, Any]
 
-BOW = Parameter(
-    "bow",
-    "",
-    -0.05,
-    0.05,
-    0.0,
-    (0.01,),
-    "off straight at half pressure, of the largest; gauges 0.0025, cheap ones 0.03",
-    spread=0.01,
-)
+BOW = bow("off straight at half pressure, of the largest; gauges 0.0025, cheap ones 0.03")
+CURVE = "pressure_nonlinearity"
 
 
 def gauge(kind: str) -> tuple[Effect, ...]:
@@ -32,7 +25,7 @@ def gauge(kind: str) -> tuple[Effect, ...]:
             (kind,),
         ),
         Effect("pressure_gain", (Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "gauge's sheet"),), (kind,)),
-        Effect("pressure_nonlinearity", (BOW,), (kind,)),
+        Effect(CURVE, (BOW,), (kind,)),
     )
 
 
@@ -42,8 +35,7 @@ def as_read(p: Array, values: Mapping[str, float], largest_kPa: float) -> Array:
     values: by "effect.parameter", see `gauge`. largest_kPa: pressure at which its curve is straight again; 0
     where none is known.
     """
-    if (bow := values.get("pressure_nonlinearity.bow", 0.0)) and largest_kPa > 0.0:
-        p = p * (1.0 + 4.0 * bow * (1.0 - np.abs(p) / largest_kPa))
+    p = curved(p, values.get(f"{CURVE}.bow", 0.0), largest_kPa)
     return p * (1.0 + values.get("pressure_gain.gain", 0.0)) + values.get("pressure_offset.offset_kPa", 0.0)
 
 
@@ -51,9 +43,4 @@ def before_the_gauge(reading: Array, values: Mapping[str, float], largest_kPa: f
     """Pressure (n,) in kPa of a gauge's reading (n,) in kPa, the inverse of `as_read`."""
     p = reading - values.get("pressure_offset.offset_kPa", 0.0)
     p = p / (1.0 + values.get("pressure_gain.gain", 0.0))
-    if (bow := values.get("pressure_nonlinearity.bow", 0.0)) and largest_kPa > 0.0:
-        # The root of x (1 + 4 b (1 - x / L)) = |p| that is |p| at b = 0.
-        slope = 1.0 + 4.0 * bow
-        root = np.sqrt(np.maximum(slope**2 - 16.0 * bow * np.abs(p) / largest_kPa, 0.0))
-        p = 2.0 * p / (slope + root)
-    return p
+    return straightened(p, values.get(f"{CURVE}.bow", 0.0), largest_kPa)

@@ -15,7 +15,7 @@ from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import first_order_lag
-from .gauge import as_read, gauge
+from .gauge import CURVE, as_read, gauge
 from .unit import GAUGE_SHARE
 
 Array = np.ndarray[Any, Any]
@@ -152,7 +152,7 @@ EFFECTS = (
         refines=True,
     ),
     # A hold's own first pressure takes up a curve.
-    *(e for e in gauge(KIND) if e.name != "pressure_nonlinearity"),
+    *(e for e in gauge(KIND) if e.name != CURVE),
 )
 
 

@@ -1,0 +1,36 @@
+"""The curve of an instrument whose reading is off a straight line: its load cell's, its pressure gauge's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..effect import Parameter
+
+Array = np.ndarray[Any, Any]
+
+
+def bow(source: str) -> Parameter:
+    """How far a reading is off straight at half the largest one, as a share of that."""
+    return Parameter("bow", "", -0.05, 0.05, 0.0, (0.01,), source, spread=0.01)
+
+
+def curved(reading: Array, bow: float, largest: float) -> Array:
+    """Reading (n,) of an instrument off straight that should read (n,), in the same unit.
+
+    largest: reading at which its curve is straight again; 0 where none is known.
+    """
+    if not bow or largest <= 0.0:
+        return reading
+    return reading * (1.0 + 4.0 * bow * (1.0 - np.abs(reading) / largest))
+
+
+def straightened(reading: Array, bow: float, largest: float) -> Array:
+    """What an instrument off straight should read (n,) where it reads (n,): the inverse of `curved`."""
+    if not bow or largest <= 0.0:
+        return reading
+    # The root of x (1 + 4 b (1 - x / L)) = |reading| that is |reading| at b = 0.
+    slope = 1.0 + 4.0 * bow
+    root = np.sqrt(np.maximum(slope**2 - 16.0 * bow * np.abs(reading) / largest, 0.0))
+    return 2.0 * reading / (slope + root)
