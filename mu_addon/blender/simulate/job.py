@@ -31,7 +31,7 @@ def announced(root: Any) -> tuple[float, bool]:
 
 def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
     """The plan, and whether all that takes long in it was measured: of this unit, else of another one."""
-    from ...usecases.simulate_and_place.expected import FULL_S, PACE, SOLVED, stage_names
+    from ...usecases.simulate_and_place.expected import SOLVED, seconds_of, stage_names
 
     settings = root.mu_unit.study
     names = stage_names(settings.command == "place", settings.detail != "quick", settings.paths == "graph")
@@ -43,7 +43,7 @@ def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
         value = taken.get(name)
         if isinstance(value, int | float) and value >= 0.0:
             return float(value)
-        return FULL_S[name] * (PACE[settings.detail] if name in SOLVED else 1.0)
+        return seconds_of(name, settings.detail)
 
     return [(name, seconds(name)) for name in names], all(name in taken for name in names if name in SOLVED)
 
