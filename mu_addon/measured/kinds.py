@@ -42,11 +42,17 @@ CONVERTED = {
     "kPa": {"Pa": 1e-3, "MPa": 1e3, "mbar": 0.1, "bar": 100.0, "psi": 6.894757293168361},
     "deg": {"rad": 180.0 / math.pi},
     "mm": {"um": 1e-3, "cm": 10.0, "m": 1e3},
-    "N": {"mN": 1e-3, "kN": 1e3},
+    "N": {"mN": 1e-3, "kN": 1e3, "kgf": 9.80665, "lbf": 4.4482216152605},
     "g": {"mg": 1e-3, "kg": 1e3},
     "V": {"mV": 1e-3},
     "mm3": {"ul": 1.0, "ml": 1e3, "cm3": 1e3},
     "": {"percent": 1e-2},
+}
+# What is read of a body that changes steadily: it never jumps by the factor between two units.
+STEADY = {
+    "coupon": ("force_N", "stress_kPa"),
+    "lattice_compression": ("force_N", "stress_kPa"),
+    "pressure_hold": ("pressure_kPa",),
 }
 # What a camera or a voltmeter can miss for a moment; a gap in anything else leaves rows without meaning.
 MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker", "volume_mm3")

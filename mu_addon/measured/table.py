@@ -17,7 +17,7 @@ import numpy as np
 from ..cells.own import own_lines, own_rows
 from ..errors import InputError
 from ..reading import require_rows
-from .kinds import Kind, markers, may_be_missing, named, quantity_of, units_of
+from .kinds import STEADY, Kind, markers, may_be_missing, named, quantity_of, units_of
 
 Array = np.ndarray[Any, Any]
 
@@ -32,6 +32,9 @@ GAP = 5.0
 # A spike leaves its neighbours' line by this many times the usual scatter about such lines, and by this
 # share of the column's whole range.
 SPIKE_SCATTER, SPIKE_RANGE = 10.0, 0.02
+# Rows on either side of a jump by which its factor is told, fewer beside a corner, and logarithms within which
+# it is a unit's.
+BESIDE, EXACT, UNSURE = (12, 9, 6), 0.01, 0.08
 
 
 @attrs.frozen
@@ -86,6 +89,9 @@ def read_table(text: str, kind: Kind, path: Path) -> Table:
         _check_missing(name, values, rows, path, remarks)
         if name not in ("time_s", "added_mass_g"):
             _check_spikes(name, values, columns.get("time_s"), rows, path, remarks)
+    for name in STEADY.get(kind.name, ()):
+        if name in columns:
+            _check_switched(name, columns, rows, path)
     return Table(columns, rows, tuple(remarks))
 
 
@@ -350,3 +356,51 @@ def _check_spikes(
                 "check it: an outlier that is not a reading should be removed",
             )
         )
+
+
+def _check_switched(name: str, columns: dict[str, Array], rows: Array, path: Path) -> None:
+    """Raise InputError where a reading jumps by the factor between two units, while nothing else does.
+
+    The lines through `BESIDE` rows on either side tell the factor, at the largest jump of the column.
+    """
+    x = columns[name]
+    i = int(np.argmax(np.abs(np.diff(x)))) if len(x) > 2 * max(BESIDE) else 0
+    steps = [np.abs(np.diff(columns[c])) for c in ("time_s", "strain", "displacement_mm") if c in columns]
+    if any(i >= len(d) - 1 or d[i] > 1.5 * np.delete(d, i).max() for d in steps):
+        return
+    t = columns.get("time_s", np.arange(len(x), dtype=float))
+    ends, unsure = [], EXACT
+    for y, s in ((x[i::-1], t[i::-1]), (x[i + 1 :], t[i + 1 :])):
+        found = _at_its_end(y, s - t[i + 1])
+        if found is None or found[0] == 0.0:
+            return
+        ends.append(found[0])
+        unsure += 2.0 * abs(found[1] / found[0])
+    quantity, unit = quantity_of(name) or ("", "")
+    if unsure > UNSURE or ends[0] * ends[1] < 0.0:
+        return
+    ratio = ends[1] / ends[0]
+    for other, factor in units_of(quantity).items():
+        for before, after, expected in ((unit, other, 1.0 / factor), (other, unit, factor)):
+            if factor != 1.0 and abs(math.log(ratio / expected)) < unsure:
+                raise InputError(
+                    f"{name} is {ratio:.3g} times as large from this row on, as if the unit changed from "
+                    f"{before} to {after}",
+                    _at(path, int(rows[i + 1]), name),
+                    f"bring all rows to {unit}, or leave out those on one side",
+                )
+
+
+def _at_its_end(values: Array, time: Array) -> tuple[float, float] | None:
+    """What the line through the first rows of a column is at time 0, and its standard deviation.
+
+    Of as many as lie on a line, within their scatter or half of `EXACT`; None without.
+    """
+    scatter = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / math.sqrt(6.0) if len(values) > 2 else 0.0
+    for rows in (n for n in BESIDE if n <= len(values)):
+        line = np.polyfit(time[:rows], values[:rows], 1)
+        off = float(np.std(values[:rows] - np.polyval(line, time[:rows]), ddof=2))
+        if off < max(2.0 * scatter, 0.5 * EXACT * abs(line[1])):
+            # At the end of a line its variance is 4 over their number.
+            return float(line[1]), 2.0 * max(off, scatter) / math.sqrt(rows)
+    return None

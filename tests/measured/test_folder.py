@@ -156,6 +156,9 @@ def test_columns_in_other_units_are_read_as_the_same_numbers(tmp_path):
     for name, values in first.experiments[0].columns.items():
         assert second.experiments[0][name] == pytest.approx(values, rel=1e-12)
     assert second.remarks == first.remarks
+    kilos = "time_s,pressure_kPa,force_kgf\n0,0,0\n1,5,2\n"
+    pressed = read_folder(folder(tmp_path / "k", entry(kind="blocked_force", mode=None), a=kilos))
+    assert pressed.experiments[0]["force_N"][1] == pytest.approx(19.6133)
     pounds = "time_s,pressure_psi\n0,14.5037738\n1,14.5037738\n2,0\n"
     e = read_folder(folder(tmp_path / "c", entry(**HOLD), a=pounds)).experiments[0]
     assert e["pressure_kPa"][0] == pytest.approx(100.0, rel=1e-7)
@@ -318,6 +321,26 @@ def test_a_spike_is_told_and_ramps_corners_steps_and_noise_are_not(seed, shape, 
     noisy[at] += 15.0
     (found,) = remarks_on(noisy)
     assert found.where == f"a.csv, row {at + 2}, column pressure_kPa"
+
+
+@given(
+    st.integers(0, 10_000),
+    st.sampled_from([1 / 9.80665, 9.80665, 1e-3, 0.5, 0.2, -0.1]),
+    st.integers(12, 40) | st.integers(56, 88),
+)
+def test_a_unit_that_changes_in_the_middle_of_a_file_is_told_and_a_tear_is_not(seed, factor, row):
+    t = np.linspace(0.0, 60.0, 100)
+    way = 0.3 * np.interp(t, [0, 30, 60], [0.1, 1, 0.1])
+    newton = 8.0 * way * (1 + way) + np.random.default_rng(seed).normal(0, 2e-4, 100)
+    newton[row:] *= factor
+    lines = (f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), way.tolist(), newton.tolist(), strict=True))
+    text = "time_s,displacement_mm,force_N\n" + "\n".join(lines)
+    if factor in (0.5, 0.2, -0.1):
+        read_table(text, KINDS["coupon"], Path("a.csv"))
+        return
+    with pytest.raises(InputError, match="as if the unit changed") as error:
+        read_table(text, KINDS["coupon"], Path("a.csv"))
+    assert error.value.where == f"a.csv, row {row + 2}, column force_N"
 
 
 @given(st.lists(st.floats(-0.9, 15, allow_nan=False), min_size=2, max_size=30))
