@@ -32,8 +32,8 @@ GAP = 5.0
 # A spike leaves its neighbours' line by this many times the usual scatter about such lines, and by this
 # share of the column's whole range.
 SPIKE_SCATTER, SPIKE_RANGE = 10.0, 0.02
-# Rows on either side of a jump by which its factor is told, fewer beside a corner, and logarithms within which
-# it is a unit's.
+# Rows on either side of a jump by which its factor is told, fewer beside a corner; logarithms within which it
+# is a unit's.
 BESIDE, EXACT, UNSURE = (12, 9, 6), 0.01, 0.08
 
 
@@ -396,7 +396,9 @@ def _at_its_end(values: Array, time: Array) -> tuple[float, float] | None:
 
     Of as many as lie on a line, within their scatter or half of `EXACT`; None without.
     """
-    scatter = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / math.sqrt(6.0) if len(values) > 2 else 0.0
+    if len(values) < min(BESIDE):
+        return None
+    scatter = 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / math.sqrt(6.0)
     for rows in (n for n in BESIDE if n <= len(values)):
         line = np.polyfit(time[:rows], values[:rows], 1)
         off = float(np.std(values[:rows] - np.polyval(line, time[:rows]), ddof=2))
