@@ -64,7 +64,7 @@ class Point:
 
     @property
     def stable(self) -> bool:
-        """Whether the point is stable at its pressure."""
+        """True if the point is stable at its pressure."""
         return self.negative == 0
 
 
@@ -92,7 +92,7 @@ Condition = Callable[[Array, Array], tuple[float, Array]]
 
 
 class Body(Protocol):
-    """What a branch is traced of: a model, its materials on the device, and the tolerances of its states.
+    """Model, its materials on the device, and the tolerances of its states, as a branch is traced for.
 
     An `Equilibrium` is one.
     """
@@ -201,7 +201,7 @@ class Arc:
         return self.model.following(u)
 
     def _check_way(self, z: Array, to: Array) -> None:
-        """Refuse a step in which the surface would meet itself: what lies beyond is no state."""
+        """Raise ConvergenceError for a step in which the surface would intersect itself."""
         contact = self.model.self_contact
         if contact is not None and contact.free_share(self._displacement(z), self._displacement(to)) < 1:
             raise ConvergenceError("the surface would meet itself within the step")
@@ -219,7 +219,7 @@ class Arc:
             raise ConvergenceError(str(why)) from None
 
     def _linearise(self, z: Array, thorough: bool = True) -> None:
-        """Factorise at z; what a unit of pressure does to the residual and to the displacement there."""
+        """Factorise the tangent at z; return the derivatives of residual and displacement by pressure."""
         self._factor(z, thorough)
         # The residual is affine in pressure.
         unit = np.append(np.zeros(self._size), 1.0)
@@ -273,7 +273,7 @@ class Arc:
         raise ConvergenceError("no convergence")
 
     def _node(self, z: Array, ahead: Array, residual: float, iterations: int, factorisations: int) -> Node:
-        """The node at z, where the tangent has just been factorised; its direction is the one `ahead`."""
+        """Node at z, where the tangent has just been factorised; its direction is the one `ahead`."""
         u, pressure = self._displacement(z), float(z[-1])
         if not np.isfinite(self.model.potential(u, pressure, self.parameters)):
             raise ConvergenceError("an element inverts")

@@ -1,4 +1,4 @@
-"""Bodies that differ in a few elements, solved side by side with the one factorisation they share."""
+"""Batched Newton's method for bodies that differ in a few elements and share one factorisation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Variant:
-    """A body that is another's but for a share (m,) of each element's volume, filled by another law.
+    """A body that differs from another in a share (m,) of each element's volume, filled by another law.
 
     share: 0 to 1, one an element; parameters: of the law, (m, count), or one row for all.
     """
@@ -37,16 +37,16 @@ class Variant:
     parameters: Array
 
     def of(self, materials: Materials) -> Materials:
-        """The variant's materials, of the body's; raises InputError for a share outside 0 to 1."""
+        """Materials of the variant, from the body's; raises InputError for a share outside 0 to 1."""
         return materials.blended(self.share, self.law, self.parameters)
 
 
 class BatchedNewton:
     """Equilibria of many variants of one body, each state from the body's own at the same pressure.
 
-    Every step is a quasi-Newton step with the variant's exact tangent at the body's state, for the price
-    of solving once with the tangent that all variants share (see `variants`). Raises InputError for a model
-    with self-contact.
+    Every step is a quasi-Newton step with the variant's exact tangent at the body's state, at the cost of one
+    solve with the tangent that all variants share (see `variants`). Raises InputError for a model with
+    self-contact.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class BatchedNewton:
         self._shared = make_variants(model, self._part.unknowns)
 
     def at(self, state: State) -> list[State]:
-        """Every variant's stable equilibrium at the pressure of one of the body's states.
+        """Stable equilibrium of every variant at the pressure of one of the body's states.
 
         Raises ConvergenceError where a variant has none that continues the body's.
         """
@@ -118,11 +118,11 @@ class BatchedNewton:
         return [one for one in found if one is not None]
 
     def alone(self, i: int) -> Equilibrium:
-        """Variant number i as a body of its own: an `Equilibrium` with the same settings."""
+        """Return variant number i as a body by itself: an `Equilibrium` with the same settings."""
         return Equilibrium(self.model, self.variants[i].of(self.materials), self.settings)
 
     def _alone(self, i: int, state: State, near: Array | None) -> State:
-        """A variant that the shared factor does not serve: with factors of its own, or along its path."""
+        """Solve for a variant that the shared factor does not serve, by its own factors or along its path."""
         alone = self.alone(i)
         limit = self.settings.predictor_tolerance * np.abs(state.u).max()
         for start in (near, state.u):
@@ -138,11 +138,11 @@ class BatchedNewton:
 
 
 class _Part:
-    """The elements (e,) that variants change, as a model of their own; `unknowns` (c,) are its free ones.
+    """Elements (e,) that variants change, as a separate model; `unknowns` (c,) are its free ones.
 
-    A variant's new law is taken at rest, turned with its elements: a stiff inclusion gives way little, so
-    that this is closer to its tangent where it will be than what the body's own strain would make of it,
-    which for a stiff law under compression need not even be definite.
+    A variant's new law is taken at rest and rotated with its elements. A stiff inclusion deforms little, so
+    this is closer to its final tangent than the law at the body's strain, which under compression need not
+    even be definite.
     """
 
     def __init__(
@@ -182,7 +182,7 @@ class _Part:
             self._new.append(known[kind])
 
     def changes(self, u: Array) -> list[Change]:
-        """What every variant adds to the tangent at the body's displacement (n, 3) in mm."""
+        """Changes of the tangent by each variant at the body's displacement (n, 3) in mm."""
         u = u[self._nodes]
         old = element_stiffness(self._model, u, self._base, self._every)
         turn = rotations(self._mesh, u, self._every)
@@ -204,7 +204,7 @@ class _Part:
 
 
 def _within(materials: Materials, elements: Array, count: int) -> Materials:
-    """Materials of some elements (e,) of `count`, numbered as they are listed."""
+    """Materials of some elements (e,) of `count`, renumbered in their order."""
     local = np.full(count, -1)
     local[elements] = np.arange(len(elements))
     layers = []

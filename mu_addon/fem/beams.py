@@ -20,7 +20,7 @@ from .rotations import skew
 Array = np.ndarray[Any, Any]
 
 LEAST_STRETCH = 0.2
-"""Below this stretch an element's axial energy goes on as a parabola: none can be crushed flat."""
+"""Below this stretch an element's axial energy continues as a parabola, so that it keeps some length."""
 
 SHEAR_FACTOR = 0.9
 """Cowper's shear coefficient of a solid round section, 6 (1 + nu)/(7 + 6 nu), at Poisson's ratio 0.45."""
@@ -219,7 +219,7 @@ def frames_along(directions: Array) -> Array:
 
 
 def _sines(vectors: Array) -> tuple[Array, Array, Array, Array]:
-    """Of rotation vectors (n, 3) of angle t: cos t/2, S = sin(t/2)/t, and S', S'' by t^2, (n,) each."""
+    """cos t/2, S = sin(t/2)/t, and S', S'' by t^2, (n,) each, of rotation vectors (n, 3) of angle t."""
     x = np.einsum("ei,ei->e", vectors, vectors)
     small = x < _SMALL_ANGLE
     safe = np.where(small, 1.0, x)
@@ -312,7 +312,7 @@ def _between(weights: Array) -> Array:
 
 
 def _turn_factors(p: Array) -> tuple[Array, Array, Array]:
-    """Of p = (c, w), r = |w|: f = 2 atan(r/c)/r, a = (df/dr)/r and b = (da/dr)/r, (e,) each."""
+    """f = 2 atan(r/c)/r, a = (df/dr)/r and b = (da/dr)/r, (e,) each, of p = (c, w) with r = |w|."""
     c, square = p[:, 0], np.einsum("ei,ei->e", p[:, 1:], p[:, 1:])
     small = square < _SMALL_TURN**2 * c**2
     y = np.where(small, square / np.where(c == 0, 1.0, c) ** 2, 0.0)

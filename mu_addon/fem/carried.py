@@ -1,4 +1,4 @@
-"""Nodes that move with the sections of beams: where they are, and what acts on them acts on the beams."""
+"""Nodes that follow the cross-sections of beams: their positions, and the forces passed on to the beams."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 def following(mesh: Mesh, u: Array) -> Array:
-    """Displacements u (n, 3) in mm with those of tied and carried nodes set to what they follow, in place."""
+    """Displacements u (n, 3) in mm with tied and carried nodes set to follow their masters, in place."""
     return mesh.following(Carried(mesh).follow(u) if len(mesh.carried) else u)
 
 
@@ -71,9 +71,9 @@ class Carried:
     def turning(self, u: Array, forces: Array, convex: bool = False) -> tuple[Array, Array]:
         """Stiffness (t, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
 
-        And the nodes (t,) that hold them: what forces that keep their direction do as their arms turn.
-        convex: each without its negative eigenvalues. Contact that presses a strut from both sides turns it
-        over otherwise, and on the way to equilibrium its forces are far larger than there.
+        Also returned: the nodes (t,) that carry them. It is the stiffness of forces of fixed direction as
+        their arms rotate. convex: each without its negative eigenvalues, since contact on both sides of a
+        strut otherwise turns it over, and on the way to equilibrium its forces are far larger than there.
         """
         acting = self._share[:, None] * forces[self.nodes[self._own]]
         found = np.zeros((len(self._turns), 3, 3))
@@ -87,7 +87,8 @@ class Carried:
         return found, self._turns
 
     def operators(self, u: Array) -> Array:
-        """By what each node's displacement changes, (1 + 2 k, 3, 3): with itself; with what carries it.
+        """Derivatives (1 + 2 k, 3, 3) of a node's displacement: by its own, and by those of the beam nodes
+        that carry it.
 
         The k shares come first, then the k slopes by rotation vectors.
         """
@@ -95,7 +96,7 @@ class Carried:
         return np.concatenate([same, self._share[:, None, None] * same, self.slopes(u)])
 
     def parts_of(self, nodes: Array) -> tuple[Array, Array, Array]:
-        """What moves some nodes (j,), each once or more: its number among them, the mover, its operator."""
+        """Node, beam node and operator of every pair in which a beam node moves one of the nodes (j,)."""
         k = len(self._own)
         place = np.full(self.count, -1)
         place[self.nodes] = np.arange(len(self.nodes))
@@ -115,7 +116,7 @@ class Carried:
         return number[order], mover[order], operator[order]
 
     def map(self, u: Array, nodes: Array) -> sparse.csr_matrix:
-        """How displacements (3 j,) of some nodes (j,) change with those (3 n,) of nodes not carried."""
+        """Derivative of displacements (3 j,) of some nodes (j,) by those (3 n,) of nodes not carried."""
         number, mover, operator = self.parts_of(nodes)
         axes = np.arange(3)
         rows = np.repeat(3 * number[:, None] + axes, 3, axis=1).ravel()
@@ -126,7 +127,7 @@ class Carried:
 
 @attrs.frozen(eq=False)
 class Folding:
-    """Where blocks with a carried node on either side act: in which pairs of nodes, and how.
+    """Map of blocks with a carried node on either side to blocks between beam nodes.
 
     block (e,): which of the given; left, right (e,): operators of its row and column, see
     `Carried.operators`; row, column (e,): nodes of the lower triangle, and turned (e,), whether the block
@@ -143,7 +144,7 @@ class Folding:
 
     @classmethod
     def of(cls, carried: Carried, rows: Array, columns: Array) -> Folding:
-        """How blocks between nodes, rows (b,) >= columns (b,), act between beam nodes."""
+        """Map of blocks between nodes, rows (b,) >= columns (b,), to blocks between beam nodes."""
         nodes, number = np.unique(np.concatenate([rows, columns]), return_inverse=True)
         at, mover, operator = carried.parts_of(nodes)
         start = np.searchsorted(at, np.arange(len(nodes) + 1))
@@ -164,7 +165,7 @@ class Folding:
         )
 
     def __call__(self, blocks: Array, operators: Array) -> Array:
-        """The blocks (e, 3, 3) that some blocks (b, 3, 3) give in the lower triangle."""
+        """Return the blocks (e, 3, 3) in the lower triangle that blocks (b, 3, 3) contribute."""
         found = operators[self.left].transpose(0, 2, 1) @ blocks[self.block] @ operators[self.right]
         other = found.transpose(0, 2, 1)
         found = np.where(self.turned[:, None, None], other, found)

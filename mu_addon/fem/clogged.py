@@ -26,8 +26,8 @@ _AT, _WEIGHT = (_AT + 1) / 2, _WEIGHT / 2
 class CloggedModel(Model):
     """A body whose cavity beyond a neck at `height_mm` holds 1 - share_lost of the pressure.
 
-    What closes the neck is a cone from the neck's rim to the mean of its nodes. It bears the difference and
-    hands it to the rim, so that both chambers are closed and the load has a potential, -p (V - share_lost
+    The neck is closed by a cone from the neck's rim to the mean of its nodes. It carries the pressure
+    difference to the rim, so that both chambers are closed and the load has a potential, -p (V - share_lost
     V_beyond): the tangent stays symmetric. Its own part of the tangent, of the rim alone, is left out, which
     costs Newton's method steps and changes no equilibrium. more: further arguments of `Model`. Raises
     InputError where no neck is cut.

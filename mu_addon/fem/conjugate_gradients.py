@@ -1,4 +1,4 @@
-"""Preconditioned conjugate gradients on a Warp device: many systems at once, in place of a factorisation."""
+"""Preconditioned conjugate gradients for many systems at once on a Warp device."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Rows:
 
 @attrs.frozen(eq=False)
 class Change:
-    """What a variant adds to the tangent: `matrix` (c, c) in N/mm on the free unknowns `unknowns` (c,)."""
+    """Change of the tangent by a variant: `matrix` (c, c) in N/mm on the free unknowns `unknowns` (c,)."""
 
     unknowns: Array
     matrix: sparse.csr_matrix
@@ -103,10 +103,10 @@ def conjugate_gradients(multiply: Any, precondition: Any, b: wp.array, tolerance
     """Solve A x = b for k symmetric systems at once, b (k, n) on a device.
 
     multiply(p, y) and precondition(r, z) write y = A p and z = M r, M positive definite. Ends when every
-    residual is below `tolerance` of its right-hand side, or after MAX_ITERATIONS.
-    (Hestenes and Stiefel, J. Res. Natl. Bur. Stand. 49 (1952) 409.)
+    residual is below `tolerance` of its right-hand side, or after MAX_ITERATIONS. (Hestenes and Stiefel, J.
+    Res. Natl. Bur. Stand. 49 (1952) 409.)
 
-    Warp's own does not show the curvature, which is all that tells a definite matrix from another.
+    Warp's own solver does not return the curvature, by which an indefinite matrix is found.
     """
     device, k = b.device, b.shape[0]
     x, r = wp.zeros_like(b), wp.clone(b)
@@ -241,7 +241,7 @@ class ConjugateGradients:
         return x.reshape(b.T.shape).T
 
     def changes(self, changes: Sequence[Change]) -> Changes:
-        """Put what several systems add to the matrix on the device, for `solve_changed`; after `factor`."""
+        """Copy several systems' changes of the matrix to the device, for `solve_changed`; after `factor`."""
         place = np.empty(self.size, dtype=np.int64)
         place[self._order] = np.arange(self.size)
         turned = [attrs.evolve(c, unknowns=place[c.unknowns]) for c in changes]

@@ -155,13 +155,13 @@ def _turned(before: Node, after: Node) -> bool:
 
 
 def _entangled(before: Node, after: Node) -> bool:
-    """Whether more happened between two nodes than one critical point explains."""
+    """Return True if more happened between two nodes than one critical point explains."""
     change = abs(after.point.negative - before.point.negative)
     return change > 1 or (_turned(before, after) and change == 0)
 
 
 def _criticals(arc: Arc, before: Node, after: Node) -> list[Critical]:
-    """What was passed between two nodes: pressure turned, or the number of negative eigenvalues changed.
+    """Critical points between two nodes, by the pressure's slope and the number of negative eigenvalues.
 
     A turn explains a change by one: the determinant of the tangent changes sign with the pressure's slope.
     """

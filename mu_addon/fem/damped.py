@@ -1,4 +1,4 @@
-"""Minimisation of the potential by damped steps, from where no stable path leads on."""
+"""Minimisation of the potential by damped steps, for starts from which no stable path leads on."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ROUNDING = 1e-13
 
 
 class Body(Protocol):
-    """What is moved: a model, its materials, its solver, and the undeformed body's tangent (nnz,).
+    """Model, its materials, its solver, and the tangent (nnz,) of the undeformed body.
 
     An `Equilibrium` is one.
     """
@@ -40,7 +40,7 @@ class Body(Protocol):
 
     @property
     def factor(self) -> Any:
-        """As `Model.factor`."""
+        """Factorisation, as `Model.factor`."""
 
     @property
     def rest_tangent(self) -> Array:

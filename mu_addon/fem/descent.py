@@ -42,7 +42,7 @@ class Descent:
 
     @property
     def converged(self) -> bool:
-        """Whether `residual` is within the settings' tolerance."""
+        """Return True if `residual` is within the settings' tolerance."""
         return self.level <= self.settings.tolerance * self.scale
 
     @property
@@ -54,7 +54,7 @@ class Descent:
         return self.level / self.scale if self.scale else 0.0
 
     def forget(self) -> None:
-        """Drop the steps taken: they belong to another factor."""
+        """Drop the steps taken so far: they belong to another factor."""
         self._secants = []
 
     def direction(self, solve: Callable[[Array], Array]) -> Array:
@@ -89,7 +89,8 @@ class Descent:
         return -step
 
     def move(self, step: Array) -> float:
-        """Go along a step (f,) in mm as far as it helps; returns the residual's new norm over the old one.
+        """Take the share of a step (f,) in mm that reduces the residual; return its new norm over the old
+        one.
 
         The step is halved until the residual halves or the potential falls enough (Armijo). Raises
         ConvergenceError where no length tried does either. With self-contact no step goes as far as a touch,

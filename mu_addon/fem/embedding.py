@@ -1,4 +1,4 @@
-"""Any points carried along by a deformed mesh: a printable surface in the motion of the analysis mesh."""
+"""Points embedded in a mesh: a printable surface that follows the motion of the analysis mesh."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
 
 @attrs.frozen(eq=False)
 class Footholds:
-    """Where points (p, 3) hold onto a mesh, so that their weights follow as mesh and points move a little.
+    """Positions of points (p, 3) relative to a mesh, so that their weights follow small motions of both.
 
     tets (p, n): nodes of each point's element; at (p, 4): the place in it, barycentric, about which the
     displacement is continued linearly; held (p,): beyond the fixed base, where nothing is continued. weights
-    (p, n): as `embed` has them, of the places that the footholds were made at.
+    (p, n): as in `embed`, at the positions that the footholds were made for.
     """
 
     tets: Array
@@ -101,7 +101,7 @@ def _barycentric(local: Array) -> Array:
 
 
 def _elements(mesh: Mesh, points: Array) -> tuple[Array, Array]:
-    """For each point the element (p,) it lies in, or -1, and its reference coordinates there (p, 3)."""
+    """Element (p,) that contains each point, or -1, and its reference coordinates there (p, 3)."""
     nodes = mesh.nodes[mesh.tets]
     inverse = np.linalg.inv((nodes[:, 1:4] - nodes[:, :1]).transpose(0, 2, 1))
     curved = np.zeros(len(nodes), bool)

@@ -59,12 +59,12 @@ class Equilibrium:
 
     @property
     def factor(self) -> Any:
-        """The model's solver: another one after self-contact has made the tangent's pattern grow."""
+        """Solver of the model; it is replaced when self-contact enlarges the tangent's pattern."""
         return self.model.factor
 
     @property
     def rest_tangent(self) -> Array:
-        """Tangent of the undeformed body: positive definite, of the same pattern, and about as stiff."""
+        """Tangent of the undeformed body: positive definite, of the same pattern and similar stiffness."""
         if self._stiffening is None or self._stiffening[0] is not self.model.pattern:
             values = self.model.tangent(rest(self.model.mesh).u, 0.0, self.parameters)
             self._stiffening = self.model.pattern, values
@@ -73,10 +73,10 @@ class Equilibrium:
     def _factorise(self, u: Array, pressure: float, convex: bool = False, first: int = 0) -> tuple[bool, int]:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
 
-        Away from equilibrium a thin wall easily carries more compression than it can, without any
-        instability at the equilibrium itself. convex: as `Model.tangent` takes it; where that of self-contact
-        is needed and not asked for, it comes first. first: number of the share to begin with, 0 for none.
-        Returns whether the tangent asked for was definite, and the number of the share that was added.
+        Away from equilibrium a thin wall may be compressed beyond its buckling load although the equilibrium
+        itself is stable. convex: as `Model.tangent` takes it; where that of self-contact is needed and not
+        asked for, it comes first. first: number of the share to begin with, 0 for none. Returns whether the
+        tangent asked for was definite, and the number of the share that was added.
         """
         touches = self.model.self_contact is not None
         shares = 0.0, *self.settings.regularisation
@@ -93,9 +93,9 @@ class Equilibrium:
         raise ConvergenceError("the tangent is far from definite")
 
     def at_zero_pressure(self) -> State:
-        """The state without pressure: as drawn, or where the model's load takes it from there.
+        """State without pressure: as drawn, or deformed by the model's load.
 
-        Raises ConvergenceError where the body does not bear its load.
+        Raises ConvergenceError where the body cannot carry its load.
         """
         model = self.model
         start, load = rest(model.mesh), model.load
@@ -257,18 +257,18 @@ class Equilibrium:
         return self._with_friction(State(pressure, u), found)
 
     def snapped(self, last: State, pressure: float) -> State:
-        """The stable state that the body falls to from one before a limit point, at a pressure in MPa beyond.
+        """Stable state beyond a limit point, at a pressure in MPa, that the body snaps to from one before it.
 
-        It tells how far (`State.snapped_mm`). Raises ConvergenceError where there is none.
+        `State.snapped_mm` holds the distance. Raises ConvergenceError where there is none.
         """
         state = self.settled(last.u, pressure)
         moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
         return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
 
     def start(self, u: Array, guess: Array) -> Array:
-        """What to start from, (n, 3) in mm: a prediction, or the last state u where surfaces would meet.
+        """Start (n, 3) in mm: the prediction, or the last state u if surfaces would meet on the way.
 
-        Cut short at the touch a prediction lies next to it, where the barrier's forces are largest.
+        A start cut short at the first touch would lie where the barrier's forces are largest.
         """
         # What touches early on a long way is found without the search of all that lies along it.
         for share in SHARES_OF_WAY:

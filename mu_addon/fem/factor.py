@@ -1,4 +1,4 @@
-"""Sparse symmetric factorisation by library: CHOLMOD with METIS ordering, or what else is installed."""
+"""Sparse symmetric factorisation by library: CHOLMOD with METIS ordering, or the alternative installed."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _load_cvxopt() -> None:
 
 
 def _kernels() -> str:
-    """OpenBLAS's name of the kernels for what this processor can do; empty where it may choose itself."""
+    """OpenBLAS's name of the kernels for this processor; empty to let it choose."""
     # numpy 1.26 has types for less.
     show: Any = np.show_config
     simd = show(mode="dicts")["SIMD Extensions"]

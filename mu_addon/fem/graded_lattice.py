@@ -1,10 +1,9 @@
-"""Stiffness of a homogenised lattice of graded struts, over that of its struts at factor 1.
+"""Stiffness of a homogenised lattice of graded struts, relative to struts of factor 1.
 
-A lattice's element gets the moduli of the endless lattice whose struts all have the diameters of its own
-place, as if these changed slowly from cell to cell. Moduli of the periodic body-centred cell were computed
-once from its quadratic solid (`benchmarks/grading.py`, resin of Poisson's ratio 0.45) over the diameters at
-junctions and at mid-span; polynomials in their logarithms keep within 1.6 % of them, and within 3 % of cells
-left out of the fit.
+An element gets the moduli of the infinite lattice whose struts all have the diameters at its position, as if
+these changed slowly from cell to cell. Moduli of the periodic body-centred cell were computed once from its
+quadratic solid (`benchmarks/grading.py`, resin of Poisson's ratio 0.45) over the diameters at junctions and
+at mid-span. Polynomials in their logarithms fit them within 1.6 %, and cells left out of the fit within 3 %.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ RANGE = (0.05, 0.32)
 
 
 class Moduli(NamedTuple):
-    """E[100], C12 and C44 of a lattice, or what belongs to each of them; (n,)."""
+    """E[100], C12 and C44 of a lattice, or a value for each of them; (n,)."""
 
     E100: Array
     C12: Array
@@ -131,7 +130,7 @@ def element_factors(d: Dimensions, mesh: Mesh) -> Array:
 
 
 def law_weight(law: Any, moduli: Moduli) -> Array:
-    """How many times (n,) as stiff one law of a homogenised lattice is by `relative_moduli`.
+    """Factor (n,) on the stiffness of one law of a homogenised lattice, by `relative_moduli`.
 
     Of a law from `homogenize` the foam stands for struts in bending and follows E[100], cubic shear and
     diagonal stretch for struts in tension, and follow C44 and C12. The one isotropic modulus of a unit was

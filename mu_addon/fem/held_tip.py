@@ -65,11 +65,11 @@ class HeldTip(Obstacle):
         return np.stack([self.edge, self.edge], axis=1), found
 
     def begin(self, u: Array | None = None) -> None:
-        """Nothing: a cell remembers nothing."""
+        """Do nothing: a cell has no history."""
 
     def commit(self, u: Array) -> None:
-        """Nothing: a cell remembers nothing."""
+        """Do nothing: a cell has no history."""
 
     def deepest_mm(self, u: Array) -> float:
-        """0: nothing overlaps. u: displacements (n, 3) in mm."""
+        """Return 0: nothing overlaps. u: displacements (n, 3) in mm."""
         return 0.0

@@ -20,11 +20,11 @@ _MODES = 8
 class Inertia:
     """Solves with a symmetric tangent K of a model, and counts its negative eigenvalues.
 
-    While K is definite this is its Cholesky factor. Past that some unknowns E, those that move most in
-    the modes that were lost, get springs r, so that K + E r E^T is definite and Cholesky's again. Taking
-    the springs away is a small system, S = 1/r - E^T (K + E r E^T)^-1 E (Sherman, Morrison and Woodbury),
-    and S has exactly as many negative eigenvalues as K (Haynsworth, Linear Algebra Appl. 1 (1968) 73, on
-    the matrix of both blocks). Where no such springs are known, an L D L^T finds the lost modes.
+    While K is definite this is its Cholesky factor. Beyond that, springs r on the unknowns E that move most
+    in the lost modes make K + E r E^T definite, so that Cholesky serves again. Removing the springs is a
+    small system, S = 1/r - E^T (K + E r E^T)^-1 E (Sherman, Morrison and Woodbury), and S has exactly as many
+    negative eigenvalues as K (Haynsworth, Linear Algebra Appl. 1 (1968) 73, on the matrix of both blocks).
+    Where no such springs are known, an L D L^T finds the lost modes.
     """
 
     def __init__(self, model: Model) -> None:
@@ -40,7 +40,7 @@ class Inertia:
 
     @property
     def _diagonal(self) -> Array:
-        """Where the diagonal's entries (n,) are: a column of the lower triangle begins with its own."""
+        """Positions (n,) of the diagonal's entries: a column of the lower triangle begins with its own."""
         return self.model.pattern.indptr[:-1]
 
     @property
@@ -53,8 +53,8 @@ class Inertia:
     def suspect(self, mode: Array) -> None:
         """Name a displacement (free unknowns,) that may become unstable next.
 
-        The next `factor` tries springs on the unknowns that move most in it before it falls back on an
-        L D L^T.
+        The next `factor` tries springs on the unknowns that move most in it before it falls back on an L D
+        L^T.
         """
         self._suspect = mode
 

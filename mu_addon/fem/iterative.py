@@ -1,4 +1,4 @@
-"""Conjugate gradients on quadratic elements around an exact solve on linear ones: for large bodies."""
+"""Conjugate gradients on quadratic elements, preconditioned by a direct solve on linear ones."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class _Symmetric:
         return part
 
     def fill(self, values: Array) -> None:
-        """Take the lower triangle's values (nnz,)."""
+        """Set the lower triangle's values (nnz,)."""
         np.take(values, self._source, out=self.whole.data)
 
     @property
@@ -92,11 +92,11 @@ class _Symmetric:
 
 
 class TwoLevel:
-    """Solver of tangents of a quadratic mesh, in the place of a factorisation.
+    """Solver for tangents of a quadratic mesh, in place of a factorisation.
 
-    Preconditioner: Chebyshev smoothing before and after an exact solve in the space of linear elements on
-    the same corners, an eighth of the unknowns (p-multigrid). Raises InputError for a mesh of order 1.
-    tolerance: relative residual of each solution.
+    Preconditioner: Chebyshev smoothing before and after an exact solve in the space of linear elements on the
+    same corners, an eighth of the unknowns (p-multigrid). Raises InputError for a mesh of order 1. tolerance:
+    relative residual of each solution.
     """
 
     # Of the smoothed part of the spectrum, the ends as shares of the largest eigenvalue, and the degree:

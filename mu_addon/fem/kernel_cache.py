@@ -1,4 +1,4 @@
-"""Warp's cache of compiled kernels, so that what became of it on the disk ends no run.
+"""Warp's cache of compiled kernels, protected so that damage on the disk ends no run.
 
 Warp writes it without fsync and reads it without doubt: after a power cut an entry may be cut short, a disk
 may return other bits than it was given, and a home may be full or read-only. Code of which one bit is wrong
@@ -21,7 +21,7 @@ from ..files import write_json
 from ..reading import file_bytes, parse_json
 
 NEEDED_BYTES = 20_000_000
-"""Room for the kernels of a run, several times what they take."""
+"""Free disk space required for the kernels of a run, several times their size."""
 _SEAL = "sha256.json"
 """File of an entry that holds the SHA-256 of each other one, by name."""
 # Where a process builds an entry, before it gets its name.
@@ -29,7 +29,7 @@ _BEING_BUILT = re.compile(r"_p\d+_t\d+$")
 
 
 def usable_cache(cache: Path) -> Path:
-    """The cache without entries that are damaged; or a copy for this process, where it cannot be written.
+    """Return the cache without damaged entries, or a copy for this process if it cannot be written.
 
     The copy is removed when the process ends. Raises OSError where there is no room for it either. Of a cache
     that can be written every entry is sealed: at once, and what this process adds when it ends.
@@ -49,14 +49,14 @@ def usable_cache(cache: Path) -> Path:
 
 
 def own_cache() -> Path:
-    """A folder for this process alone, removed when it ends; raises OSError."""
+    """Make a folder for this process alone, removed when it ends; raises OSError."""
     own = Path(tempfile.mkdtemp(prefix="mu-kernels-"))
     atexit.register(shutil.rmtree, own, ignore_errors=True)
     return own
 
 
 def entries(cache: Path) -> list[Path]:
-    """The folders of a cache's entries, a module's kernels each."""
+    """Folders of a cache's entries, each with a module's kernels."""
     if not cache.is_dir():
         return []
     found = [path for path in cache.glob("wp_*") if path.is_dir()]
@@ -64,9 +64,9 @@ def entries(cache: Path) -> list[Path]:
 
 
 def seal(cache: Path) -> None:
-    """Write the digests of an entry's files beside them, of every entry that has files without one.
+    """Write the digests of an entry's files beside them, if it has files without one.
 
-    What has a digest keeps it: it is what the file held when it was new.
+    Existing digests stay: they belong to the files as first written.
     """
     for entry in entries(cache):
         with suppress(OSError, InputError, OutputError):
@@ -80,7 +80,7 @@ def seal(cache: Path) -> None:
 
 
 def is_whole(entry: Path) -> bool:
-    """Whether the files of an entry can be read, are as long as they say and hold what was sealed."""
+    """Return True if an entry's files can be read, have their stated length and match their digests."""
     try:
         sealed = _sealed(entry)
         contents = {path.name: file_bytes(path) for path in _files(entry)}
@@ -95,7 +95,7 @@ def is_whole(entry: Path) -> bool:
 
 
 def _files(entry: Path) -> list[Path]:
-    """What Warp wrote into an entry; a file whose name begins with a dot is a seal being written."""
+    """Files that Warp wrote into an entry; one whose name begins with a dot is a seal being written."""
     return [path for path in entry.iterdir() if path.name != _SEAL and not path.name.startswith(".")]
 
 
@@ -116,7 +116,7 @@ def _digest(content: bytes) -> str:
 
 
 def _object_is_whole(content: bytes) -> bool:
-    """Whether an object file of ELF holds its table of sections, its end; any other must not be empty."""
+    """Return True if an ELF file is complete up to its table of sections, or any other file is not empty."""
     if content[:4] != b"\x7fELF":
         return sys.platform != "linux" and bool(content.strip(b"\0"))
     begin, size, count = (int.from_bytes(content[a:b], "little") for a, b in ((40, 48), (58, 60), (60, 62)))

@@ -349,7 +349,7 @@ def enclosed_volume(
     weight: wp.array(dtype=f64),
     out: wp.array(dtype=f64),
 ):
-    """Cavity volume a face: normals point out of the solid, into the cavity, hence the sign."""
+    """Cavity volume of a face: its normal points out of the solid, into the cavity, hence the sign."""
     f = wp.tid()
     total = f64(0.0)
     for q in range(N.shape[0]):
@@ -439,7 +439,7 @@ def gather_vectors(
     index: wp.array(dtype=int),
     out: wp.array(dtype=vec3),
 ):
-    """Sum each node's contributions in a fixed order, so that the answer does not depend on timing."""
+    """Sum each node's contributions in a fixed order, so that the result does not depend on timing."""
     i = wp.tid()
     total = vec3()
     for k in range(start[i], start[i + 1]):

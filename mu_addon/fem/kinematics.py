@@ -1,4 +1,4 @@
-"""What is read off a deformed mesh: displacements at points, the bending angle of the tip."""
+"""Quantities read from a deformed mesh: displacements at points, and the bending angle of the tip."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = np.ndarray[Any, Any]
 
 
 SETTLED = 1e-9
-"""A step of Newton's method in reference coordinates after which there is nothing more to gain."""
+"""A smaller Newton step in reference coordinates is not followed by another."""
 
 
 @attrs.frozen(eq=False)

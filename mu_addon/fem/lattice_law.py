@@ -1,4 +1,4 @@
-"""What a lattice between walls is made of for the analysis mesh: laws side by side, the same everywhere."""
+"""Laws in parallel, uniform in space, of the homogenised lattice in the analysis mesh."""
 
 from __future__ import annotations
 

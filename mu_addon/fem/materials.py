@@ -1,4 +1,4 @@
-"""What a body is made of: laws in layers, each over some elements, side by side where they overlap."""
+"""Materials of a body: laws in layers, each over some elements, in parallel where they overlap."""
 
 from __future__ import annotations
 
@@ -24,11 +24,10 @@ def _rows(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Layer:
-    """One material law in some elements: elements (k,), parameters (k, count) in the law's own order.
+    """A material law in some elements: elements (k,), parameters (k, count) in the law's own order.
 
-    weight, a number or (k,): share of an element's volume that this law fills; laws that share an element
-    act in parallel, under the same strain (Voigt). Raises InputError where the law does not admit its
-    parameters.
+    weight, a number or (k,): share of an element's volume that this law fills; laws that share an element act
+    in parallel, under the same strain (Voigt). Raises InputError where the law does not admit its parameters.
     """
 
     law: Any
@@ -51,7 +50,7 @@ class Layer:
         self.law.valid(self.parameters)
 
     def of(self, kept: Array) -> Layer:
-        """The layer in those of its elements that are kept, (k,) bool."""
+        """The layer restricted to a mask (k,) of its elements."""
         return (
             self
             if kept.all()
@@ -59,13 +58,13 @@ class Layer:
         )
 
     def kept(self, rows: Array, weight: Array) -> Layer:
-        """The rows numbered `rows` (r,) of this layer, with new weights (r,) from 0 to 1."""
+        """Rows `rows` (r,) of this layer, with new weights (r,) from 0 to 1."""
         return Layer(self.law, self.elements[rows], self.parameters[rows], weight)
 
 
 @attrs.frozen(eq=False)
 class Materials:
-    """What fills a body: layers of laws over elements, in parallel where they share one.
+    """Materials of a body: layers of laws over elements, in parallel where they share one.
 
     Every element needs at least one layer. `neo_hooke` covers all elements by Young's modulus in MPa and
     Poisson's ratio.
@@ -90,7 +89,8 @@ class Materials:
         return cls((Layer(NeoHooke, np.arange(len(parameters)), parameters),))
 
     def blended(self, share: Array, law: Any, parameters: Array) -> Materials:
-        """These materials with another law in a share (m,) of every element, and as much less of themselves.
+        """These materials with another law in a share (m,) of each element and their own weight reduced by
+        it.
 
         parameters: (m, count) or one row for all. Elements of which a layer keeps nothing leave it. Raises
         InputError for a share outside 0 to 1, or parameters that the law does not admit.

@@ -78,11 +78,11 @@ class MaterialData:
 
     @property
     def has_history(self) -> bool:
-        """Whether a law remembers, so that a state depends on those before it."""
+        """True if a law has history, so that a state depends on those before it."""
         return any(layer.history.shape[2] for layer in self.layers)
 
     def kept(self) -> tuple[Array, ...]:
-        """A copy of what each law with history remembers, (k, q, h) each, for `restore`."""
+        """Copy of each law's history, (k, q, h) each, for `restore`."""
         return tuple(layer.history.numpy().copy() for layer in self.layers if layer.history.shape[2])
 
     def restore(self, kept: Sequence[Array]) -> None:
@@ -99,7 +99,7 @@ class MaterialData:
 
 
 def _lists(target: Array, count: int) -> tuple[Array, Array]:
-    """For each of `count` targets the list of positions that add to it, as (start, index)."""
+    """For each of `count` targets the list of positions that contribute to it, as (start, index)."""
     index = np.argsort(target, kind="stable")
     start = np.zeros(count + 1, dtype=np.int32)
     np.cumsum(np.bincount(target, minlength=count), out=start[1:])
@@ -250,7 +250,7 @@ class Model:
         self.pattern = self._own_pattern = Pattern.of(row[sorting], column[sorting], self.free)
 
     def _hold_beams(self, fixed: Array) -> None:
-        """Fix what beams leave without stiffness of its own, and how rotation vectors are supported."""
+        """Fix the unknowns without own stiffness in beams, and apply supports to rotation vectors."""
         mesh = self.mesh
         self._carried = Carried(mesh) if len(mesh.beams) else None
         if self._carried is None:
@@ -272,7 +272,7 @@ class Model:
         fixed[mesh.carried] = True
 
     def _with_beam_blocks(self, own: Array) -> Array:
-        """Keys of the tangent's blocks, those of beams and of what they carry included; own (b,): without."""
+        """Keys of the tangent's blocks, with those of beams and of carried nodes; own (b,): without."""
         mesh, n = self.mesh, len(self.mesh.nodes)
         assert self._carried is not None
         is_carried = np.zeros(n, bool)
@@ -301,9 +301,9 @@ class Model:
         return self.mesh.following(u)
 
     def passed_on(self, u: Array, loads: Any) -> Any:
-        """Loads (3 n, c) on nodes passed on to what carries them about u (n, 3) in mm, and what ties them.
+        """Loads (3 n, c) passed on from tied and carried nodes to those they follow, about u (n, 3) in mm.
 
-        Of a sparse matrix, which must leave tied nodes out, comes another.
+        A sparse matrix, which must leave tied nodes out, gives a sparse one.
         """
         if self._carried is not None:
             loads = self._carried.map(u, np.arange(len(u))).T @ loads
@@ -312,7 +312,7 @@ class Model:
         return self.mesh.folded(loads.reshape(len(u), 3, -1)).reshape(loads.shape)
 
     def passed_back(self, u: Array, changes: Array) -> Array:
-        """Changes (3 n, c) of displacements, of those of free nodes, with those of tied and carried ones."""
+        """Changes (3 n, c) of displacement of all nodes, from those of free nodes."""
         changes = self.mesh.following(changes.reshape(len(u), 3, -1)).reshape(changes.shape)
         if self._carried is None:
             return changes
@@ -440,9 +440,9 @@ class Model:
         return np.maximum(kappa - POINTWISE_BULK * mu, 0.0)
 
     def commit(self, u: Array, m: MaterialData) -> None:
-        """Make the converged state u (n, 3) in mm the one that materials and contacts remember.
+        """Store the converged state u (n, 3) in mm as the history of materials and contacts.
 
-        It lies `m.dt_s` seconds after the one remembered before.
+        It lies `m.dt_s` seconds after the last one stored.
         """
         for contact in self.remembering:
             contact.commit(u)
@@ -461,19 +461,19 @@ class Model:
             contact.begin()
 
     def move_obstacles(self, time_s: float) -> None:
-        """Put obstacles with a path where they are at a time in s."""
+        """Move obstacles with a path to their pose at a time in s."""
         for obstacle in self.obstacles:
             obstacle.move(time_s)
 
     @property
     def remembering(self) -> tuple[Obstacle | SelfContact, ...]:
-        """Contacts whose friction may remember: obstacles, and self-contact where it has friction."""
+        """Contacts whose friction may have history: obstacles, and self-contact where it has friction."""
         own = self.self_contact
         return self.obstacles if own is None or not own.friction else (*self.obstacles, own)
 
     @property
     def has_friction(self) -> bool:
-        """Whether anything has friction, so that a state depends on those before it."""
+        """True if anything has friction, so that a state depends on those before it."""
         return any(contact.friction for contact in self.remembering)
 
     def deepest_mm(self, u: Array) -> float:
@@ -515,7 +515,7 @@ class Model:
         return self.following(found)
 
     def before_touch(self, u: Array, to: Array) -> Array:
-        """Displacements `to`, (n, 3) in mm, or before them on the straight way from u where surfaces meet.
+        """Displacements `to`, (n, 3) in mm, or the last on the straight way from u before surfaces meet.
 
         u must be free of intersections. Without self-contact that is always `to`.
         """
@@ -548,11 +548,11 @@ class Model:
         return float(self._energy.numpy().sum() - work)
 
     def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
-        """What acts on each run of the cavity's faces: pressure in MPa, first face, faces (f, 3 | 6)."""
+        """Runs of the cavity's faces under one pressure: pressure in MPa, first face, faces (f, 3 | 6)."""
         return [(pressure, 0, self._faces)] if len(self.mesh.cavity) else []
 
     def _pressure_work(self, pressure: float) -> float:
-        """Pressure in MPa times the volume that it fills, in mJ; the volume is that at `_place`."""
+        """Pressure in MPa times the volume that it fills, in mJ, at the displacement in `_place`."""
         return pressure * self._volume()
 
     def _volume(self) -> float:
@@ -619,9 +619,9 @@ class Model:
     def tangent(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
         """Values (nnz,) in N/mm of the tangent's lower triangle by columns, as in `pattern`.
 
-        u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact.
-        convex: self-contact without what makes it less than definite (`SelfContact.stiffness`), and forces
-        on the sections of beams without what it is to turn these (`Carried.turning`).
+        u: (n, 3) in mm; pressure in MPa, whose follower stiffness is included, as is that of contact. convex:
+        self-contact without its negative eigenvalues (`SelfContact.stiffness`), and forces on sections of
+        beams without the stiffness of their rotation (`Carried.turning`).
         """
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
@@ -644,7 +644,7 @@ class Model:
         return np.asarray(blocks.ravel()[self._scalar_map])
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
-        """The tangent's values (nnz,) of the body's own and of self-contact, its pattern grown if need be."""
+        """Values (nnz,) of the tangent with self-contact, its pattern enlarged if need be."""
         found = np.zeros(len(self.pattern.indices))
         found[self._own] = own
         contact = self.self_contact
@@ -668,7 +668,7 @@ class Model:
         return found
 
     def _uncarried(self, stiffness: sparse.coo_matrix, u: Array) -> sparse.coo_matrix:
-        """A stiffness (3 n, 3 n) between all nodes as one between those that are not carried, at u (n, 3)."""
+        """A stiffness (3 n, 3 n) between all nodes, mapped to those that are not carried, at u (n, 3)."""
         if self._carried is None:
             return stiffness
         nodes = np.unique(stiffness.row // 3)
@@ -680,7 +680,7 @@ class Model:
         return sparse.coo_matrix(to.T @ own @ to)
 
     def _room(self, u: Array) -> tuple[Array, Array]:
-        """Entries that self-contact may come to fill, between nodes that are not carried."""
+        """Entries that self-contact may fill, between nodes that are not carried."""
         assert self.self_contact is not None
         rows, columns = self.self_contact.room(u)
         if self._carried is None:
@@ -691,7 +691,7 @@ class Model:
         return found.row, found.col
 
     def forget_contact(self) -> None:
-        """Go back to the body's own pattern, without what self-contact has added: factors take less time."""
+        """Return to the body's own pattern, without the entries of self-contact: factors take less time."""
         if self.pattern is not self._own_pattern:
             self.pattern, self._own = self._own_pattern, slice(None)
             self.__dict__.pop("factor", None)

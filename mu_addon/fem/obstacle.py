@@ -25,11 +25,11 @@ _AT_BOUND = 0.999
 
 @attrs.frozen(eq=False)
 class ObstacleContact:
-    """What a state's contact with one obstacle is; forces are of the meshed body on the obstacle, (3,) in N.
+    """Contact of a state with one obstacle; forces are of the meshed body on the obstacle, (3,) in N.
 
     area_mm2: of the surface that touches, undeformed; sticking: the share of it that does not slide, 1 where
-    nothing touches. deepest_mm: the error of the gap. slid_mm (f, q): what each point has slid so far, those
-    of `Obstacle.places`; lost_mJ: what that has cost.
+    nothing touches. deepest_mm: the error of the gap. slid_mm (f, q): slid length of each point of
+    `Obstacle.places`; lost_mJ: energy dissipated by sliding.
     """
 
     normal_N: Array
@@ -114,7 +114,7 @@ class Obstacle:
         self.begin()
 
     def move(self, time_s: float) -> None:
-        """Set `pose` to what `path` gives for a time in s; without a path nothing happens."""
+        """Set `pose` to that of `path` at a time in s; do nothing without a path."""
         if self.path is not None:
             self.pose = self.path(time_s)
 
@@ -146,9 +146,9 @@ class Obstacle:
         return {"point": at, "lost_mJ": np.array(m.lost_mJ), **found}
 
     def restore(self, u: Array, kept: dict[str, Array]) -> None:
-        """Set the memory to what it was when `kept` was stored.
+        """Set the memory to its value when `kept` stored it.
 
-        u (n, 3) in mm: displacement that was the last committed one then. Nothing happens without friction.
+        u (n, 3) in mm: the last committed displacement then. Does nothing without friction.
         """
         if not self.friction:
             return
@@ -159,7 +159,7 @@ class Obstacle:
         self.recall(Memory(y, g, n, pressure, slip, slid, float(kept["lost_mJ"])))
 
     def lag_from_memory(self) -> None:
-        """Take pressure and normal that bound friction from the last committed state."""
+        """Take the pressure and normal that bound friction from the last committed state."""
         if self.friction:
             m = self.memory
             self.lag = Lag(m.pressure, m.normal, np.ones_like(m.pressure))
@@ -181,7 +181,7 @@ class Obstacle:
         return change / most if most else float(change > 0)
 
     def update_lag(self, u: Array) -> None:
-        """Let pressure and normal that bound friction follow to displacement u (n, 3) in mm."""
+        """Update the pressure and normal that bound friction to displacement u (n, 3) in mm."""
         if not self.friction:
             return
         face, m = self._near(u), self.memory
@@ -192,7 +192,7 @@ class Obstacle:
         self.lag.counts[face] = new.counts
 
     def commit(self, u: Array) -> None:
-        """Make a converged state u (n, 3) in mm part of the memory.
+        """Commit a converged state u (n, 3) in mm to the memory.
 
         Slip beyond the bound is added to `slid`, and its work, by the mean of friction at both ends of the
         step, to `lost_mJ`. Points that no longer touch lose their elastic slip.
@@ -223,7 +223,7 @@ class Obstacle:
         )
 
     def energy_mJ(self, u: Array) -> float:
-        """Energy in mJ stored in the contact at u (n, 3) in mm, with what sliding costs in this step."""
+        """Energy in mJ stored in the contact at u (n, 3) in mm, with that dissipated in this step."""
         face = self._near(u)
         y, g, _, _ = self._points(u, face)
         s = np.maximum(-g, 0.0)
@@ -343,7 +343,7 @@ class Obstacle:
         return x[on], pressure[on]
 
     def _points(self, u: Array, faces: Array | None = None) -> tuple[Array, Array, Array, Array]:
-        """In the obstacle's frame, at points of faces: place (f, q, 3), distance (f, q), its derivatives."""
+        """Position (f, q, 3), distance (f, q), its derivatives, of faces' points in the obstacle's frame."""
         chosen = slice(None) if faces is None else faces
         x = np.einsum("qa,fai->fqi", self._shape, (self._rest + u)[self.faces[chosen]])
         y = (x - self.pose.shift) @ self.pose.rotation
@@ -353,7 +353,7 @@ class Obstacle:
         return y, gap, n.reshape(*shape, 3), h.reshape(*shape, 3, 3)
 
     def _contact_candidates(self, u: Array) -> tuple[Array, ...]:
-        """Faces (f,) that press or rub, and what `_points` says of them."""
+        """Faces (f,) that press or rub, and their `_points`."""
         near = self._near(u)
         y, g, n, h = self._points(u, near)
         on = (g < 0).any(axis=1)

@@ -1,4 +1,4 @@
-"""The faces of a mesh that something outside can touch, and which part of each is free to be touched."""
+"""Faces of a mesh that outside bodies can touch, and the exposed part of each."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _CUT_AWAY = 0.02
 
 @attrs.frozen(eq=False)
 class OuterFaces:
-    """Faces that can be touched: their nodes (f, 3 | 6), and the share (f, 3) of each third that is bare.
+    """Faces that can be touched: their nodes (f, 3 | 6), and the exposed share (f, 3) of each third.
 
-    A face's thirds are what lies nearest to each of its corners. All is bare of a mesh whose parts do not
-    overlap; what a strut has inside a wall or a waveguide is not.
+    A third of a face is nearest to one of its corners. All is exposed in a mesh whose parts do not overlap;
+    the part of a strut inside a wall or a waveguide is not.
     """
 
     nodes: Array

@@ -1,4 +1,4 @@
-"""Sparsity of a symmetric tangent, and how it grows where contact joins what no element does."""
+"""Sparsity of a symmetric tangent, and its growth by contact between nodes that share no element."""
 
 from __future__ import annotations
 
@@ -47,19 +47,20 @@ class Pattern:
 
     @cached_property
     def keys(self) -> Array:
-        """One number (nnz,) for each entry, ascending: f times its column, plus its row."""
+        """Number (nnz,) of each entry, ascending: f times its column, plus its row."""
         columns = np.repeat(np.arange(len(self.order)), np.diff(self.indptr))
         return np.asarray(columns * len(self.order) + self.indices)
 
     def places(self, rows: Array, columns: Array) -> tuple[Array, Array]:
-        """Where entries (j,) of the lower triangle are among the nnz, and which of them are there at all."""
+        """Positions of entries (j,) of the lower triangle among the nnz, and a mask of those that exist."""
         keys = columns.astype(np.int64) * len(self.order) + rows
         at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
         return at, self.keys[at] == keys
 
 
 def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> tuple[Pattern, Array]:
-    """A pattern with more entries (j,) of the lower triangle, and where its own (nnz,) are in it.
+    """A pattern with additional entries (j,) of the lower triangle, and the positions in it of its own
+    (nnz,).
 
     free (f,): number 3 node + axis of each unknown. The order is made anew: the old one made the factor of a
     unit whose walls touch 2.5 times slower, and with more room for contact 10 times.

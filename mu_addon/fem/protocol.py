@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 COLUMNS = ("time_s", "pressure_kPa")
 LEAST_KPA, MOST_KPA = -101.325, 1000.0
-"""Gauge pressures that a protocol may have: from none at all, to twenty times what a unit is built for."""
+"""Least gauge pressure of a protocol: vacuum. Largest: twenty times the design pressure of a unit."""
 # Far longer than any protocol of a million corner points needs to be, in bytes.
 _LONGEST = 1 << 25
 
@@ -59,8 +59,8 @@ class ProtocolText:
         """Values (c, k) of k columns of numbers, the first of them time; needs their names in the heading.
 
         Raises InputError naming file and line where a value is missing or not a finite number, a pressure (a
-        column whose name ends with kPa) is none that can be, time does not increase, or there are fewer than
-        two rows.
+        column whose name ends with kPa) is out of range, time does not increase, or there are fewer than two
+        rows.
         """
         columns = [self.names.index(name) for name in names]
         found: list[list[float]] = []
@@ -116,8 +116,8 @@ def read_protocol(path: Path) -> Protocol:
     """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
 
     Raises InputError naming file and line where the file is unreadable, a value is missing or not a finite
-    number, a pressure is none that can be, time does not increase, or the protocol does not start at
-    atmospheric pressure.
+    number, a pressure is out of range, time does not increase, or the protocol does not start at atmospheric
+    pressure.
     """
     text = read_protocol_text(path, COLUMNS)
     number, line = text.heading

@@ -1,4 +1,4 @@
-"""A body's elements as drawn: gradients of their shape functions and volumes, found when asked for."""
+"""Elements of the undeformed body: gradients of shape functions and volumes, computed on demand."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ Array = np.ndarray[Any, Any]
 
 
 class Reference:
-    """What a mesh's elements are as drawn, on a device of Warp as well.
+    """Gradients and volumes of a mesh's undeformed elements, on a device of Warp as well.
 
-    near: of a mesh of the same elements; only those with moved nodes are then found anew.
+    near: of a mesh of the same elements; only elements with moved nodes are then computed anew.
     """
 
     def __init__(self, mesh: Mesh, device: str, near: Reference | None = None) -> None:

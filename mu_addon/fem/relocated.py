@@ -1,4 +1,4 @@
-"""A body with its nodes elsewhere: same elements, unknowns and pattern, other reference gradients."""
+"""A body with moved nodes: same elements, unknowns and pattern, other reference gradients."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = np.ndarray[Any, Any]
 
 
 def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None) -> Model:
-    """The model of a mesh of the same elements with other nodes, in milliseconds instead of a new pattern.
+    """The model of a mesh of the same elements with moved nodes, in milliseconds, without a new pattern.
 
     The two share buffers and factor: use one after the other, and factorise again in between. `load` is the
     first model's and must be set anew where it depends on the places. self_contact: of the other mesh, see

@@ -1,4 +1,4 @@
-"""Rigid bodies by their signed distance, and where they are."""
+"""Rigid bodies by their signed distance, and their poses."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def round_bend(normal: Array, radius: Array, within: Array | None = None) -> Arr
 
 @attrs.frozen(eq=False)
 class Pose:
-    """Where a rigid body is: turned by `rotation` (3, 3), then moved by `shift` (3,) in mm.
+    """Pose of a rigid body: rotated by `rotation` (3, 3), then moved by `shift` (3,) in mm.
 
     Raises InputError where the matrix is not a rotation (orthogonal, determinant 1).
     """

@@ -63,10 +63,10 @@ class _Pairs:
 
 @attrs.frozen(eq=False)
 class Touch:
-    """Where a body touches itself in one state.
+    """Self-contact of a body in one state.
 
     pressure_kPa (n,): the contact's normal force at each node of the mesh over the undeformed area around it;
-    force_N: what all pieces press on each other with, mirror images included; gap_mm: the least distance,
+    force_N: total normal force between all pieces, mirror images included; gap_mm: the least distance,
     infinite where nothing is within the gap.
     """
 
@@ -93,20 +93,19 @@ class SelfContact:
     """Energy of a body's surface that comes near itself, as `Model.self_contact` takes it.
 
     gap_mm: the distance d at which two pieces of the surface begin to repel each other; they never touch.
-    stiffness_MPa, k: how hard. An area at distance s < d from what faces it holds -k d ((s/d)^2 - 1)^2
-    ln((s/d)^2) in N/mm, so that the pressure between them grows without bound as they close (Li et al., ACM
-    Trans. Graph. 39 (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices
-    with facets and of edges with edges counts an area more than once: two flat plates press on each other
-    like a k 2.3 to 3.1 times as large, by how their meshes lie. Forces balance exactly all the same, and the
-    gap left hardly depends on k. Gap and k stay what they are along a path: energy, forces and tangent are
-    those of one potential.
+    stiffness_MPa: k. An area at distance s < d from what faces it holds -k d ((s/d)^2 - 1)^2 ln((s/d)^2) in
+    N/mm, so that the pressure between them grows without bound as they close (Li et al., ACM Trans. Graph. 39
+    (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices with facets and
+    of edges with edges counts an area more than once: two flat plates press on each other like a k 2.3 to 3.1
+    times as large, by how their meshes lie. Forces balance exactly all the same, and the gap left hardly
+    depends on k. Gap and k are constant along a path: energy, forces and tangent are those of one potential.
 
     Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
     image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
     nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall, bar or seat that
-    they stand on: their feet may cut into it where it bends.
-    Faces of the base do not touch, nor do facets nearer than the gap to their own neighbourhood as drawn, as
-    around the axis of a cap. Facets with a common node are not kept apart.
+    they stand on: their feet may cut into it where it bends. Faces of the base do not touch, nor do facets
+    nearer than the gap to their own neighbourhood as drawn, as around the axis of a cap. Facets with a common
+    node are not kept apart.
 
     friction: Coulomb's coefficient, 0 without friction; see `SelfFriction`. A body with it has memory, as
     beside an `Obstacle` with friction: `time_stepping.simulate_in_time` solves it. On a mirror plane a body
@@ -172,7 +171,7 @@ class SelfContact:
         return [nodes[pair[pair >= 0]] for pair in ids]
 
     def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
-        """Facets without those by which a part of the body stands on another as drawn.
+        """Facets without those at the foot of a part that stands on another in the undeformed body.
 
         Struts stand on the wall, on a waveguide's bar and its seats, and these on the wall.
         """
@@ -185,10 +184,10 @@ class SelfContact:
         return facets[~foot[facets].any(axis=1)]
 
     def _without_slivers(self, facets: Array) -> Array:
-        """Facets without those nearer than the gap as drawn to others of their own neighbourhood.
+        """Facets without those nearer than the gap, as drawn, to others of their own neighbourhood.
 
-        So they are where facets narrow to a point, as around a cap's axis. Raises InputError where pieces
-        are near that do not hang together there, a wall's faces or two walls, and where facets are small.
+        So they are where facets narrow to a point, as around a cap's axis. Raises InputError where pieces are
+        near that do not hang together there, a wall's faces or two walls, and where facets are small.
         """
         count = len(facets)
         while close := self._close_as_drawn(facets, self.gap_mm):
@@ -208,7 +207,7 @@ class SelfContact:
         return facets
 
     def _not_neighbours(self, facets: Array, close: list[Array]) -> Array | None:
-        """The first pair whose nodes are far from each other along the surface, as it is drawn, or None."""
+        """First pair whose nodes are far from each other along the undeformed surface, or None."""
         ends = facets[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
         length = np.linalg.norm(self._rest[ends[0]] - self._rest[ends[1]], axis=1)
         graph = sparse.csr_matrix((length, ends), shape=(len(self._rest),) * 2)
@@ -228,7 +227,7 @@ class SelfContact:
 
     @property
     def lost_mJ(self) -> float:
-        """What sliding has cost up to the last committed state, in mJ; of a half mesh its half."""
+        """Energy dissipated by friction up to the last committed state, in mJ; of a half mesh its half."""
         return 0.0 if self._friction is None else self._friction.lost_mJ
 
     def begin(self, u: Array | None = None) -> None:
@@ -240,7 +239,7 @@ class SelfContact:
         return {} if self._friction is None else {"lost_mJ": np.array(self._friction.lost_mJ)}
 
     def restore(self, u: Array, kept: dict[str, Array]) -> None:
-        """Set the memory to what it was when `kept` was stored, u (n, 3) in mm being the state then."""
+        """Set the memory to its value when `kept` stored it, u (n, 3) in mm being the state then."""
         if self._friction is not None:
             self._recall(u, float(kept["lost_mJ"]))
 
@@ -262,25 +261,25 @@ class SelfContact:
         return self._friction.lag_change(found.places, found.near)
 
     def update_lag(self, u: Array) -> None:
-        """Let the normal forces that bound friction follow to displacement u (n, 3) in mm."""
+        """Update the normal forces that bound friction to displacement u (n, 3) in mm."""
         if self._friction is not None:
             found = self._pairs(u)
             self._friction.update_lag(found.places, found.near)
 
     def commit(self, u: Array) -> None:
-        """Make a converged state u (n, 3) in mm part of friction's memory."""
+        """Commit a converged state u (n, 3) in mm to friction's memory."""
         if self._friction is not None:
             found = self._pairs(u)
             self._friction.commit(found.places, found.near)
 
     def without_image(self) -> SelfContact:
-        """The same contact of a half body without that across its mirror planes."""
+        """The same contact of a half body, without contact across its mirror planes."""
         other = copy.copy(self)
         other._planes, other._last, other._kept = [], None, None
         return other
 
     def relocated(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float) -> SelfContact:
-        """The same facets and mirror planes on a mesh of the same elements with its nodes elsewhere.
+        """The same facets and mirror planes on a mesh of the same elements with moved nodes.
 
         gap_mm, stiffness_MPa: as the class has them, for the other body. Without friction.
         """
@@ -342,7 +341,8 @@ class SelfContact:
         return np.asarray(total[self._nodes])
 
     def by_places(self, u: Array, along: Sequence[Array]) -> list[Array]:
-        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the places of the nodes as drawn.
+        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the positions of the undeformed
+        nodes.
 
         u and v: displacements (n, 3) in mm, which stay; gap and stiffness stay, too. Without friction.
         """
@@ -360,7 +360,7 @@ class SelfContact:
         return found
 
     def _by_rest(self, u: Array, along: Array) -> Array:
-        """Derivatives (v, j, 3) of v . forces (v, j, 3) by the surface as drawn, what is moved staying there.
+        """Derivatives (v, j, 3) of v . forces (v, j, 3) by the undeformed surface at a fixed deformed one.
 
         By the pairs' weights, which are areas, and where edges are nearly parallel by the smoothing there,
         which is over a share of the squares of their lengths.
@@ -420,8 +420,8 @@ class SelfContact:
     def room(self, u: Array) -> tuple[Array, Array]:
         """Rows and columns (j,) of 3 n that `stiffness` may fill while the surface moves on a little.
 
-        Those of pairs within some gaps and of the facets around them: what slides past an edge or a corner
-        comes to face the next facet. u: displacements (n, 3) in mm.
+        Those of pairs within some gaps and of the facets around them: a point that slides past an edge or a
+        corner faces the next facet. u: displacements (n, 3) in mm.
         """
         places = self._places(u)
         h = self._hessian(self._wider, self._near(places, _ROOM * self.gap_mm), places)
@@ -443,7 +443,7 @@ class SelfContact:
         return min(least, images if images < self.gap_mm else np.inf)
 
     def touch(self, u: Array) -> Touch:
-        """Where the surface is within the gap of itself at u (n, 3) in mm, and how hard it presses there."""
+        """Regions where the surface is within the gap of itself at u (n, 3) in mm, and the pressure there."""
         area = np.asarray(self._surface.vertex_areas)
         size = np.linalg.norm(self._normal_forces(u), axis=1)
         pressure = np.zeros(len(self._rest))
@@ -453,11 +453,11 @@ class SelfContact:
         return Touch(pressure, force, self.least_gap_mm(u))
 
     def count(self, u: Array) -> int:
-        """How many pairs of vertices, edges and facets are within the gap at u (n, 3) in mm."""
+        """Number of pairs of vertices, edges and facets within the gap at u (n, 3) in mm."""
         return len(self._pairs(u).near)
 
     def intersects(self, u: Array) -> bool:
-        """Whether the surface cuts itself or a mirror plane at u (n, 3) in mm."""
+        """Return True if the surface intersects itself or a mirror plane at u (n, 3) in mm."""
         if any((plane.distance(self._rest + u) <= 0).any() for plane in self._planes):
             return True
         return bool(self._ipctk.has_intersections(self._surface, self._places(u)))
@@ -489,16 +489,16 @@ class SelfContact:
         return np.asfortranarray((self._rest + u)[self._nodes])
 
     def forget_candidates(self) -> None:
-        """Search anew next time, so that what is found does not depend on what was looked for before."""
+        """Force a new search of pairs, so that results do not depend on earlier searches."""
         self._kept, self._last = None, None
 
     @property
     def _margin_mm(self) -> float:
-        """How far a node may move while the pairs found by a search stay all that can come near."""
+        """Distance that a node may move while the last search's pairs still contain all within the gap."""
         return _MARGIN * self.gap_mm
 
     def _moved_mm(self, places: Array) -> float:
-        """How far any node has moved since the search whose candidates are kept; infinite without one."""
+        """Largest move of a node since the last search whose candidates are kept; infinite without one."""
         return (
             np.inf
             if self._kept is None
@@ -506,7 +506,7 @@ class SelfContact:
         )
 
     def _candidates(self, places: Array) -> Any:
-        """ipctk's candidates among which all pairs are that are within the gap at some places (v, 3)."""
+        """ipctk's candidates: a superset of the pairs within the gap at positions (v, 3)."""
         if self._moved_mm(places) > self._margin_mm:
             found = self._ipctk.Candidates()
             # Boxes are inflated on either side.

@@ -10,17 +10,17 @@ Array = np.ndarray[Any, Any]
 
 
 class SelfFriction:
-    """What resists pieces of a surface that slide on each other, as a term of `SelfContact`.
+    """Friction between pieces of a surface that slide on each other, as a term of `SelfContact`.
 
-    coefficient: Coulomb's. slip_mm, e: friction grows with the slip s since the last committed state as
-    2 s/e - (s/e)^2, up to the coefficient times the barrier's force from a slip of e on (Li et al., ACM
-    Trans. Graph. 39 (2020) 49, of displacements in place of velocities). What sticks thus gives by less than
-    e in every step, also where its load does not change. Pairs of facets, their normals and forces are those
-    of an earlier iterate, as of `Obstacle`, so that energy, force and tangent belong together.
+    coefficient: Coulomb's. slip_mm, e: friction grows with the slip s since the last committed state as 2 s/e
+    - (s/e)^2, up to the coefficient times the barrier's force from a slip of e on (Li et al., ACM Trans.
+    Graph. 39 (2020) 49, of displacements in place of velocities). Sticking points thus move by less than e in
+    every step, also where its load does not change. Pairs of facets, their normals and forces are those of an
+    earlier iterate, as of `Obstacle`, so that energy, force and tangent belong together.
 
     ipctk, surface, barrier: the library, its mesh of the surface and its potential of the normal forces. All
-    places are (v, 3) in mm of the surface's v nodes, by columns, pairs ipctk's. lost_mJ: what sliding has
-    cost up to the last committed state.
+    places are (v, 3) in mm of the surface's v nodes, by columns, pairs ipctk's. lost_mJ: energy dissipated up
+    to the last committed state.
     """
 
     def __init__(self, ipctk: Any, surface: Any, barrier: Any, coefficient: float, slip_mm: float) -> None:
@@ -31,20 +31,20 @@ class SelfFriction:
         self.recall(np.asfortranarray(surface.rest_positions), ipctk.NormalCollisions())
 
     def recall(self, places: Array, pairs: Any, lost_mJ: float = 0.0) -> None:
-        """Make a state the last committed one, with what sliding has cost up to it, and the lag's."""
+        """Set the last committed state, the energy dissipated up to it, and the lag's state."""
         self._before, self._remembered, self.lost_mJ = places, self._lagged(places, pairs), lost_mJ
         self.lag_from_memory()
 
     def lag_from_memory(self) -> None:
-        """Take the pairs that slide, and what presses them, from the last committed state."""
+        """Take the sliding pairs and their normal forces from the last committed state."""
         self._lag = self._remembered
 
     def update_lag(self, places: Array, pairs: Any) -> None:
-        """Let the pairs that slide, and what presses them, follow to other places."""
+        """Update the sliding pairs and their normal forces to other positions."""
         self._lag = self._lagged(places, pairs)
 
     def lag_change(self, places: Array, pairs: Any) -> float:
-        """Change of friction's forces if the lag followed to some places, over the sum of their bounds."""
+        """Change of friction's forces if the lag followed to some positions, over the sum of their bounds."""
         old, new = (self._gradient(lag, places) for lag in (self._lag, self._lagged(places, pairs)))
         change = float(np.linalg.norm(new - old, axis=1).sum())
         if not len(pairs):
@@ -58,7 +58,7 @@ class SelfFriction:
         self.recall(places, pairs, self.lost_mJ + lost)
 
     def energy_mJ(self, places: Array) -> float:
-        """What sliding costs in this step, in mJ, as the potential has it."""
+        """Energy dissipated by sliding in this step, in mJ, as in the potential."""
         if not len(self._lag):
             return 0.0
         return float(self._potential(self._lag, self._surface, self._slip(places)))
@@ -73,7 +73,7 @@ class SelfFriction:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether any pair was within the gap where the lag is from."""
+        """Return True if any pair was within the gap in the lag's state."""
         return len(self._lag) > 0
 
     def _slip(self, places: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Where walls of a deformed body have passed through each other, as they may without self-contact."""
+"""Self-intersections of a deformed body's walls, which occur without self-contact."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ def facets_of(faces: Array) -> Array:
 class Crossing:
     """Two pieces of a body's surface that intersect.
 
-    place (3,) in mm: where, deformed. walls (2, 3) in mm: the middle of either piece in the undeformed
-    body. inner: whether each belongs to the cavity. facets: how many pairs of facets intersect.
+    place (3,) in mm: their position, deformed. walls (2, 3) in mm: the middle of either piece in the
+    undeformed body. inner: for each, True if it belongs to the cavity. facets: number of intersecting pairs
+    of facets.
     """
 
     place: Array
@@ -50,7 +51,7 @@ def _text(place: Array) -> str:
 
 @attrs.frozen(eq=False)
 class FirstSelfIntersection:
-    """The pressure in MPa at which walls first meet, between two states of a path, and where they do.
+    """Pressure in MPa at which walls first meet, between two states of a path, and the crossings there.
 
     before_MPa, after_MPa: of the two states. Between them the body is taken to move along a straight line;
     `crossings` are those found at `pressure_MPa`, where the first of them begins.
@@ -87,10 +88,9 @@ def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfInt
 
 
 def crossings(mesh: Mesh, u: Array) -> tuple[Crossing, ...]:
-    """Where the surface of a mesh cuts itself when displaced by u (n, 3) in mm, cavity and outside together.
+    """Self-intersections of a mesh's surface displaced by u (n, 3) in mm, cavity and outside together.
 
-    Mirror images of half meshes count. The cut of most facets comes first. Facets that share a
-    node are not tested against each other.
+    Mirror images of half meshes count. The crossing of most facets comes first.
     """
     return _Boundary(mesh).crossings(u)
 
@@ -191,7 +191,7 @@ def with_middles(faces: Array, tets: Array) -> Array:
 
 
 def _cut(a: Array, b: Array) -> Array:
-    """Which triangles of two lists (p, 3, 3) cut each other: an edge of one goes through the other."""
+    """Mask (p,) of triangles of two lists (p, 3, 3) that intersect: an edge of one crosses the other."""
     cut = np.zeros(len(a), bool)
     for one, other in ((a, b), (b, a)):
         for k in range(3):
@@ -200,7 +200,8 @@ def _cut(a: Array, b: Array) -> Array:
 
 
 def _pierced(start: Array, end: Array, triangle: Array) -> Array:
-    """Which segments (p, 3) to (p, 3) go through their triangle (p, 3, 3); those in its plane do not.
+    """Mask (p,) of segments (p, 3) to (p, 3) that go through their triangle (p, 3, 3); those in its plane do
+    not.
 
     Source: Moeller and Trumbore, J. Graphics Tools 2 (1997) 21.
     """

@@ -1,8 +1,8 @@
-"""How the work of a body's residual along given displacements changes with all that the body is made of.
+"""Sensitivity of the residual's work along given displacements to mesh, ties and materials.
 
 With u and v fixed, g = v . r(u) is a sum over quadrature points, of F = 1 + grad u and H = grad v:
 
-    g = sum dV f [P : H + p cof F : H],    p = kappa (mean J - 1) the part of the pressure by the mean,
+g = sum dV f [P : H + p cof F : H],    p = kappa (mean J - 1) the part of the pressure by the mean,
 
 so that its derivatives by every node's place, every point's filled share and every tie's weight come from one
 pass over the elements, however many freedoms move them. Source: the shape derivative in material form, e.g.
@@ -41,7 +41,7 @@ class Sensitivity:
     stiffness: Array
 
     def between(self, first: Mesh, second: Mesh) -> float:
-        """How much more the number is of the first of two meshes of the same elements, to first order."""
+        """Difference of the number between two meshes of the same elements, to first order."""
         found = float(np.vdot(self.nodes, first.nodes - second.nodes))
         if first.resolved:
             found += float(np.vdot(self.filled, first.filled - second.filled))
@@ -55,7 +55,7 @@ def of_residual(
     """Sensitivities of v . r(u), in mJ, r the elements' and the pressure's forces, for each v of `along`.
 
     u and each v: displacements (n, 3) in mm that tied nodes follow; pressure in MPa. Forces of contact and
-    dead loads are left out: they are known by themselves.
+    dead loads are left out: their derivatives are computed elsewhere.
     """
     mesh = model.mesh
     G, dV = model.reference.at.gradients, model.reference.filled_volumes

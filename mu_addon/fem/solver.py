@@ -1,4 +1,4 @@
-"""Which linear solver and which device a body gets: as asked for, or by size and memory."""
+"""Choice of linear solver and device for a body: as asked for, or by size and memory."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ FACTORISATION, TWO_LEVELS, GRADIENTS = "factorisation", "two levels", "conjugate
 
 @attrs.frozen
 class SolverChoice:
-    """What solves linear systems, and Warp's name of a device; answers move by its tolerance only.
+    """Name of the linear solver, and Warp's name of a device; results differ only by the solver's tolerance.
 
     auto: the CPU's factorisation, whose digits do not change with the machine; two levels of conjugate
     gradients where a factor of quadratic elements does not fit into free memory and `needs_factor` is not
-    set; a CUDA device where Warp sees one and the body has CUDA_PAYS unknowns.
-    Raises InputError for a name that is not known.
+    set; a CUDA device where Warp sees one and the body has CUDA_PAYS unknowns. Raises InputError for a name
+    that is not known.
     """
 
     method: str = "auto"
@@ -83,7 +83,7 @@ def factor_bytes(unknowns: int) -> float:
 
 
 def free_memory_bytes() -> float | None:
-    """Memory in bytes that a process may still take, or None where the system does not say."""
+    """Memory in bytes still available to a process, or None where the system does not report it."""
     try:
         with open("/proc/meminfo", encoding="ascii") as stream:
             found = re.search(r"^MemAvailable:\s+(\d+) kB", stream.read(), re.MULTILINE)
@@ -97,7 +97,7 @@ def free_memory_bytes() -> float | None:
 
 
 def _without_cuda() -> str:
-    """What to do where Warp sees no CUDA device."""
+    """Remedy where Warp sees no CUDA device."""
     import warp as wp
 
     if wp.get_cuda_toolkit_version() is None:

@@ -19,7 +19,7 @@ class State:
     """A converged equilibrium: pressure in MPa, displacement u (n, 3) in mm, relative residual, and its cost.
 
     residual: over the root sum of squares of all element forces; iterations, factorisations: those it took.
-    snapped_mm: how far a node moved at a limit point before the state, 0 where the path is smooth.
+    snapped_mm: largest move of a node at a limit point before the state, 0 where the path is smooth.
 
     >>> import numpy as np
     >>> State(0.02, np.zeros((4, 3))).pressure_kPa
@@ -40,7 +40,7 @@ class State:
 
     @property
     def loaded(self) -> bool:
-        """Whether pressure or weight acts on the body: the pressure or a displacement is not 0."""
+        """True if pressure or weight acts on the body: the pressure or a displacement is not 0."""
         return bool(self.pressure_MPa) or bool(self.u.any())
 
 
@@ -63,8 +63,8 @@ def extrapolate(points: Sequence[State], pressure: float) -> Array:
 
 
 def rest(mesh: Mesh) -> State:
-    """The undeformed, unloaded state of a mesh: zero displacement at zero pressure.
+    """Undeformed, unloaded state of a mesh: zero displacement at zero pressure.
 
-    A body with weight has none such; its state without pressure is `Equilibrium.at_zero_pressure`.
+    A body with weight has no such state; use `Equilibrium.at_zero_pressure`.
     """
     return State(0.0, np.zeros_like(mesh.nodes))

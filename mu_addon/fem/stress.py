@@ -29,8 +29,8 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
     """Cauchy stress (m, q, 3, 3) in MPa and deformation gradients (m, q, 3, 3) at the quadrature points.
 
     u: displacements (n, 3) in mm. sigma = P F^T / det F, the laws of an element added by their weights.
-    history: what each law with one remembers of this state, as `MaterialData.kept` gives it. Raises
-    InputError where it is missing: such a law's stress is not that of the state alone.
+    history: of each law with one, from `MaterialData.kept`. Raises InputError where it is missing, since such
+    a law's stress depends on it.
     """
     everywhere = np.arange(len(mesh.tets))
     F, _ = deformation_gradients(mesh, u, everywhere)
@@ -56,10 +56,10 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
 
 
 def narrowed(mesh: Mesh, F: Array, elements: Array, poisson: Array) -> Array:
-    """F (e, q, 3, 3) of elements (e,) with the lateral strain that sections of beams have and do not show.
+    """F (e, q, 3, 3) of elements (e,) with the lateral strain that beams' sections leave out.
 
-    Sections of beams stay as wide as drawn; a strut that is stretched by l along its axis is narrower by
-    l^-nu. poisson (e,): nu.
+    Sections of beams keep their drawn width; a strut stretched by l along its axis narrows by l^-nu. poisson
+    (e,): nu.
     """
     rows = np.flatnonzero(~mesh.solid[elements])
     if not len(rows):
@@ -126,10 +126,10 @@ def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
 
 
 class NodalMean:
-    """Values at the quadrature points of some elements (e,) of a mesh, carried to the nodes.
+    """Values at the quadrature points of some elements (e,) of a mesh, averaged at the nodes.
 
-    They go on linearly from the points to an element's nodes (its mean where it has one point) and are
-    averaged over the elements around a node, by volume; of a resolved mesh by what of it is filled.
+    They are extrapolated linearly from the points to an element's nodes (its mean where it has one point) and
+    averaged over the elements around a node by volume; in a resolved mesh by filled volume.
     """
 
     def __init__(self, mesh: Mesh, elements: Array) -> None:
@@ -155,7 +155,7 @@ class NodalMean:
     def __call__(self, values: Array) -> Array:
         """Means (k, ...) at `nodes` (k,) of values (m, q, ...) at all elements' points.
 
-        Of tensors take the mean first and invariants then: those of the mean are possible ones.
+        Average tensors first and take invariants after: those of a mean tensor are physically possible.
         """
         mine = values[self._elements]
         flat = mine.reshape(*mine.shape[:2], -1)

@@ -1,4 +1,4 @@
-"""Tied nodes in the tangent: blocks of a mesh's pairs of nodes as blocks between those that are not tied."""
+"""Tied nodes in the tangent: its blocks mapped to blocks between nodes that are not tied."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ Array = np.ndarray[Any, Any]
 
 
 def folded_blocks(mesh: Mesh, keys: Array) -> tuple[Callable[[Array], Array], Array]:
-    """How the tangent's blocks (b, 3, 3) fold onto the nodes that tied ones follow, and where to.
+    """Map of the tangent's blocks (b, 3, 3) onto the nodes that tied ones follow, and the folded blocks'
+    keys.
 
     keys (b,): of the lower triangle's blocks, column n + row of n nodes, row >= column. Returns the map from
     those blocks to the folded ones, and the keys (c,) of these, ascending. A node tied to others by weights w

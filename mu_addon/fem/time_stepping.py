@@ -1,4 +1,4 @@
-"""Motion of a body that remembers: instants visited in order, each step made part of its history."""
+"""Time stepping of a body with history: instants in order, each converged step committed to it."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ SNAPS_BELOW = 1 / 16
 
 @attrs.frozen(eq=False)
 class Instant:
-    """A converged state, when it holds in s, and the rate (n, 3) in mm/s at which it was reached, if any.
+    """A converged state, its time in s, and the rate (n, 3) in mm/s at which it was reached, if any.
 
-    contacts: what each of `Model.remembering` does, see `Obstacle.kept`; history: what each law
-    with one does, see `MaterialData.kept`. Both are filled in to be stored.
+    contacts: memory of each of `Model.remembering`, see `Obstacle.kept`; history: of each law with one, see
+    `MaterialData.kept`. Both are filled in for storage.
     """
 
     time_s: float
@@ -95,7 +95,7 @@ def simulate_in_time(
 
 
 def _start(eq: Equilibrium, time: float) -> Instant:
-    """The body before any pressure; what touches an obstacle there is remembered."""
+    """Body before any pressure, its contacts with obstacles committed."""
     if eq.model.load is None:
         return Instant(time, rest(eq.model.mesh))
     state = eq.at_zero_pressure()
@@ -104,7 +104,7 @@ def _start(eq: Equilibrium, time: float) -> Instant:
 
 
 def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max_step_s: float) -> Instant:
-    """Step to an instant, in equal shares of the interval where one step is too much."""
+    """Step to an instant, in equal parts of the interval where one step is too large."""
     span, rise = time - start.time_s, pressure - start.state.pressure_MPa
     start = attrs.evolve(start, state=attrs.evolve(start.state, snapped_mm=0.0))
     if span == 0 and rise == 0:
@@ -136,7 +136,7 @@ def _interval(eq: Equilibrium, start: Instant, time: float, pressure: float, max
 
 
 def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Instant:
-    """One step, committed to what materials and contacts remember when it has converged."""
+    """Take one step, and commit it to the history of materials and contacts when it has converged."""
     m, u = eq.parameters, last.state.u
     m.dt_s = time - last.time_s
     eq.model.move_obstacles(time)
@@ -158,7 +158,7 @@ def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Insta
 
 
 def _step_or_snap(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Instant:
-    """As `_step`; where it finds no state nearby, the one that the body falls to."""
+    """Take a `_step`; if it finds no state nearby, the one that the body snaps to."""
     try:
         return _step(eq, last, time, pressure)
     except ConvergenceError:
@@ -169,12 +169,12 @@ def _step_or_snap(eq: Equilibrium, last: Instant, time: float, pressure: float) 
 
 
 def _reach(eq: Equilibrium, u: Array, guess: Array) -> float:
-    """How far in mm from a prediction a state may lie: an obstacle pushes as far as it overlaps, besides."""
+    """Largest allowed distance in mm of a state from its prediction, the overlap with obstacles included."""
     return LEAP * (float(np.abs(guess - u).max()) + eq.model.deepest_mm(guess))
 
 
 def _along_tangent(eq: Equilibrium, u: Array, pressure: float) -> Array:
-    """One Newton step from the last state, whose tangent must be definite."""
+    """Predict by one Newton step from the last state, whose tangent must be definite."""
     model = eq.model
     values = model.tangent(u, pressure, eq.parameters)
     try:

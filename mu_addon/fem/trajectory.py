@@ -1,4 +1,4 @@
-"""A pressure protocol's quasi-static motion: one equilibrium a pressure, read at every instant."""
+"""Quasi-static motion along a pressure protocol: one equilibrium per pressure, read at every instant."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Trajectory:
 
     @property
     def tip_mm(self) -> Array:
-        """Where the middle of the tip's end plane is at each instant, (k, 3) in mm."""
+        """Middle of the tip's end plane at each instant, (k, 3) in mm."""
         return self._read(TipSection.of(self.mesh).middle_mm)
 
     @property
@@ -64,9 +64,9 @@ class Trajectory:
 def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
     """Distinct pressures (d,) in kPa ascending, and the order in which to visit them: outward from 0.
 
-    The second result has one array for each side of 0 that occurs, negative first. pressure_kPa: (k,).
-    An elastic body under pressure alone has no memory: as long as its path is stable, the state depends on
-    the pressure only, so that a pressure met twice is solved once.
+    The second result has one array for each side of 0 that occurs, negative first. pressure_kPa: (k,). An
+    elastic body under pressure alone has no memory: as long as its path is stable, the state depends on the
+    pressure only, so that a pressure met twice is solved once.
 
     >>> import numpy as np
     >>> distinct, sides = branches(np.array([0.0, 20.0, -10.0, 10.0, 20.0]))

@@ -54,11 +54,11 @@ def column_blocks(lower: Lower, last: int) -> Array:
 class Triangular:
     """Solves with one factor for many right-hand sides at once, to single precision.
 
-    That halves what is read, and is plenty for steps that are corrected by exact residuals: on the unit it
-    changes a step by 1e-5 of its energy norm.
+    That halves the memory traffic, and suffices for steps that are corrected by exact residuals: on the unit
+    it changes a step by 1e-5 of its energy norm.
 
-    The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix
-    (t, t) that remains for them when all others are eliminated.
+    The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix (t, t)
+    that remains for them when all others are eliminated.
     """
 
     def __init__(self, lower: Lower, trailing: int = 0, threads: int = 2) -> None:

@@ -1,4 +1,4 @@
-"""What a unit's mesh is made of."""
+"""Materials and self-contact of a unit's mesh."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
 
 
 def _of_resin(unit: Unit, mesh: Mesh) -> Materials:
-    """The wall's law in wall and struts alike, stiffer by as much of the skin as each has."""
+    """The wall's law in wall and struts alike, stiffened by each element's share of the skin."""
     m = unit.material
     count = len(mesh.tets)
     stiffer = _skin_stiffening(unit, mesh)
@@ -118,7 +118,7 @@ def _depths(d: Dimensions, points: Array, corner: Array) -> Array:
 
 
 def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | None) -> tuple[Layer, ...]:
-    """The lattice's layers in some elements (k,): a law's or of the unit's modulus, graded as the unit is."""
+    """Layers of the lattice in some elements (k,): a law's, or of the unit's modulus, graded as the unit."""
     m = unit.material
     if law is not None:
         layers = law.fill(elements)
@@ -133,14 +133,14 @@ def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | N
 
 
 def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:
-    """What keeps walls and struts of a resolved mesh apart, with friction between them. Raises InputError."""
+    """Self-contact of a resolved mesh's walls and struts, with friction between them. Raises InputError."""
     from .self_contact import SelfContact
 
     return SelfContact(mesh, *_barrier_of(unit), friction)
 
 
 def relocated_contact(contact: SelfContact, unit: Unit, mesh: Mesh) -> SelfContact:
-    """The contact of a unit whose mesh is that of another with its nodes moved; see `self_contact_of`."""
+    """Contact of a unit whose mesh is that of another with moved nodes; see `self_contact_of`."""
     return contact.relocated(mesh, *_barrier_of(unit))
 
 

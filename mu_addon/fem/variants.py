@@ -1,4 +1,4 @@
-"""One tangent that many variants share but for a change of each: solved for all of them at once."""
+"""Variants of one tangent that differ by a change each, solved for all at once."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Array = np.ndarray[Any, Any]
 
 
 class SharedTangent(Protocol):
-    """What solves for variants: the tangent they share, each one's change, then all of them at once."""
+    """Solver of variants: takes the shared tangent and each variant's change, then solves for all at once."""
 
     def factor(self, values: Array) -> None:
-        """Take the shared tangent's values (nnz,) in N/mm; raises IndefiniteError."""
+        """Factorise the shared tangent's values (nnz,) in N/mm; raises IndefiniteError."""
 
     def take(self, change: Change) -> Any:
         """Prepare a variant's change for `solve`. Raises IndefiniteError."""
@@ -33,8 +33,8 @@ class SharedTangent(Protocol):
 class DirectVariants:
     """Solves by one Cholesky factor.
 
-    The unknowns that any variant changes, `changed`, are eliminated last. What the others leave for them
-    (the Schur complement) is then common to all variants, and each adds its own change to it.
+    The unknowns that any variant changes, `changed`, are eliminated last. The Schur complement that remains
+    for them is common to all variants, and each adds its own change to it.
     """
 
     def __init__(self, pattern: Pattern, changed: Array, threads: int) -> None:
@@ -48,7 +48,7 @@ class DirectVariants:
         self._place[changed] = np.arange(len(changed))
 
     def factor(self, values: Array) -> None:
-        """Take the shared tangent's values (nnz,). Raises IndefiniteError."""
+        """Factorise the shared tangent's values (nnz,). Raises IndefiniteError."""
         spread = np.zeros(self._nonzeros)
         spread[self._kept] = values
         self._factor.factor(spread)
@@ -85,7 +85,7 @@ class IterativeVariants:
         self._stacked: tuple[list[Change], Changes] | None = None
 
     def factor(self, values: Array) -> None:
-        """Take the shared tangent's values (nnz,). Raises IndefiniteError."""
+        """Factorise the shared tangent's values (nnz,). Raises IndefiniteError."""
         self._gradients.factor(values)
         self._stacked = None
 
@@ -120,10 +120,10 @@ def make_variants(model: Model, changed: Array) -> SharedTangent:
 
 
 def _keeping_last(pattern: Pattern, last: Array) -> tuple[Pattern, Array]:
-    """A pattern whose order ends with some unknowns, and where its entries went in it.
+    """A pattern whose order ends with some unknowns, and the positions of its entries in it.
 
-    A factorisation is free to renumber as long as it makes the same fill, and so may take some of the
-    last unknowns earlier. Entries between the unknown before them and all of them forbid it.
+    A factorisation is free to renumber as long as it makes the same fill, and so may take some of the last
+    unknowns earlier. Entries between the unknown before them and all of them forbid it.
     """
     is_last = np.zeros(len(pattern.order), dtype=bool)
     is_last[last] = True

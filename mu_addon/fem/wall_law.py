@@ -1,4 +1,4 @@
-"""Layers of laws that fill a membrane's wall, as the unit's [wall] asks for them."""
+"""Layers of laws in a membrane's wall, as the unit's [wall] asks for them."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ LAYER_NORMAL = (0.0, 0.0, 1.0)
 def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float) -> tuple[Layer, ...]:
     """Layers of laws in a wall's elements (k,), of its Young's modulus in MPa and Poisson's ratio.
 
-    Both are of small strain: of a wall that relaxes after long, of one that softens before any stretch; a
-    branch that slides comes on top of them. Laws: the one that the wall names, `Layered` where stiffness
-    along and across the print's layers differ, `Friction` where it slides.
+    Both are of small strain: long-term for a wall that relaxes, unstretched for one that softens; a sliding
+    branch is added to them. Laws: the one that the wall names, `Layered` where stiffness along and across the
+    print's layers differ, `Friction` where it slides.
     """
     (mu, kappa) = NeoHooke.parameters(modulus_MPa, poisson)[0]
     added, share = layer_stiffness(1 + wall.layers_excess, mu, kappa) if wall.layers_excess else (0.0, 1.0)
@@ -64,11 +64,11 @@ def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
 
 
 def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
-    """What `Layered` adds along the layers in MPa, and the share of all, that make a wall's layers differ.
+    """Stiffness in MPa that `Layered` adds along the layers, and its share of all.
 
-    ratio: Young's modulus along the layers over that across, which stays what it was; shear_MPa, bulk_MPa: of
-    the isotropic law beside it. Below 0: as much across them, with as much less of the isotropic law's shear,
-    which is the same at small strain.
+    ratio: Young's modulus along the layers over that across, which is kept; shear_MPa, bulk_MPa: of the
+    isotropic law beside it. For a ratio below 1 as much is added across them and taken from the isotropic
+    law's shear, which is the same at small strain.
     """
     from scipy.optimize import brentq
 

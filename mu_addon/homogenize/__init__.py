@@ -1,4 +1,4 @@
-"""Homogenisation: what a lattice of struts is as a continuum.
+"""Homogenisation of a lattice of struts to a continuum.
 
 `mesh_cell` meshes an eighth of a printed cell, `effective_tensor` gives its elasticity at small strain,
 `stretch_lattice` its response at finite strain, `compress` a finite block between plates, and `fit_foam` a

@@ -46,10 +46,10 @@ class Compressed:
 
 @attrs.frozen(eq=False)
 class Compression:
-    """A specimen's states in ascending strain, the first of them at rest, and how far they can be believed.
+    """States of a specimen in ascending strain, the first at rest, and the limits of their validity.
 
-    touch: where struts first meet, which nothing resists here. loss: where the block first buckles out of
-    its symmetry, which is not followed. ended: why the path ends before the last strain asked for, or "".
+    touch: first contact of struts, which the model leaves out. loss: first buckling out of the block's
+    symmetry, which is not followed. ended: why the path ends before the last strain asked for, or "".
     """
 
     specimen: Specimen
@@ -76,7 +76,7 @@ class Compression:
 
     @property
     def valid_to_strain(self) -> float:
-        """Nominal strain, compression positive, up to which neither contact nor buckling is missing."""
+        """Nominal strain, compression positive, up to which contact and buckling play no part."""
         ends = [self.states[-1].strain]
         ends += [self.touch.strain] if self.touch else []
         ends += [self.loss.before] if self.loss else []
@@ -116,12 +116,12 @@ def compress(
 ) -> Compression:
     """Equilibria at nominal strains in ascending order, compression positive, of a specimen between plates.
 
-    friction: the plates let faces slide ("slide") or hold them ("stick"), the bounds of what real ones do;
-    neither lets go of them. `load` gives a state of an earlier run at a strain, if it kept one with
-    `store`; a resumed run finds the same states to the last digit. Equilibria keep the mirror planes of the
-    block; `stability` asks where others branch off, for about as many factorisations again. Where the path
-    cannot be followed it ends, and says why. Raises InputError for strains not ascending between 0 and 1 or
-    an unknown friction, and ConvergenceError where there is no first state.
+    friction: faces slide on the plates ("slide") or stick to them ("stick"), the bounds of real plates;
+    neither lifts off. `load` gives a state of an earlier run at a strain, if it kept one with `store`; a
+    resumed run finds the same states to the last digit. Equilibria keep the mirror planes of the block;
+    `stability` asks where others branch off, for about as many factorisations again. A path that cannot be
+    followed further ends, with the reason. Raises InputError for strains not ascending between 0 and 1 or an
+    unknown friction, and ConvergenceError where there is no first state.
     """
     strains = [float(s) for s in strains]
     if not strains or not (np.diff([0.0, *strains, 1.0]) > 0).all():
@@ -226,7 +226,7 @@ class Plates:
         return u
 
     def _along_tangent(self, last: Compressed, strain: float) -> Array:
-        """Free nodes follow the plate as the tangent has it, which must be definite."""
+        """Predict along the tangent, which must be definite: free nodes follow the plate."""
         eq, model = self.equilibrium, self.equilibrium.model
         try:
             eq.factor.factor(model.tangent(last.u, 0.0, eq.parameters))

@@ -1,4 +1,4 @@
-"""effective.toml: what homogenizing a lattice found, and the law that an analysis mesh takes from it."""
+"""effective.toml: results of homogenizing a lattice, and its law for an analysis mesh."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ _DERIVED = "derived"
 
 @attrs.frozen
 class Effective:
-    """A homogenized lattice: where it comes from, its moduli at small strain, and its law.
+    """A homogenized lattice: its origin, its moduli at small strain, and its law.
 
-    cell: kind and geometry, with the print's offset; resin; provenance: software, version and hash of what
-    went in, all three tables of text and numbers. relative_density: solid share of the volume; C11, C12, C44
+    cell: kind and geometry, with the print's offset; resin; provenance: software, version and hash of the
+    inputs, all three tables of text and numbers. relative_density: solid share of the volume; C11, C12, C44
     in kPa, of cubic symmetry. parameters (6,) as Foam names them, shear_MPa of CubicShear and diagonal_MPa of
     DiagonalStretch act in parallel; stretch is the range they were fitted in. Raises InputError for moduli
     that are not positive definite, and a law that is not admissible or not stable.
@@ -163,8 +163,7 @@ def effective(
     """A homogenized lattice of its fit and its C11, C12 and C44 in MPa.
 
     relative_density: share of the volume that is solid. cell, resin: text and numbers that describe them;
-    inputs: text of all that decided the result, of which the provenance keeps the hash. Raises InputError as
-    `Effective`.
+    inputs: text of all inputs, whose hash the provenance keeps. Raises InputError as `Effective`.
     """
     provenance = {
         "software": "mu_addon",

@@ -113,7 +113,7 @@ class Elasticity:
         return self.C12 / (self.C11 + self.C12)
 
     def young_modulus(self, directions: ArrayLike) -> Array:
-        """Young's modulus (k,) in MPa along directions (k, 3) of any length, of the tensor C as it is."""
+        """Young's modulus (k,) in MPa along directions (k, 3) of any length, of the full tensor C."""
         return young_modulus(self.C, directions)
 
 
@@ -139,8 +139,8 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
     """Effective elasticity, at small strain, of the periodic body of which a mesh is one eighth, [0, box] mm.
 
     The mesh's mirror images in its six sides must make up the body (`octant.Octant`). box (3,) in mm: by
-    default the mesh's own. Energies are those of exact small-strain solutions on the mesh, so never below
-    the true ones of the meshed shape. Raises MeshingError where a piece hangs loose, or where the result is
+    default the mesh's own. Energies are those of exact small-strain solutions on the mesh, so never below the
+    true ones of the meshed shape. Raises MeshingError where a piece is loose, or where the result is
     indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
     """
     octant = Octant(mesh, materials, box)

@@ -44,7 +44,7 @@ _STRUTS = (CubicShear, DiagonalStretch)
 
 @attrs.frozen
 class Misfit:
-    """Root mean squares of what is left of a fit, as parts of the largest value on that side.
+    """Root mean squares of a fit's residuals, as parts of the largest value on that side.
 
     tension, compression: of the nominal stress; lateral: of the lateral strain.
     """
@@ -56,7 +56,7 @@ class Misfit:
 
 @attrs.frozen(eq=False)
 class FoamFit:
-    """A foam, a cubic shear and a diagonal stretch that act in parallel, and how well they stand for a cell.
+    """A foam, a cubic shear and a diagonal stretch in parallel, and how well they fit a cell.
 
     parameters (6,): as Foam names them; shear_MPa and diagonal_MPa: G and C of the others. stretch: the range
     of the curve; one_modulus: whether tension and compression share theirs, so that the tangent is continuous
@@ -117,9 +117,8 @@ def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> Fo
     C11_MPa, C12_MPa, C44_MPa: of the cell at small strain. Least squares of stress, each side of 1 by its own
     largest, and of lateral strain, from several starts. What couples the axes is either the cell's C12 as
     diagonal stretch, the foam itself having none, or the foam's own volumetric part, fitted too: the one that
-    leaves less. The cubic shear makes up for what the foam lacks of C44; where it has more, it stays and C44
-    is missed. Raises InputError for a curve that leaves a side of 1 undetermined, and where the law found is
-    not stable.
+    leaves less. The cubic shear supplies what the foam lacks of C44; where the foam has more, C44 is not met.
+    Raises InputError for a curve that leaves a side of 1 undetermined, and where the law found is not stable.
     """
     _sides(curve)
     fits = {
@@ -200,7 +199,7 @@ def _residuals(curve: Curve, parameters: Array, diagonal_MPa: float) -> tuple[Ar
 
 @attrs.frozen(eq=False)
 class _Form:
-    """One form of the law to fit: with diagonal stretch or without, tension and compression tied or apart."""
+    """One form of the law to fit: with diagonal stretch or without, both sides of 1 tied or separate."""
 
     curve: Curve
     C11_MPa: float
@@ -246,9 +245,9 @@ class _Form:
 def require_stable(law: LatticeLaw) -> None:
     """Raise InputError where a law of foam, cubic shear and diagonal stretch is not stable within its range.
 
-    Along an axis with free sides the force must grow with the stretch, and the law be strongly elliptic; so
-    it must be a little beside rest in any direction. It need not be under larger shear or compression from
-    all sides, where slender struts buckle: `stable_shear` and `stable_pressed` say how far it is.
+    Along an axis with free sides the force must grow with the stretch, and the law be strongly elliptic; it
+    must also be so near rest in any direction. It need not be under larger shear or compression from all
+    sides, where slender struts buckle: `stable_shear` and `stable_pressed` say how far it is.
     """
     low, high = law.stretch
     along = np.linspace(low, high, 81)
@@ -279,8 +278,7 @@ def require_stable(law: LatticeLaw) -> None:
 def stable_shear(law: LatticeLaw) -> float:
     """The simple shear between two axes, up to 0.6, up to which a lattice's law stays strongly elliptic.
 
-    In steps of 0.005. Shear puts the struts of one diagonal under compression, and what holds them there is
-    the foam alone.
+    In steps of 0.005. Shear puts the struts of one diagonal under compression, where only the foam resists.
     """
     amounts = np.linspace(0, _FARTHEST, _STEPS)
     F = np.tile(np.eye(3), (len(amounts), 1, 1))

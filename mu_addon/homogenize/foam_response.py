@@ -1,4 +1,4 @@
-"""A lattice's law at a point: a foam's uniaxial response, and whether the whole is stable in a state."""
+"""A lattice's law at a point: a foam's uniaxial response, and the stability of the whole law in a state."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def _growth(stretch: Array, exponent: Array) -> Array:
 
 
 def _own(stretch: Array, p: Array) -> Array:
-    """Kirchhoff stress of the principal stretches themselves."""
+    """Kirchhoff stress of the principal stretches, without the volumetric part."""
     tension = stretch >= 1
     return 2 * np.where(tension, p[0], p[2]) * _growth(stretch, np.where(tension, p[1], p[3]))
 
 
 def _own_slope(stretch: Array, p: Array) -> Array:
-    """Its derivative by the stretch's logarithm."""
+    """Derivative of `_own` by the stretch's logarithm."""
     tension = stretch >= 1
     return 2 * np.where(tension, p[0], p[2]) * stretch ** np.where(tension, p[1], p[3])
 

@@ -1,4 +1,4 @@
-"""An eighth of a periodic cell with three mirror planes: what its six sides prescribe, and its tangent.
+"""An eighth of a periodic cell with three mirror planes: conditions on its six sides, and its tangent.
 
 Under normal strains the lattice is its own mirror image, so the sides stay plane and free of shear. Under a
 shear of x against y it is turned into its negative by the mirrors across x and y and kept by that across z:
@@ -32,7 +32,7 @@ SHEARS = ((1, 2), (0, 2), (0, 1))
 class Part:
     """Some of a model's unknowns: their numbers (f,), and the factor of the tangent between them.
 
-    entries: where their values lie among the tangent's (nnz,).
+    entries: positions of their values among the tangent's (nnz,).
     """
 
     free: Array
@@ -118,7 +118,7 @@ class Octant:
 
     @cached_property
     def across(self) -> Array:
-        """(n, 3) bool: whether a node lies on a side across x, y, z."""
+        """Mask (n, 3) of nodes on a side across x, y, z."""
         return np.asarray(self.sides.any(axis=0))
 
     @cached_property
@@ -144,7 +144,8 @@ class Octant:
         return values, self.model.matrix(values)
 
     def buckling(self, u: Array) -> str:
-        """A way the body may leave the equilibrium u (n, 3) in mm, in words, or "" if it is stable.
+        """A way in which the body may buckle from the equilibrium u (n, 3) in mm, in words; "" if it is
+        stable.
 
         Covers motions that repeat after one or two cells along each axis, and homogeneous shears. Such
         motions are sums of those that each mirror keeps or negates, each side by itself. Does not cover
@@ -204,7 +205,7 @@ def _wave(odd: Array) -> str:
 def require_factor(part: Part, values: Array) -> None:
     """Factorise a part of the tangent's values (nnz,) at rest.
 
-    Raises MeshingError where it is not positive definite, as where a piece of the mesh hangs loose.
+    Raises MeshingError where it is not positive definite, for instance where a piece of the mesh is loose.
     """
     try:
         part.factorise(values)

@@ -43,7 +43,7 @@ _HALVINGS = 3
 class Loss:
     """Two nominal strains, compression positive, between which an equilibrium becomes unstable.
 
-    signs: for the mirrors across x, y and z, whether the buckled shape breaks it.
+    signs: for the mirrors across x, y and z, -1 if the buckled shape breaks it.
     """
 
     before: float
@@ -75,7 +75,7 @@ class SymmetryBreakingModes:
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:
-        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm, or None where all are."""
+        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm; None if there is none."""
         values = self.model.tangent(u, 0.0, self.parameters)
         for signs in self._order:
             try:
@@ -105,8 +105,8 @@ def first_loss(
 ) -> Loss | None:
     """Strain at which displacements (n, 3) in mm at ascending strains, the first at rest, lose stability.
 
-    None where it is not. Found by halving, first among the states and then between two, where equilibria are
-    taken from the polynomial through their neighbours: what is lost is taken to stay lost.
+    None if they do not. Found by halving, first among the states and then between two, with equilibria from
+    the polynomial through their neighbours. Lost stability is assumed not to return.
     """
     low, high = 0, len(strains) - 1
     signs = motions.lost(moves[high])

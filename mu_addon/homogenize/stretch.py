@@ -25,7 +25,7 @@ class StretchSettings:
     """Settings of a virtual test of a periodic lattice.
 
     axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
-    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also ask whether
+    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also test whether
     the lattice would leave the planes of its mirrors (octant.Octant.buckling), at some 60 factorisations a
     point asked. tolerance: residual over the root sum of squares of all element forces; min_step: least step
     of strain; predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted
@@ -65,7 +65,7 @@ class Point:
 
 @attrs.frozen(eq=False)
 class Stretched:
-    """Result of a virtual test: the curve, its points in the order of the curve, and why it stops short.
+    """Result of a virtual test: the curve, its points in the order of the curve, and why it stops early.
 
     stopped: where and why, "" where it reaches both ends.
     """
@@ -157,7 +157,7 @@ class Stretching:
         return found, ""
 
     def _until_buckled(self, points: list[Point], stopped: str) -> tuple[list[Point], str]:
-        """Points up to the last that does not buckle, if each after the first that does, does; and why so."""
+        """Points up to the last stable one, assuming that buckling persists once begun; and the reason."""
         stable, unstable, way = 0, len(points) + 1, ""
         asked = len(points)
         while unstable - stable > 1:
@@ -291,7 +291,8 @@ class Stretching:
         return force, float(level / octant.model.force_scale())
 
     def _factorised(self, u: Array) -> tuple[bool, Array, Array]:
-        """Factorise at u, with a share of the undeformed tangent's where indefinite; whether without one.
+        """Factorise at u, adding a share of the undeformed tangent's where indefinite; also True if none was
+        added.
 
         Returns the coupling (f, l) solved for, and the factorised complement (l, l) of the stretches.
         """
@@ -312,7 +313,7 @@ class Stretching:
         raise ConvergenceError("the tangent is far from definite")
 
     def _step(self, u: Array, force: Array) -> tuple[bool, Array, Array]:
-        """Newton's step: whether the tangent was definite, change of the lateral stretches, and of u."""
+        """Newton's step: True if the tangent was definite, change of the lateral stretches, and of u."""
         along = self._affine[:, self.lateral]
         definite, solved, complement = self._factorised(u)
         inner = self._part.solve(-force)
@@ -325,7 +326,7 @@ class Stretching:
         return np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
 
     def _first_contact(self, path: Sequence[Point]) -> str:
-        """Place on a path, straight between its states, where walls first meet, in words; "" if nowhere."""
+        """Position on a path, straight between states, where walls first meet, in words; "" if nowhere."""
         for before, after in itertools.pairwise(path):
             if not self._meeting(after.stretch, after.u):
                 continue
@@ -342,7 +343,7 @@ class Stretching:
         return ""
 
     def _meeting(self, stretch: Array, u: Array) -> str:
-        """Walls of the deformed lattice that cut each other, in words, or "".
+        """Walls of the deformed lattice that intersect, in words, or "".
 
         An eighth meets its mirror images exactly where it crosses a mirror plane.
         """

@@ -1,4 +1,4 @@
-"""First contact of a compressed specimen's struts with each other or a plate; nothing here resists it."""
+"""First contact of a compressed specimen's struts with each other or a plate, detected and not resisted."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _ROUNDING = 1e-9
 
 @attrs.frozen(eq=False)
 class StrutContact:
-    """The nominal strain at which struts first meet, and what: "a plate" or "each other".
+    """Nominal strain at which struts first meet "a plate" or "each other".
 
-    place (3,): where, in the undeformed eighth, in mm from the block's middle.
+    place (3,): position in the undeformed eighth, in mm from the block's middle.
     """
 
     strain: float
@@ -72,7 +72,7 @@ def first_strut_contact(mesh: Mesh, strains: Sequence[float], moves: Sequence[Ar
 def _passed(
     mesh: Mesh, strains: Sequence[float], moves: Sequence[Array], plane: _Plane
 ) -> StrutContact | None:
-    """When nodes first pass a plane that they did not lie on."""
+    """First passage of nodes through a plane that they did not lie on."""
     off = np.setdiff1d(np.arange(len(mesh.nodes)), plane.on)
     least = _ROUNDING * mesh.nodes.max()
     before = np.full(len(off), -np.inf)

@@ -1,4 +1,4 @@
-"""Second-order elements beside a curved surface, bent along with it so that it does not cut through them."""
+"""Second-order elements beside a curved surface, bent with it so that they do not intersect it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FLAT = 0.25
 
 
 def relieved(mesh: Mesh, bounds: Any) -> Mesh:
-    """The mesh with lattice elements bent along with the membrane, where its curve comes near to fold one.
+    """The mesh with lattice elements bent along with the membrane, where its curvature would fold one.
 
     bounds (3, 2): the envelope's box, (low, high) in mm for x, y and z; its faces and the mirror planes keep
     their nodes in plane, and the membrane keeps all of its own. Meshes of order 1 are returned as they are.

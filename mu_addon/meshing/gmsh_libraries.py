@@ -1,4 +1,4 @@
-"""The system libraries that gmsh expects, and what to do where one is missing, known without gmsh."""
+"""System libraries that gmsh needs, and the remedy where one is missing, found without loading gmsh."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ SYSTEM_LIBRARIES = {
     "libfontconfig.so.1": "libfontconfig1",
     "libgomp.so.1": "libgomp1",
 }
-"""Libraries that gmsh's wheel for Linux expects of the system, and Debian's packages of them."""
+"""Libraries that gmsh's wheel for Linux expects from the system, and Debian's packages of them."""
 
 
 _CACHE = Path("/etc/ld.so.cache")
-"""Where Linux keeps the names of the libraries that it finds."""
+"""Linux's cache of the libraries that it finds."""
 
 
 def missing_libraries() -> list[str]:
-    """Names of those of SYSTEM_LIBRARIES that this system does not find; none where it cannot be known.
+    """Names of those of SYSTEM_LIBRARIES that this system lacks; none where it cannot be known.
 
-    Nothing is loaded: Blender asks while it draws.
+    Nothing is loaded: Blender asks at every redraw.
     """
     try:
         known = file_bytes(_CACHE)
@@ -46,5 +46,5 @@ def missing_libraries() -> list[str]:
 
 
 def install_libraries(names: Iterable[str]) -> str:
-    """What to do about system libraries that gmsh lacks."""
+    """Remedy for system libraries that gmsh lacks."""
     return f"on Debian and Ubuntu: apt install {' '.join(SYSTEM_LIBRARIES[name] for name in names)}"

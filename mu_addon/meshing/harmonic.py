@@ -1,4 +1,4 @@
-"""Nodes that follow others: displacements that are harmonic between those prescribed."""
+"""Harmonic displacements: nodes follow those whose displacement is prescribed."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class GmshUnavailable(MeshingError):
 class Sizes:
     """Element sizes in mm: at the envelope, on the anchors' line x = 0, y = `row`, and at the necks.
 
-    row and neck_radius are places in mm: of the line, and of the necks' outer surface.
+    row and neck_radius are positions in mm: of the line, and of the necks' outer surface.
     """
 
     envelope: float
@@ -123,7 +123,7 @@ _OPTIONS = {
 
 @contextmanager
 def gmsh_model(gmsh: Any) -> Iterator[Any]:
-    """A fresh silent gmsh model under fixed options, as a context; afterwards gmsh is as it was found."""
+    """Context of a fresh, silent gmsh model under fixed options; gmsh's own state is restored afterwards."""
     ours = not gmsh.isInitialized()
     if ours:
         # Personal option files and signal handlers would change results and Ctrl-C.
@@ -167,7 +167,7 @@ def _rim(nodes: Array, outside: Array, height: float) -> list[Array]:
 
 
 def _place_surface(gmsh: Any, nodes: Array, outside: Array, height: float) -> None:
-    """Enter the profile as discrete surface 1 with its border, curves 1..4; a node's tag is its id + 1."""
+    """Add the profile as discrete surface 1 with its border, curves 1..4; a node's tag is its id + 1."""
     rim = _rim(nodes, outside, height)
     first, _, second, _ = rim
     ends = [first[0], first[-1], second[-1], second[0]]

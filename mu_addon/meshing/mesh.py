@@ -78,22 +78,22 @@ class Mesh:
 
     @property
     def resolved(self) -> bool:
-        """Whether the mesh is of a printed body, strut by strut, in parts that overlap."""
+        """True if the mesh is of a printed body, strut by strut, in parts that overlap."""
         return self.filled.size > 0
 
     @property
     def solid(self) -> Array:
-        """Whether each element (m,) resists by itself, and is not part of a beam."""
+        """Mask (m,) of elements that resist by themselves, and are not part of a beam."""
         return np.ones(len(self.tets), bool) if len(self.beam_of) == 0 else self.beam_of < 0
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, ...) in mm with those of tied nodes set to what they follow, in place."""
+        """Displacements u (n, ...) in mm with tied nodes set to those of the nodes they follow, in place."""
         if len(self.tied):
             u[self.tied] = np.einsum("tk,tk...->t...", self.tied_weights, u[self.tied_to])
         return u
 
     def folded(self, forces: Array) -> Array:
-        """Forces (n, ...) in N with those on tied nodes passed on to what they follow, in place."""
+        """Forces (n, ...) in N with those on tied nodes passed on to the nodes they follow, in place."""
         if len(self.tied):
             weights = self.tied_weights.reshape(*self.tied_to.shape, *(1,) * (forces.ndim - 1))
             np.add.at(forces, self.tied_to, weights * forces[self.tied, None])
@@ -116,7 +116,7 @@ class Mesh:
         return self.cavity[:, :3]
 
     def symmetry_nodes(self, axis: str) -> Array:
-        """Nodes on the mirror plane of an axis, (k,) int32; raises MeshingError if it is none."""
+        """Nodes on the mirror plane of an axis, (k,) int32; raises MeshingError if it is not one."""
         if axis not in self.symmetry:
             raise MeshingError(
                 f"the mesh has no mirror plane {axis} = 0", f"its mirror planes: {self.symmetry or 'none'}"
@@ -176,7 +176,7 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
 
 
 def _on_plane(mesh: Mesh, axis: str) -> Array:
-    """Whether each node (n,) lies in a mirror plane, rotation vectors of sections there included."""
+    """Mask (n,) of nodes in a mirror plane, rotation vectors of sections there included."""
     found = np.zeros(len(mesh.nodes), bool)
     found[mesh.symmetry_nodes(axis)] = True
     for end in (0, 2):
@@ -250,7 +250,7 @@ def boundary_faces(tets: Array) -> tuple[Array, Array]:
 
 
 def edge_keys(edges: Array, count: int) -> Array:
-    """One number (e,) for each edge (e, 2) of a mesh of `count` nodes, ordered as edges are.
+    """Number (e,) of each edge (e, 2) of a mesh of `count` nodes, ordered as edges are.
 
     The ends of each edge must ascend.
     """

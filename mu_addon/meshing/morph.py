@@ -1,4 +1,4 @@
-"""The mesh of a slightly different unit by moving nodes: the two compare without a mesher's noise."""
+"""The mesh of a slightly different unit by moving nodes, so that the two compare without meshing noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .settings import CELL_MM, MeshSettings
 
 
 class WallGrid:
-    """The grid of a unit's membrane, made again of other units node by node."""
+    """Grid of a unit's membrane, repeated node by node for other units."""
 
     def __init__(
         self, d: Dimensions, edge_mm: float, turn: float, sectors: int, layers: int, rings: int
@@ -30,7 +30,7 @@ class WallGrid:
         self.membrane = self._made(self.meridian, self._heights)
 
     def of(self, b: Dimensions) -> Membrane:
-        """The membrane of other dimensions of the same cell and envelope; raises MeshingError."""
+        """Membrane of other dimensions of the same cell and envelope; raises MeshingError."""
         a = self.meridian.d
         if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
             raise _failed("its envelope differs")
@@ -53,7 +53,7 @@ class WallGrid:
 class Morph:
     """Moves the half mesh that gmsh made of a unit under some settings to other units.
 
-    What depends on the mesh alone is done once, so that many units near to it cost little.
+    Work that depends on the mesh alone is done once, so that many similar units cost little.
     """
 
     def __init__(self, mesh: Mesh, drawn: Unit, settings: MeshSettings) -> None:
@@ -91,9 +91,9 @@ class Morph:
     def to(self, other: Unit, checked: bool = True) -> Mesh:
         """The mesh moved to the unit `other`, of as many chambers and cells.
 
-        Another cell or scale first scales all of it. The membrane goes to its exact place; what is between it
-        and the envelope follows harmonically. checked: whether elements are looked at for inversion, as a
-        tiny move leaves them. Raises MeshingError where that cannot be done.
+        Another cell or scale first scales all of it. The membrane moves to its exact position; nodes between
+        it and the envelope follow harmonically. checked: test elements for inversion, which a tiny move does
+        not need. Raises MeshingError where that cannot be done.
         """
         mesh, a, b = self.mesh, self.drawn.printed, other.printed
         if a == b:
@@ -127,7 +127,7 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
 
 
 def struts_alone_differ(a: Dimensions, b: Dimensions) -> bool:
-    """Whether all but the struts is the same, wall and homogenised mesh among it."""
+    """Return True if dimensions differ in nothing but the struts, so that wall and homogenised mesh agree."""
     struts = ("grading", "junction_diameter", "midspan_diameter")
     return attrs.evolve(b, **{name: getattr(a, name) for name in struts}) == a
 
@@ -143,14 +143,14 @@ def shrunk(d: Dimensions, cell: float) -> Dimensions:
 
 
 def _breaks(meridian: Meridian) -> Array:
-    """Heights on the profile where something ends: cuts, arcs, ends."""
+    """Heights on the profile where a part ends: cuts, arcs, ends."""
     d = meridian.d
     joints = np.arange(d.count)[:, None] * d.cell + np.array([0.0, d.b, d.cell / 2, d.cell - d.b])
     return np.concatenate([joints.ravel(), [d.height], meridian.cuts])
 
 
 def _ends(mesh: Mesh) -> Array:
-    """The corners (n, 2) that every middle node is between."""
+    """Corners (n, 2) on either side of every mid-edge node."""
     ends = np.zeros((len(mesh.nodes), 2), int)
     ends[mesh.tets[:, 4:].ravel()] = mesh.tets[:, TET_EDGES].reshape(-1, 2)
     return ends

@@ -1,4 +1,4 @@
-"""How good a mesh is: counts, angles, Jacobians, and volumes against the design's own."""
+"""Mesh quality: counts, angles, Jacobians, and volumes against the design's own."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DUNAVANT_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3) / 2
 
 @attrs.frozen
 class Quality:
-    """What `mesh_quality` measures of a mesh: counts, angles in degrees, Jacobians, volumes in mm3.
+    """Quality of a mesh: counts, angles in degrees, Jacobians, volumes in mm3.
 
     Volumes are the whole body's, their errors relative to the design. min_scaled_jacobian is the least ratio,
     in one element, of the smallest to the largest det J at its four Gauss points: 1 where edges are straight,
@@ -58,9 +58,9 @@ def mesh_quality(
 ) -> Quality:
     """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
 
-    Half meshes count as the whole body they stand for. body: the closed surface that took the
-    place of the envelope's box, if one did. struts_mm3: volume of the struts outside the actuator, with which
-    the lattice of a resolved mesh is compared. See `Quality` for units.
+    Half meshes count as the whole body. body: the closed surface that took the place of the envelope's box,
+    if one did. struts_mm3: volume of the struts outside the actuator, with which the lattice of a resolved
+    mesh is compared. See `Quality` for units.
     """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds

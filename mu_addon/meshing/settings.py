@@ -1,4 +1,4 @@
-"""How fine an analysis mesh is; sizes belong to a cell of 12.5 mm and grow with the unit's."""
+"""Element sizes of an analysis mesh, given for a cell of 12.5 mm and scaled with the unit's."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import InputError
 FRACTIONS = ("half", "full")
 FIDELITIES = RESOLVED, SOLID, HOMOGENISED = ("resolved", "solid", "homogenised")
 CELL_MM = 12.5
-"""The cell, in mm, that the element sizes are given for."""
+"""Cell, in mm, to which the element sizes refer."""
 ORDER = described("order", 2, "order of the finite elements; 1 for a quick look only", low=1, high=2)
 REFINE = described("refine", 1.0, "mesh refinement: every element size is divided by it", low=0.2, high=8.0)
 FIDELITY = described(
@@ -79,16 +79,16 @@ class MeshSettings:
 
     @property
     def resolved(self) -> bool:
-        """Whether struts are meshed as printed."""
+        """True if struts are meshed as printed."""
         return self.fidelity != HOMOGENISED
 
     @property
     def without_beams(self) -> MeshSettings:
-        """The same with every strut solid, for what beams do not serve yet."""
+        """The same with every strut solid, for jobs that do not support beams yet."""
         return attrs.evolve(self, fidelity=SOLID) if self.fidelity == RESOLVED else self
 
     def table(self) -> dict[str, Any]:
-        """The settings as a file of inputs has them; fidelity only where it is not homogenised."""
+        """Settings as a table of a file of inputs; fidelity only where it is not homogenised."""
         found = attrs.asdict(self)
         if self.fidelity == HOMOGENISED:
             # As files were written before there was another.
@@ -97,11 +97,11 @@ class MeshSettings:
 
 
 QUICK = MeshSettings(refine=0.5)
-"""The mesh of a quick look in Blender."""
+"""Coarse mesh for a preview in Blender."""
 
 
 def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
-    """Raise InputError where self-contact is asked for without walls and struts."""
+    """Raise InputError where self-contact is asked for without meshed walls and struts."""
     if self_contact and not mesh.resolved:
         raise InputError(
             "self-contact needs walls and struts as they are printed",

@@ -1,4 +1,4 @@
-"""STEP files of a unit's bodies, exact where their surfaces are: cavity, membrane, envelope, waveguide.
+"""STEP files of a unit's bodies with exact surfaces: cavity, membrane, envelope, waveguide.
 
 Bodies of revolution are swept from half sections of Bezier arcs, the profile's parabolas as quadratic ones,
 so that no Boolean operation touches them. Struts are left out: fused as faces they take hours.
@@ -31,7 +31,7 @@ ROUND = 16
 
 
 def bodies(d: Dimensions, bar: Bar | None = None) -> dict[str, float]:
-    """Volume in mm3, exact, of each body that can be written, by name: cavity, membrane, envelope, waveguide.
+    """Exact volume in mm3 of each body that can be written, by name: cavity, membrane, envelope, waveguide.
 
     The cavity includes the inlet's bore, the membrane its boss. The waveguide is there if `bar` is given.
     """
@@ -52,7 +52,7 @@ def bodies(d: Dimensions, bar: Bar | None = None) -> dict[str, float]:
 
 
 def write_step(name: str, d: Dimensions, path: Path, bar: Bar | None = None) -> None:
-    """Write one body as STEP in mm, whole or not at all.
+    """Write one body as STEP in mm, completely or not at all.
 
     cavity: chambers and inlet as one; membrane: the wall with caps and inlet; envelope: the lattice's box
     without the actuator; waveguide: bar and seats, with everything cut out. Raises InputError for another
@@ -80,7 +80,7 @@ def write_step(name: str, d: Dimensions, path: Path, bar: Bar | None = None) -> 
 
 
 def step_volume(path: Path) -> tuple[int, float]:
-    """How many solids a STEP file holds, and their volume in mm3 within a surface mesh of order 2.
+    """Number of solids in a STEP file, and their volume in mm3 within a surface mesh of order 2.
 
     By the divergence theorem over the mesh, since a kernel's own mass properties are wrong by up to 20 % on
     some swept splines. Raises MeshingError where gmsh cannot be loaded or cannot read the file.
@@ -120,7 +120,7 @@ def _enclosed(gmsh: Any, solid: tuple[int, int]) -> float:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Standard output to nowhere: the STEP writer reports there, whatever gmsh's own verbosity."""
+    """Discard standard output: the STEP writer reports there, whatever gmsh's own verbosity."""
     sys.stdout.flush()
     try:
         kept = os.dup(1)
@@ -172,7 +172,7 @@ def _membrane_section(d: Dimensions) -> Section:
 
 
 def _lines(points: Sequence[Any]) -> Section:
-    """Straight pieces between points, without those that have no length."""
+    """Straight pieces between points, without those of zero length."""
     at = [np.asarray(p, float) for p in points]
     return [np.stack([a, b]) for a, b in pairwise(at) if np.linalg.norm(b - a) > 1e-12]
 
@@ -237,7 +237,7 @@ def _faced(occ: Any, corners: Array, faces: list[list[int]]) -> tuple[int, int]:
 
 
 def _only_solids(gmsh: Any) -> None:
-    """Remove the points and curves that construction left: a file holds its body alone."""
+    """Remove the points and curves left by construction, so that a file holds its body alone."""
     for dim in (2, 1, 0):
         bounds = {entity for solid in gmsh.model.getEntities(3) for entity in _boundary(gmsh, solid, dim)}
         loose = [entity for entity in gmsh.model.getEntities(dim) if entity[1] not in bounds]

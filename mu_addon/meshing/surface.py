@@ -1,4 +1,4 @@
-"""Labelled tetrahedra inside any closed surface mesh, by pytetwild; it has no seed, hence the cache."""
+"""Labelled tetrahedra inside any closed surface mesh, by pytetwild, cached because it has no seed."""
 
 from __future__ import annotations
 
@@ -53,14 +53,13 @@ def mesh_surface(
 ) -> Mesh:
     """Fill a closed surface, vertices (n, 3) in mm and triangles (f, 3) outward, with tetrahedra.
 
-    Elements are about edge_mm long; the result stays within epsilon_mm of the surface (a fiftieth of
-    edge_mm if not given). Each tetrahedron belongs to the last surface of `inside` whose winding number
-    at its centroid says so, else to `region`; or `classify` maps centroids (m, 3) to regions (m,). What
-    is VOID is left out, and its wall becomes the cavity. Sides on the bounding box are made exactly flat:
-    the lowest and highest in z are base and tip, and those of `symmetry` must be at zero. Elements of
-    order 2 are straight-sided. With a cache folder the same input always gives the same mesh. Raises
-    InputError for a surface that is not closed, OutputError for a cache that cannot be written, and
-    MeshingError.
+    Elements are about edge_mm long; the result stays within epsilon_mm of the surface (a fiftieth of edge_mm
+    if not given). Each tetrahedron belongs to the last surface of `inside` that encloses its centroid by
+    winding number, else to `region`; or `classify` maps centroids (m, 3) to regions (m,). Elements in VOID
+    are left out, and its wall becomes the cavity. Sides on the bounding box are made exactly flat: the lowest
+    and highest in z are base and tip, and those of `symmetry` must be at zero. Elements of order 2 are
+    straight-sided. With a cache folder the same input always gives the same mesh. Raises InputError for a
+    surface that is not closed, OutputError for a cache that cannot be written, and MeshingError.
     """
     outer = Surface(np.asarray(vertices, float), np.asarray(triangles), region)
     surfaces = [outer, *inside]
@@ -130,7 +129,7 @@ def _labelled(
 
 
 def winding_number(surface: Surface, points: Array) -> Array:
-    """How many times a closed surface winds around points (n, 3) in mm, (n,): 1 inside, 0 outside.
+    """Winding number (n,) of a closed surface around points (n, 3) in mm: 1 inside, 0 outside.
 
     The sum of its triangles' solid angles over 4 pi. Source: Van Oosterom and Strackee, IEEE Trans. Biomed.
     Eng. BME-30 (1983) 125.
@@ -169,7 +168,7 @@ def _flatten(nodes: Array, faces: Array, column: int, plane: float, epsilon: flo
 def _cached(
     cache: Path | None, points: Array, faces: Array, edge: float, epsilon: float, *, anew: bool
 ) -> tuple[Array, Array]:
-    """pytetwild's nodes and tets for an input, from the cache folder if it holds them, or made `anew`."""
+    """pytetwild's nodes and tets for an input: from the cache folder if it holds them, else computed."""
     if cache is None:
         return _tetrahedralize(points, faces, edge, epsilon)
     digest = hashlib.sha256(repr((points.shape, faces.shape, edge, epsilon, _version())).encode())

@@ -45,7 +45,7 @@ def tiled(
 
 
 def _images(nodes: Array, axis: int, count: int, side: float) -> tuple[list[Array], list[Array]]:
-    """For each copy along an axis the numbers (n,) of its nodes, and which of them are new with it."""
+    """Numbers (n,) of the nodes of each copy along an axis, and a mask of those that are new with it."""
     low, high = nodes[:, axis] == 0.0, nodes[:, axis] == side
     total = len(nodes)
     numbers, new = [np.arange(total)], [np.ones(total, bool)]

@@ -42,7 +42,7 @@ _FLAT = 0.05
 
 
 class MeshingWarning(UserWarning):
-    """A mesh that could be made, but not in the way that was asked for."""
+    """A mesh was made, but not in the way that was asked for."""
 
 
 def mesh_unit(
@@ -53,7 +53,7 @@ def mesh_unit(
     cache: Path | None = None,
     body: Body | None = None,
 ) -> Mesh:
-    """The analysis mesh of a unit as it is printed: labelled tetrahedra of membrane and lattice region.
+    """Analysis mesh of a unit as printed: labelled tetrahedra of membrane and lattice region.
 
     The membrane is a structured grid revolved about z; gmsh fills the lattice region around it. The base is
     clamped, the inlet is left out. settings: sizes and order. mesher: "gmsh", "pytetwild" (meshes all from
@@ -62,8 +62,8 @@ def mesh_unit(
     place of the envelope's box (`design.body.envelope`), which pytetwild meshes: half of it where it is its
     own mirror image across x = 0. progress: called with a stage and the share done.
 
-    Raises InputError and MeshingError. A coarse mesh takes about a second:
-    `mesh_unit(load_preset("mu-1.0x"), MeshSettings(order=1, refine=0.5))`.
+    Raises InputError and MeshingError. A coarse mesh takes about a second: `mesh_unit(load_preset("mu-1.0x"),
+    MeshSettings(order=1, refine=0.5))`.
     """
     settings = settings or MeshSettings()
     report = progress or (lambda stage, share: None)
@@ -145,7 +145,7 @@ def _lattice(d: Dimensions, settings: MeshSettings, membrane: Membrane) -> tuple
 
 
 def _joined(membrane: Membrane, nodes: Array, lattice: Array, height: float, order: int) -> Mesh:
-    """One mesh from the membrane and the linear lattice tets around it, curved where they meet."""
+    """Join the membrane and the linear lattice tets around it, curved where they meet."""
     region = np.repeat([MEMBRANE, LATTICE], [len(membrane.tets), len(lattice)])
     tets, cavity = np.vstack([membrane.tets, lattice]), membrane.cavity
     if order == 2:
@@ -186,7 +186,7 @@ def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
 def _within(
     body: Body, d: Dimensions, settings: MeshSettings, report: Progress, mesher: str, cache: Path | None
 ) -> Mesh:
-    """Mesh of a unit with a body for its envelope."""
+    """Mesh of a unit with a closed surface in place of its envelope."""
     if mesher == "gmsh":
         raise InputError(
             "a user-defined body is meshed by pytetwild", "mesher", 'choose mesher "auto" or "pytetwild"'

@@ -1,4 +1,4 @@
-"""Every candidate on one mesh at once: at each state of Model A, all sensors by a batched Newton method."""
+"""Batches of candidates on one mesh: at each state of Model A, all sensors by a batched Newton method."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = np.ndarray[Any, Any]
 
 
 class CandidateBatch:
-    """Many candidate sensors in one unit, solved together: how each moves the monitored points in a state.
+    """Many candidate sensors in one unit, solved together: displacement of the monitored points by each.
 
     At every state of Model A (the unit without a sensor) all candidates share one factorisation (batched
     Newton). shares: for each sensor the share (m,) of every element that it fills (`sensor_share`).
@@ -55,8 +55,8 @@ class CandidateBatch:
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, in the order of time.
 
-        time_s (k,) ascending, pressure_kPa (k,). For what remembers: friction on the model's obstacles, or a
-        law with history. Raises InputError where time runs backward, and ConvergenceError.
+        time_s (k,) ascending, pressure_kPa (k,). For models with history: friction on obstacles, or a law
+        with history. Raises InputError where time runs backward, and ConvergenceError.
         """
         equilibrium = self._batched_newton.alone(number)
         equilibrium.settings = CONTACT_NEWTON
@@ -71,7 +71,7 @@ class CandidateBatch:
         return self.points(self.states(state))
 
     def states(self, state: State) -> list[State]:
-        """Every sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
+        """Each sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
         return self._batched_newton.at(state)
 
     def points(self, states: Sequence[State]) -> Array:

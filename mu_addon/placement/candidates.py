@@ -81,7 +81,7 @@ def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Arra
 
 @attrs.frozen(eq=False)
 class Evaluation:
-    """One candidate under one inclusion rule: its deviation from Model A, and how much it stiffened.
+    """One candidate under one inclusion rule: its deviation from Model A, and the volume it stiffened.
 
     stiffened_mm3: volume of the whole body that got the sensor's material; cylinder_mm3: of the cylinder.
     """

@@ -34,10 +34,10 @@ def _positive(_: object, field: attrs.Attribute[float], value: float) -> None:
 class Limits:
     """Limits of a path: its least and largest length, and its sharpest bend.
 
-    Lengths are in cells; a window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2
-    cells. The bend is assumed, since the paper's paths are straight: 75 degrees admits the zigzag from
-    one half-diagonal to a neighbouring one (70.5) and refuses a step across from one along the axis (90).
-    Raises InputError for a limit that is not positive.
+    Lengths are in cells; a window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2 cells.
+    The bend is assumed, since the paper's paths are straight: 75 degrees allows the zigzag from one
+    half-diagonal to a neighbouring one (70.5) and refuses a step across from one along the axis (90). Raises
+    InputError for a limit that is not positive.
     """
 
     shortest_cells: float = attrs.field(default=2.0, validator=_positive)
@@ -64,10 +64,10 @@ class Graph:
         return np.asarray(np.linalg.norm(np.diff(self.nodes[self.steps], axis=1)[:, 0], axis=1))
 
     def chains(self, limits: Limits) -> Iterator[tuple[int, ...]]:
-        """Every chain within the limits as its nodes, from the lowest; of two mirror images only one.
+        """Every chain within the limits as its nodes, from the lowest; only one of two mirror images.
 
-        Depth first and in the order of the nodes, so that the same graph gives the same sequence; only
-        one chain is held at a time.
+        Depth first and in the order of the nodes, so that the same graph gives the same sequence; only one
+        chain is held at a time.
         """
         shortest, longest = (self.cell * c for c in (limits.shortest_cells, limits.longest_cells))
         least = np.cos(np.radians(limits.sharpest_bend_deg)) - 1e-9
@@ -91,7 +91,7 @@ class Graph:
             yield from extend([start], None, 0.0)
 
     def _stands_for_both(self, chain: list[int]) -> bool:
-        """True if a chain is the one of two mirror images that is listed."""
+        """Return True if a chain is the one of two mirror images that is listed."""
         return chain <= [int(i) for i in self.image[chain]]
 
     def count(self, limits: Limits) -> int:
@@ -144,7 +144,7 @@ def lattice_graph(d: Dimensions, clearance_mm: float | None = None) -> Graph:
 
 
 def _clear(d: Dimensions, ends: Array, clearance: float) -> Array:
-    """True for steps (e, 2, 3) clear of the membrane's outer surface and the envelope's faces, (e,)."""
+    """Mask (e,) of steps (e, 2, 3) clear of the membrane's outer surface and the envelope's faces."""
     from scipy.spatial import cKDTree
 
     t = np.linspace(0.0, 1.0, _ALONG_STEP)[:, None]

@@ -1,4 +1,4 @@
-"""The waveguide as a stiff cylinder in the lattice: which elements it touches and how much of each."""
+"""The waveguide as a stiff cylinder in the lattice: the elements it touches and the share of each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = np.ndarray[Any, Any]
 
 RULES = ("intersect", "volume_fraction")
 PRINTED = "printed"
-"""In place of a rule: the waveguide itself, with its wells and seats, in a mesh of the printed unit."""
+"""Used in place of a rule: the waveguide itself, with wells and seats, in a mesh of the printed unit."""
 
 # Between two vertex heights the slice area is smooth but where an edge meets the circle: many short
 # Gauss rules lose less at such a kink than one long one.
@@ -123,7 +123,7 @@ class Inclusion:
 
     @property
     def touched(self) -> Array:
-        """True for each element that the cylinder touches, (m,): the paper's region of interest."""
+        """Mask (m,) of elements that the cylinder touches: the paper's region of interest."""
         return self.share > 0
 
     @property
@@ -168,7 +168,7 @@ def sensor_share(rule: str, found: Inclusion) -> Array:
 
 
 def stiffened_volume_mm3(rule: str, found: Inclusion, volumes: Array) -> float:
-    """Volume in mm3 that a rule gives the sensor's material to, of elements with volumes (m,) in mm3.
+    """Volume in mm3 that gets the sensor's material under a rule, of elements with volumes (m,) in mm3.
 
     Blended elements count by their share. Raises ValueError as `sensor_share`.
     """

@@ -1,4 +1,4 @@
-"""Adjoint map of a trajectory: how far each element's stiffness moves the monitored points."""
+"""Adjoint map of a trajectory: displacement of the monitored points by each element's stiffness."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _STEP = 1e-4
 
 @attrs.frozen(eq=False)
 class Parity:
-    """One half of the responses of a body with a mirror plane x = 0: those even in x, or those odd.
+    """The responses of a body with a mirror plane x = 0 that are even in x, or those that are odd.
 
-    components: 0 to 2, of the displacement of points on the plane, those that this half carries.
+    components: 0 to 2, of the displacement of points on the plane, that this parity allows.
     """
 
     model: Model
@@ -42,10 +42,10 @@ class Parity:
 def parities(model: Model) -> list[Parity]:
     """The responses of a whole body about a state of its model, which may be of one half.
 
-    A load on one side of a half's mirror plane is half an even load and half an odd one; the tangents
-    of both are those of the half mesh, under different supports on the plane. What touches its own image
-    goes along with it in an odd motion, so that the contact across the plane has no part in that tangent.
-    Raises MeshingError for a mesh with other mirror planes.
+    A load on one side of a half's mirror plane is half an even load and half an odd one; the tangents of both
+    are those of the half mesh, under different supports on the plane. In an odd motion a point in contact
+    with its image moves with it, so that contact across the plane has no part in that tangent. Raises
+    MeshingError for a mesh with other mirror planes.
     """
     mesh = model.mesh
     if not mesh.symmetry:
@@ -92,11 +92,9 @@ def loaded(trajectory: Trajectory, pressures_MPa: Array | None = None) -> list[S
 def stable_part(
     model: Model, materials: Materials, trajectory: Trajectory, sides: list[Parity] | None = None
 ) -> Trajectory:
-    """A trajectory without the states from which a body would move away by itself, to either side too.
+    """The trajectory without states that are unstable, also against motions that break the mirror symmetry.
 
-    A half mesh follows motions that mirror themselves, and knows of no others. From either end of the
-    pressures states are left out until one is stable; those between are taken to be stable. sides:
-    `parities(model)`. Without states where all that are loaded are unstable.
+    A half mesh contains symmetric motions only.
     """
     sides = parities(model) if sides is None else sides
     data = model.parameters(materials)
@@ -130,7 +128,7 @@ def stable_part(
 
 
 def representative_pressures(trajectory: Trajectory) -> Array:
-    """Pressures (t,) in MPa, ascending, of three of a trajectory's loaded states that stand for all.
+    """Pressures (t,) in MPa, ascending, of three of a trajectory's loaded states that represent all.
 
     The least, the largest, and the one nearest two thirds of the way between; 0 as well, where the unit's
     weight makes it deviate there, too. Over the grasp protocol J_hat by `polynomials` through these was
@@ -200,9 +198,9 @@ def influence_map(
 
 
 def of_beams(model: Model, u: Array, data: MaterialData, moved: Array) -> Array:
-    """Work (c, m) in mJ of the elements that beams stand for on displacements `moved` (n, 3, c) in mm.
+    """Work (c, m) in mJ of the elements that beams replace on displacements `moved` (n, 3, c) in mm.
 
-    Each has the share of its beam's that it has of its volume. u: (n, 3) in mm.
+    Each gets the share of its beam's work that it has of its volume.
     """
     mesh = model.mesh
     found = np.zeros((moved.shape[2], len(mesh.tets)))
@@ -230,8 +228,8 @@ def centreline_gradient(points: Array, stations: int) -> Array:
 def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
     """J_hat (...,) in mm, to first order, of displacements (..., s, p, 3) of the monitored points.
 
-    gradients (s, j, 3, p, 3) of the centreline in every state; weights (s,) the share of the instants
-    at which each state holds.
+    gradients (s, j, 3, p, 3) of the centreline in every state; weights (s,) share of the instants of each
+    state.
     """
     total = np.zeros(moved.shape[:-3])
     # State by state, for there are as many displacements as elements or paths.
@@ -242,7 +240,7 @@ def mean_deviation(gradients: Array, moved: Array, weights: Array) -> Array:
 
 
 def shares_of_time(trajectory: Trajectory) -> Array:
-    """Share (s,), 0 to 1, of a trajectory's instants at which each loaded state holds."""
+    """Share (s,), 0 to 1, of a trajectory's instants for each loaded state."""
     count = np.bincount(trajectory.index, minlength=len(trajectory.solved)) / len(trajectory.index)
     return count[[state.loaded for state in trajectory.solved]]
 
@@ -258,7 +256,7 @@ def gradients_of(trajectory: Trajectory, points: Array, monitor: Probe, stations
 
 
 def deviation_map(found: Influence, gradients: Array, weights: Array) -> Array:
-    """dJ_hat (m,) in mm by each element's relative stiffening, alone and from Model A on.
+    """dJ_hat (m,) in mm by each element's relative stiffening, alone, about Model A.
 
     gradients (s, j, 3, p, 3), weights (s,): as `mean_deviation` has them. J_hat is a mean of distances and
     has a kink at Model A, where all of them are 0: this is its slope on the side of stiffening, and never

@@ -78,13 +78,13 @@ def polyline_inclusion(
 
 
 def _near(corners: Array, low: Array, high: Array, radius: float) -> Array:
-    """True for tetrahedra (m, 4, 3) whose boxes touch a cylinder's, (m,)."""
+    """Mask (m,) of tetrahedra (m, 4, 3) whose boxes touch a cylinder's."""
     below, above = np.minimum(low, high) - radius, np.maximum(low, high) + radius
     return np.asarray(((corners.max(axis=1) > below) & (corners.min(axis=1) < above)).all(axis=1))
 
 
 def _kept(tets: Array, owner: Array, point: Array, normal: Array) -> tuple[Array, Array]:
-    """The parts of tetrahedra (m, 4, 3) on a plane's positive side as tetrahedra, and what they are of."""
+    """Parts of tetrahedra (m, 4, 3) on a plane's positive side, as tetrahedra; numbers of their originals."""
     height = (tets - point) @ normal
     order = np.argsort(-height, axis=1)
     v = np.take_along_axis(tets, order[:, :, None], axis=1)

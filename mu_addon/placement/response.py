@@ -1,9 +1,9 @@
 """Reduced, linear response of a unit to a path of stiff steps, without solving for the path.
 
 An inclusion a hundred times stiffer than the lattice is far beyond a first-order map. But its own strain
-stays small. So its forces are linear in the displacement of its co-rotated elements, and the rest of the unit
-answers them nearly linearly about Model A. Each step of the graph gets a few patterns of strain. Their forces
-are applied to Model A's tangent once; any chain of steps is then a small dense system.
+stays small, so its forces are linear in the displacement of its co-rotated elements, and the rest of the unit
+responds nearly linearly about Model A. Each step of the graph gets a few patterns of strain. Their forces are
+applied to Model A's tangent once; any chain of steps is then a small dense system.
 """
 
 from __future__ import annotations
@@ -60,9 +60,8 @@ class Response:
     For each of s states, at pressure_MPa (s,): flexibility (s, parities, q, q) between all patterns, drive
     (s, q) the work of each pattern's forces under Model A's deformation, and reach (s, p, 3, q), the
     displacement in mm of the monitored points. stiffness (q,): the sensor's own, pattern by pattern; each
-    representative step has as many `patterns`. step (e,) and side (e,) of every step of the graph: the place
-    of the one that represents it, and on which side of the mirror plane it lies itself, 0 if in it. odd:
-    which parities are.
+    representative step has as many `patterns`. step (e,) and side (e,) of every step of the graph: index of
+    its representative, and its own side of the mirror plane, 0 if in it. odd: mask of the odd parities.
     """
 
     graph: Graph
@@ -179,7 +178,7 @@ def reduced_response(
 
 
 def solver_of(model: Model, tangent: Array) -> Callable[[Array], Array]:
-    """Solves with a tangent for right-hand sides (k, n), many at once where its factor is at hand."""
+    """Return a function that solves with a tangent for right-hand sides (k, n), together if possible."""
     factor = model.factor.factor(tangent)
     if isinstance(factor, Cholesky | SuperLU):
         return Triangular(factor.lower(), threads=model.threads).solve
@@ -187,9 +186,9 @@ def solver_of(model: Model, tangent: Array) -> Callable[[Array], Array]:
 
 
 def _represented(graph: Graph, mirrored: bool) -> tuple[Array, Array, Array]:
-    """For every step the place of its representative and its own side (e,), and the representatives (r,).
+    """Index of the representative and own side (e,) of every step, and the representatives (r,).
 
-    In a half mesh, of two mirror images the one at x > 0 represents both.
+    In a half mesh, the one of two mirror images at x > 0 represents both.
     """
     if not mirrored:
         every = np.arange(len(graph.steps))
@@ -213,10 +212,10 @@ def _patterns(
     rule: str,
     radius_mm: float,
 ) -> list[Patterns]:
-    """The strain patterns of some steps (r,): six uniform strains, and stretch passed on to neighbours.
+    """Strain patterns of some steps (r,): six uniform strains, and stretch passed on to neighbours.
 
-    Each is relaxed inside the elements that the step touches, so that the inclusion resists it as it does
-    in a lattice that far from it is strained uniformly.
+    Each is relaxed inside the elements that the step touches, so that the inclusion resists it as in a
+    lattice under uniform strain far away.
     """
     mesh = model.mesh
     corners, lattice = mesh.nodes[mesh.corners], mesh.region == LATTICE
@@ -260,17 +259,17 @@ def _patterns(
 
 
 def _filled(rule: str, share: Array, radius_mm: float) -> tuple[Array, Array]:
-    """Elements (e,) that a bar fills under a rule, and how much of each (e,)."""
+    """Elements (e,) that a bar fills under a rule, and the share of each (e,)."""
     filled = sensor_share(rule, Inclusion(share, radius_mm, 0.0))
     elements = np.flatnonzero(filled)
     return elements, filled[elements]
 
 
 def _independent(displacement: Array, stiffness: Array) -> Array:
-    """Forces (e, 3k, q) of as many patterns as are given, of unit energy and orthogonal to each other.
+    """Forces (e, 3k, q) of the given patterns, made orthogonal and of unit energy.
 
-    Where some depend on others, as those of a step whose neighbours touch no further element do, as
-    many are zero.
+    Where some depend on others, as those of a step whose neighbours touch no further element do, as many are
+    zero.
     """
     force = stiffness @ displacement
     energy, turn = np.linalg.eigh(np.einsum("eiq,eir->qr", displacement, force))
@@ -279,7 +278,7 @@ def _independent(displacement: Array, stiffness: Array) -> Array:
 
 
 def _added_stiffness(model: Model, materials: Materials, sensor_MPa: float, elements: Array) -> Array:
-    """Stiffness (e, 3k, 3k) in N/mm at rest of whole elements of the sensor, less that of what they are."""
+    """Stiffness (e, 3k, 3k) in N/mm at rest of elements of the sensor's material, less their own."""
     every = np.arange(len(model.mesh.tets))
     _, poisson = materials.small_strain(len(every))
     parameters = NeoHooke.parameters(np.full(len(every), sensor_MPa), poisson)

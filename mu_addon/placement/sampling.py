@@ -1,4 +1,4 @@
-"""Deviations at a few pressures for all: where to solve, what lies between, and how far that may be off."""
+"""Deviations at a few pressures instead of all: which to solve, interpolation, and its error."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Array = np.ndarray[Any, Any]
 def solution_order(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
     """Numbers of distinct pressures (s,) in the order to solve them: two at a time, the extremes first.
 
-    Each later pressure is the one farthest from those before it and from 0, where nothing deviates. Where
-    the unit has weight, it deviates there, too: 0, if it is met, is then solved beside the extremes.
+    Each later pressure is the one farthest from those before it and from 0, where nothing deviates. A unit
+    with weight deviates there, too: 0, if present, is then solved with the extremes.
     """
     pressure = np.asarray(pressure, float)
     left = [i for i, p in enumerate(pressure) if p or has_gravity]
@@ -44,9 +44,9 @@ def polynomials(known: Array, wanted: Array) -> Array:
 
 
 def between(pressure: Array, known: Mapping[int, Array]) -> Array:
-    """Differences (s, ...) at all pressures (s,), of those known at some of them by number.
+    """Differences (s, ...) at all pressures (s,), from those known at some of them by number.
 
-    Their polynomial, see `polynomials`; what is known stays as it is. Pressures in any unit.
+    By their polynomial, see `polynomials`; known values stay. Pressures in any unit.
     """
     pressure = np.asarray(pressure, float)
     numbers = list(known)

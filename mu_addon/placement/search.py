@@ -1,4 +1,4 @@
-"""The best path among thousands: all ranked by a cheap prediction, the best of them checked exactly."""
+"""Search for the best of many paths: all are ranked by a cheap prediction, the best checked exactly."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Array = np.ndarray[Any, Any]
 class SearchSettings:
     """Numbers of paths to check at first, at most and at a time, and the risk left at the end.
 
-    spread: of the first checks, how many are taken from the whole range of predictions, so that the
-    prediction's error is known there too. risk: a probability, see `probability_of_better`.
+    spread: number of the first checks taken from the whole range of predictions, so that the prediction's
+    error is known there too. risk: a probability, see `probability_of_better`.
     """
 
     first: int = 12
@@ -33,8 +33,8 @@ class Search:
     """A search's outcome over n paths: predicted and exact J_hat (n,) in mm, and the number of the best path.
 
     exact_mm is NaN where unchecked. risk: probability that an unchecked path beats the best, as
-    `probability_of_better` has it; complete: whether every path was checked or the risk is as small as was
-    asked for; left_out (k,): numbers of paths that turned out impossible.
+    `probability_of_better` has it; complete: True if every path was checked or the risk is as small as asked
+    for; left_out (k,): numbers of paths that turned out impossible.
     """
 
     predicted_mm: Array
@@ -56,8 +56,8 @@ def probability_of_better(predicted_mm: Array, exact_mm: Array) -> float:
 
     predicted_mm, exact_mm (n,): J_hat of every path, exact NaN where unchecked. The logarithm of exact over
     predicted is taken as normal with the checked paths' mean and variance; Student's t gives the probability
-    for each unchecked path, and their sum bounds that for any. This is what was observed, not a proof: it
-    holds as far as unchecked paths err as checked ones do.
+    for each unchecked path, and their sum bounds that for any. This is an estimate, not a proof: it assumes
+    that predictions of unchecked paths err as those of checked ones do.
     """
     from scipy.stats import t
 

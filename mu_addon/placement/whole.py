@@ -1,4 +1,4 @@
-"""Model A of the whole body from that of its half: a path off the mirror plane needs both sides."""
+"""Model A of the whole body from that of its half, for paths off the mirror plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bar and seats of a waveguide as meshes of their own, and where a point is outside them."""
+"""Bar and seats of a waveguide as separate meshes, and distances of points from them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _EXACT = 1e-9
 
 
 def is_own_mirror_image(bar: Bar) -> bool:
-    """Whether a waveguide is its own image in the plane x = 0, wells and seats included."""
+    """Return True if a waveguide is its own image in the plane x = 0, wells and seats included."""
     sides = [*np.cross(bar.directions, bar.normals), *(seat.body.axes[2] for seat in bar.seats)]
     return bool(
         (np.abs(bar.points[:, 0]) < _EXACT).all() and all(abs(side[0]) > 1.0 - _EXACT for side in sides)
@@ -26,10 +26,10 @@ def is_own_mirror_image(bar: Bar) -> bool:
 
 
 def bar_mesh(bar: Bar, half: bool, kept: list[Depth]) -> Mesh:
-    """Quadratic tetrahedra of a bar without what its wells cut out; legs meet in the planes of its mitres.
+    """Quadratic tetrahedra of a bar less its wells; legs meet in the planes of its mitres.
 
-    half: whether only what lies at x >= 0 is wanted, of a bar that is its own mirror image. kept: where it
-    counts, as in `filled_outside`.
+    half: keep only the part at x >= 0, of a bar that is its own mirror image. kept: where it counts, as in
+    `filled_outside`.
     """
     h, longest = bar.half, _LONGEST * 2.0 * bar.half
     leg_of = [int(_outside_legs(bar, well.centre[None])[0].argmin()) for well in bar.wells]
@@ -62,7 +62,7 @@ def bar_mesh(bar: Bar, half: bool, kept: list[Depth]) -> Mesh:
 def _section(bar: Bar, leg: int, place: float, up: Array, aside: Array, plane: Array) -> Array:
     """Points (a, b, 3) in mm of a leg's section in a plane of given normal, `place` mm from its start.
 
-    up (a,) and aside (b,): places across the leg in mm, along its normal and beside it.
+    up (a,) and aside (b,): positions across the leg in mm, along its normal and beside it.
     """
     way, normal = bar.directions[leg], bar.normals[leg]
     across = up[:, None, None] * normal + aside[None, :, None] * np.cross(way, normal)

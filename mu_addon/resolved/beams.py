@@ -1,8 +1,8 @@
 """Struts of a resolved mesh as beams, wherever they are whole: away from wall, waveguide and cuts.
 
-A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of all that struts stand
-on becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and the
-joints of any of these stay solid, so that what struts do to the wall is what solid ones do.
+A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of everything that
+struts stand on becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and
+their joints stay solid, so that struts act on the wall as solid ones do.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .octants import SweptNodes
 Array = np.ndarray[Any, Any]
 
 REACH = 0.3
-"""Layers that come nearer than this share of a junction's diameter to what struts stand on stay solid."""
+"""Layers nearer than this share of a junction's diameter to the parts that struts stand on stay solid."""
 
 _WHOLE = 1.0 - 1e-9
 _GAUSS = np.polynomial.legendre.leggauss(6)
@@ -32,9 +32,9 @@ _OFF = 0.3
 
 
 def without_beams(mesh: Mesh, solid: Array) -> Mesh:
-    """The mesh with some elements (m,) bool solid again, with all of their beams, and joints that these meet.
+    """The mesh with some elements (m,) bool solid again, with all of their beams and the joints of these.
 
-    Rotation vectors that nothing turns by any more stay as nodes, for the numbers of all to stay.
+    Rotation vectors that no beam uses any more stay as nodes, so that numbers do not change.
     """
     gone = np.zeros(len(mesh.beams), bool)
     gone[np.unique(mesh.beam_of[solid & (mesh.beam_of >= 0)])] = True
@@ -66,11 +66,11 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
 
 
 def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: float) -> Mesh:
-    """A resolved mesh of swept struts with beams in place of the layers that are whole and out of reach.
+    """A resolved mesh of swept struts with beams in place of the layers that are whole and far from walls.
 
-    layers: of a strut's mesh, as in `strut_mesh`; clear (n,): distance of the nodes in mm from what struts
-    stand on, of which the struts' count; reach_mm: below which a layer stays solid. Rotation vectors are
-    nodes added at the end.
+    layers: of a strut's mesh, as in `strut_mesh`; clear (n,): distance of the struts' nodes in mm from the
+    parts that struts stand on; reach_mm: below which a layer stays solid. Rotation vectors are nodes added at
+    the end.
     """
     lattice = lattice_of(d)
     parts = _Layers(mesh, lattice, layers)
@@ -108,7 +108,7 @@ class _Layers:
         self.ends = np.where(lattice.is_corner[ends[:, 0]][:, None], ends, ends[:, ::-1])
 
     def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
-        """Whether each layer of each strut (struts, layers) can be a beam."""
+        """Mask (struts, layers) of the layers that can be a beam."""
         shape = len(self.lattice.struts), self.count
         tied = np.zeros(len(mesh.nodes), bool)
         tied[mesh.tied] = True
@@ -162,13 +162,13 @@ class _Layers:
         )
 
     def _towards(self, beams: Array, own: Array, nodes: Array) -> Array:
-        """From each beam node (b,) to the other end of one of its beams, (b, 3) in mm."""
+        """Vectors (b, 3) in mm from each beam node (b,) to the other end of one of its beams."""
         other = np.empty(len(nodes), int)
         other[beams[:, 0]], other[beams[:, 2]] = beams[:, 2], beams[:, 0]
         return np.asarray(nodes[other[own]] - nodes[own])
 
     def _carried(self, mesh: Mesh, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
-        """Carried nodes (c,), what carries them (c, 4) and the first one's shares (c,)."""
+        """Carried nodes (c,), their carriers (c, 4) and the first one's shares (c,)."""
         used = whole[self.strut, self.layer]
         pairs = np.unique(self.of_element[used])
         node, strut, level = self.node[pairs], self.node_strut[pairs], self.level[pairs]

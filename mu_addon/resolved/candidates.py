@@ -27,7 +27,7 @@ from .waveguide import bar_of, with_waveguide
 Array = np.ndarray[Any, Any]
 
 EASED_CELLS = 1.0
-"""How far from a waveguide, in cells, a candidate's start gives way to it."""
+"""Distance from a waveguide, in cells, within which struts yield to it in a candidate's start."""
 
 MaterialsOf = Callable[[Mesh], Materials]
 ModelOf = Callable[[Mesh], Model]
@@ -35,7 +35,7 @@ ModelOf = Callable[[Mesh], Model]
 
 @attrs.frozen(eq=False)
 class PrintedWaveguides:
-    """The candidates of one unit as printed: how each moves the anchors at a state of the unit without them.
+    """Candidates of one unit as printed: displacements of the anchors by each at a state without them.
 
     mesh: of `mesh_printed`, a half or a whole; paths: lattice nodes (h, 3) in mm of each; anchors (p, 3) in
     mm, nodes of the mesh; materials_of and model_of: a mesh's materials and model; settings: of Newton's
@@ -71,7 +71,7 @@ class PrintedWaveguides:
         return equilibrium.path([state.pressure_MPa for state in way], equilibrium.at_zero_pressure())
 
     def _near(self, equilibrium: Equilibrium, path: Array, state: State) -> State | None:
-        """A candidate's state near one of Model A, or None where there is none to be found."""
+        """A candidate's state near one of Model A, or None if none is found."""
         bent = started(self.mesh, equilibrium.model.mesh, path, state.u)
         start = eased(equilibrium, bent, state.u, EASED_CELLS * self.unit.printed.cell)
         return _near(equilibrium, start, state.pressure_MPa)
@@ -99,7 +99,7 @@ class PrintedWaveguides:
     def of_unit(self, number: int, state: State) -> Array:
         """Displacements (n, 3) in mm of the unit's own nodes in a candidate's state.
 
-        Where the waveguide thickens struts, their surface as it is without it.
+        Where the waveguide thickens struts, of their surface without it.
         """
         count = len(self.mesh.nodes)
         mesh = self._mesh(self.paths[number])
@@ -123,7 +123,7 @@ class PrintedWaveguides:
 
 
 def _near(equilibrium: Equilibrium, start: Array, pressure: float) -> State | None:
-    """The state at a pressure in MPa near a start (m, 3) in mm, or None where there is none to be found."""
+    """State at a pressure in MPa near a start (m, 3) in mm, or None if none is found."""
     touch = equilibrium.model.self_contact
     # What has passed through itself can only come back the way it went.
     if touch is None or not touch.intersects(start):

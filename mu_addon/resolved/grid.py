@@ -1,4 +1,4 @@
-"""Quadratic tetrahedra of a grid of boxes, of which some may be left out."""
+"""Quadratic tetrahedra of a grid of boxes, some of which may be left out."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ _SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 
 def box_grid(points: Array, solid: Array) -> Mesh:
     """Straight quadratic tetrahedra of a grid's boxes, which may be oblique.
 
-    points (a, b, c, 3): the grid in mm; solid (a - 1, b - 1, c - 1): which boxes there are. Nothing is
-    clamped.
+    points (a, b, c, 3): the grid in mm; solid (a - 1, b - 1, c - 1): mask of the boxes. Nothing is clamped.
     """
     number = np.arange(points[..., 0].size).reshape(points.shape[:3])
     points = points.reshape(-1, 3)

@@ -1,6 +1,6 @@
-"""Where struts meet they are stiffer than beams: zones about a joint that do not stretch, or do not bend.
+"""Joints of struts, stiffer than beams, as rigid zones in stretch and in bending.
 
-In an endless lattice of half diagonals under small strain, joints move with the mean strain and do not turn.
+In an infinite lattice of half diagonals under small strain, joints move with the mean strain and do not turn.
 Let k_a and k_t be the stiffness of a half diagonal along and across it, its ends not turning, and h half a
 cell. Then C44 = (k_a/3 + k_t/6)/h and (C11 - C12)/2 = k_t/(2 h). The solid cell gives k_a and k_t, and these
 the lengths of both zones. The bulk modulus is then k_a/(3 h); its error is kept.
@@ -36,8 +36,8 @@ FEWER = ((4, 0.704), (2, 0.362), (1, 0.0))
 class Zones:
     """Rigid zones about a joint in junction diameters: in stretch, and in bending, twist and shear.
 
-    fewer: factor of the latter where a number of struts meets, 1 where none is given. bulk_error: of the
-    endless lattice's bulk modulus with these zones, against the solid cell's.
+    fewer: factor of the latter by the number of struts that meet, 1 where none is given. bulk_error: of the
+    infinite lattice's bulk modulus with these zones, against the solid cell's.
     """
 
     stretch: float
@@ -88,11 +88,11 @@ class _Strut:
 
     @property
     def length(self) -> float:
-        """From the cell's corner to its centre."""
+        """Length from the cell's corner to its centre."""
         return math.sqrt(3.0) / 2
 
     def _sections(self, zone: float) -> tuple[Array, Array, Array]:
-        """Places, radii and weights along what lies between rigid zones."""
+        """Positions, radii and weights along the part between rigid zones."""
         x, w = np.polynomial.legendre.leggauss(64)
         span = self.length - 2 * zone
         s = zone + span * (1 + x) / 2
@@ -108,7 +108,7 @@ class _Strut:
         return float(1 / (w / (np.pi * r**2)).sum())
 
     def across(self, zone: float) -> float:
-        """Stiffness in N/mm against an offset of the ends, which do not turn."""
+        """Stiffness in N/mm against a relative offset of the ends, which do not turn."""
         s, r, w = self._sections(zone)
         inertia, shear = np.pi * r**4 / 4, SHEAR_FACTOR / (2 * (1 + POISSON))
         lever = s - self.length / 2

@@ -1,4 +1,4 @@
-"""The struts of a unit: octants side by side in the envelope, as far as they lie outside the actuator."""
+"""Struts of a unit: octants side by side in the envelope, as far as they lie outside the actuator."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def strut_volume_mm3(unit: Unit, body: Body | None = None) -> float:
 
 
 def cuts(d: Dimensions, body: Body | None) -> list[Depth]:
-    """What the struts end at: functions of points (n, 3) in mm, positive (n,) where the struts remain."""
+    """Boundaries of the struts: functions of points (n, 3) in mm, positive (n,) where the struts remain."""
     found: list[Depth] = [lambda points: clearance(d, points)]
     if body is not None:
         surface = Surface(body.vertices, body.triangles)
@@ -122,10 +122,10 @@ def clearance(d: Dimensions, points: Array) -> Array:
 
 
 def filled_outside(mesh: Mesh, kept: list[Depth], drop: bool = True) -> Mesh:
-    """The mesh with the shares of its elements' volume where every function of `kept` is positive.
+    """The mesh with the filled shares of its elements' volume: where every function of `kept` is positive.
 
-    kept: of points (n, 3) in mm, (n,) each. Elements of which nothing is left go, with their nodes, unless
-    `drop` is off.
+    kept: of points (n, 3) in mm, (n,) each. Elements without a filled share are removed with their nodes,
+    unless `drop` is off.
     """
     at = even_points(_STEPS)
     own = at.argmax(axis=1)  # the quadrature point that each is nearest to

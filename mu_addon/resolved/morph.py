@@ -1,8 +1,8 @@
-"""The mesh of a slightly different printed unit: the same elements, their nodes, ties and shares moved.
+"""The mesh of a slightly different printed unit: same elements, with nodes, ties and shares moved.
 
-The wall's grid goes to its exact new place. Struts stay where they are, or are swept again with another
-radius. Nodes of struts hold onto the wall at the same places of it, with weights continued to first order;
-and of an element that the wall's profile cuts, the share outside changes as the profile moves through it.
+The wall's grid moves to its exact new position. Struts stay, or are swept again with another radius. Tied
+nodes of struts keep their position in the wall, with weights continued to first order. For an element that
+the wall's profile cuts, the share outside changes as the profile moves through it.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _BLUR = 1.0
 
 
 class PrintedMorph:
-    """Moves the mesh that `mesh_printed` made of a unit to other units near to it.
+    """Moves the mesh that `mesh_printed` made of a unit to similar units.
 
-    What depends on the mesh alone is done once.
+    Work that depends on the mesh alone is done once.
     """
 
     def __init__(self, mesh: Mesh, drawn: Unit, settings: MeshSettings, body: Body | None = None) -> None:
@@ -62,8 +62,8 @@ class PrintedMorph:
     def to(self, other: Unit, checked: bool = True) -> Mesh:
         """The mesh moved to the unit `other`, of as many chambers and cells of the same kind.
 
-        Another cell or scale first scales all of it. checked: whether elements are looked at for inversion.
-        Raises InputError for struts that cannot be swept again, and MeshingError otherwise.
+        Another cell or scale first scales all of it. checked: test elements for inversion. Raises InputError
+        for struts that cannot be swept again, and MeshingError otherwise.
         """
         mesh, a, b = self.mesh, self.drawn.printed, other.printed
         if a == b:
@@ -113,7 +113,7 @@ class PrintedMorph:
         return d if self._body is None else covering(d, self._body)
 
     def _cut_elements(self, d: Dimensions) -> tuple[Array, Array]:
-        """Elements (k,) that the wall's profile cuts, and which of their points a body leaves (k, p)."""
+        """Elements (k,) that the wall's profile cuts, and a mask (k, p) of their points outside a body."""
         mesh = self.mesh
         of_struts = np.flatnonzero((mesh.tets >= self._count).any(axis=1))
         at = mesh.nodes[mesh.tets[of_struts]]

@@ -1,4 +1,4 @@
-"""Struts that are not all alike, octant by octant: graded ones, and those that a waveguide meets."""
+"""Struts that differ from octant to octant: graded ones, and those that a waveguide meets."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _SLACK = 1e-9
 
 
 def is_thickening(d: Dimensions, bar: Bar) -> bool:
-    """Whether a waveguide thickens any of the struts that it meets."""
+    """Return True if a waveguide thickens any of the struts that it meets."""
     return bool(_raised(lattice_of(d), bar).any())
 
 
 def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
-    """Nodes (n, 3) in mm of a lattice's struts where the struts that a waveguide meets are as thick as drawn.
+    """Nodes (n, 3) in mm of a lattice's struts, with those that a waveguide meets thickened as drawn.
 
     The struts are half diagonals of their cells, each alone in its octant (`strut_mesh`). Nodes between
-    octants take the mean of their places in those whose struts are thickened.
+    octants take the mean of their positions in the thickened ones.
     """
     lattice, plain = lattice_of(d), radius_of(d)
     moved, count = np.zeros_like(nodes), np.zeros(len(nodes))
@@ -51,7 +51,7 @@ def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
 
 
 def graded_nodes(d: Dimensions, nodes: Array) -> Array:
-    """Nodes (n, 3) in mm of a lattice's struts that are alike everywhere where graded struts have them.
+    """Nodes (n, 3) in mm of uniform struts moved to those of graded ones.
 
     As `SweptNodes` moves them. Raises InputError for struts that fill their cell.
     """
@@ -68,7 +68,7 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
 
 
 class Places(NamedTuple):
-    """Nodes (p,), struts (p,) that they belong to, and where in these they lie (`strut.placed`)."""
+    """Nodes (p,), the struts (p,) they belong to, and their coordinates in these (`strut.placed`)."""
 
     node: Array
     strut: Array
@@ -78,9 +78,9 @@ class Places(NamedTuple):
 class SweptNodes:
     """Nodes (n, 3) in mm of the struts of a lattice of half diagonals, to be swept again with other radii.
 
-    Each node keeps its place along its octant's strut and, in radii, across it. Nodes between octants take
-    the mean of their places in them: struts that meet have one radius at their node and nearly so beside it,
-    so that these are within rounding of each other but for steep gradings.
+    Each node keeps its position along its octant's strut and, in radii, across it. Nodes between octants take
+    the mean of their positions in them: struts that meet have one radius at their node and nearly so beside
+    it, so that these are within rounding of each other but for steep gradings.
     """
 
     def __init__(self, lattice: Lattice, nodes: Array) -> None:
@@ -98,11 +98,11 @@ class SweptNodes:
 
     @property
     def places(self) -> Places:
-        """Where each node lies in its strut."""
+        """Coordinates of each node in its strut."""
         return Places(self._node, self._strut, self._places)
 
     def strut_of(self, points: Array) -> Array:
-        """The strut (p,) in whose octant each of some points (p, 3) in mm lies; none of them between two."""
+        """Strut (p,) in whose octant each of some points (p, 3) in mm lies; no point may lie between two."""
         found = np.full(len(points), -1)
         point, strut = _octants_of(self._lattice, points)
         found[point] = strut
@@ -126,7 +126,7 @@ class SweptNodes:
         return np.asarray(self._nodes + mean)
 
     def _changed(self, other: Lattice) -> Array:
-        """Whether each strut (E,) has other radii."""
+        """Mask (E,) of struts with other radii."""
         own = self._lattice
         sizes = [(x.junction_radius, x.midspan_radius, x.growth) for x in (own, other)]
         if sizes[0] != sizes[1]:
@@ -183,7 +183,7 @@ def _thicker(one: Lattice, met: Array, half: float) -> Radius:
 
 
 def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
-    """Whether points (n, 3) in mm lie in the octant of a strut whose place the waveguide takes, (n,)."""
+    """Return a mask (n,) of points (n, 3) in mm in the octant of a strut that the waveguide replaces."""
     lattice = lattice_of(d)
     found = np.zeros(len(points), bool)
     for strut in np.flatnonzero(bar.replaced).tolist():
@@ -192,13 +192,13 @@ def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
 
 
 def _raised(lattice: Lattice, bar: Bar) -> Array:
-    """Whether each strut (E,) is thicker somewhere beside a waveguide than without it."""
+    """Return a mask (E,) of struts that are thicker somewhere beside a waveguide than without it."""
     more = strut_radii(lattice, bar.met, bar.half, _STATIONS) - lattice.radii(_STATIONS)
     return np.asarray((more > 1e-9 * lattice.cell).any(axis=1))
 
 
 def _octant(lattice: Lattice, strut: int, points: Array) -> tuple[Array, Array, Array]:
-    """Numbers (k,) of points in a strut's octant, its corner (3,) in mm and signs of its way inward."""
+    """Numbers (k,) of points in a strut's octant, its corner (3,) in mm and signs of the direction inward."""
     first, second = lattice.struts[strut]
     corner, centre = (first, second) if lattice.is_corner[first] else (second, first)
     low, high = np.sort(lattice.nodes[[corner, centre]], axis=0)

@@ -1,9 +1,9 @@
-"""What any printed waveguide does to a unit, without solving for it: bars between joints of the lattice.
+"""First-order response of a unit to any printed waveguide: bars between joints of the lattice.
 
-A waveguide holds on to the lattice at the joints of its path. Model A's tangent answers forces and couples on
-every joint; a path is a chain of straight bars between joints that have moved and turned as in Model A, each
-with six ways to deform, less the struts whose place they take. That is of first order about Model A; seats,
-and thickened struts are left out, and joints are rigid.
+A waveguide is held by the lattice at the joints of its path. Model A's tangent gives the response to forces
+and couples on every joint. A path is a chain of straight bars between joints displaced and rotated as in
+Model A, each with six modes of deformation, less the struts it replaces. The response is of first order about
+Model A; seats and thickened struts are left out, and joints are rigid.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def bar_response(
 
 
 def _around(mesh: Mesh, node: Array, d: Dimensions) -> Array:
-    """Nodes (k,) of struts that a bar's end at a lattice node (3,) holds on to."""
+    """Nodes (k,) of struts that hold a bar's end at a lattice node (3,)."""
     near = np.linalg.norm(mesh.nodes - node, axis=1) < _reach(d)
     near[mesh.tied] = False
     near[mesh.tets[mesh.region != LATTICE]] = False
@@ -128,11 +128,11 @@ def _frame(way: Array) -> Array:
 def _moved_joints(
     mesh: Mesh, points: Array, joints: list[Array], u: Array
 ) -> tuple[Array, Array, sparse.csr_matrix]:
-    """Places (j, 3) in mm and rotations (j, 3, 3) of joints in a state, and the loads (3 n, 6 j) on them.
+    """Positions (j, 3) in mm and rotations (j, 3, 3) of joints in a state, and the loads (3 n, 6 j) on them.
 
-    A joint moves by the mean of its nodes and turns as fits them best (Kabsch); its loads, forces and couples
-    along x, y and z, are spread over them so that they work on just that motion. points (j, 3): joints in mm
-    at rest.
+    A joint moves by the mean of its nodes and rotates by their best fit (Kabsch); its loads, forces and
+    couples along x, y and z, are spread over them so that their work is on that motion. points (j, 3): joints
+    in mm at rest.
     """
     place, turn = np.zeros((len(joints), 3)), np.zeros((len(joints), 3, 3))
     rows, columns, values = [], [], []
@@ -158,7 +158,7 @@ def _moved_joints(
 
 
 def _natural(frame: Array, length: float, place: Array, turn: Array) -> tuple[Array, Array]:
-    """How a bar deforms between two joints (6,), and its slopes (6, 12) by their motions.
+    """Deformation (6,) of a bar between two joints, and its derivatives (6, 12) by their motions.
 
     Elongation in mm, twist, then the turns of both ends from the chord about the second axis and about the
     third. frame (3, 3): the bar's axes at rest as rows; place (2, 3) in mm and turn (2, 3, 3) of the joints,
@@ -208,7 +208,7 @@ def _bar_stiffness(d: Dimensions, modulus: float, poisson: float, length: float)
 def _strut_stiffness(
     d: Dimensions, modulus: float, poisson: float, length: float, first: float = 1.0, last: float = 1.0
 ) -> Array:
-    """As `_bar_stiffness`, of a round strut with these factors of a grading at its ends."""
+    """Stiffness as of `_bar_stiffness`, of a round strut with these factors of a grading at its ends."""
     t = _clear(d, length)
     r = radius_of(d)(t)
     if (first, last) != (1.0, 1.0):
@@ -218,7 +218,7 @@ def _strut_stiffness(
 
 
 def _clear(d: Dimensions, length: float) -> Array:
-    """Places (s,), as shares of the length in mm, where a step bends: between its joints."""
+    """Positions (s,), as shares of the length in mm, where a step bends: between its joints."""
     joint = _reach(d) / length
     return np.linspace(joint, 1.0 - joint, _STATIONS)
 

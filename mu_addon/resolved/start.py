@@ -1,4 +1,4 @@
-"""Displacements to begin with: a unit's own state, and the waveguide bent through the joints of its path."""
+"""Start of Newton's method: a unit's own state, and the waveguide bent through the joints of its path."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def mean_gradients(mesh: Mesh, u: Array, nodes: Array) -> Array:
 
 
 def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
-    """Displacements (m, 3) in mm of a mesh with a waveguide, of those of the unit without it, u (n, 3).
+    """Displacements (m, 3) in mm of a mesh with a waveguide, from those of the unit without it, u (n, 3).
 
     unit, mesh: of `mesh_printed` and `with_waveguide`; path (h, 3): the waveguide's lattice nodes in mm.
     Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes
@@ -78,13 +78,13 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
 
 
 def eased(equilibrium: Equilibrium, start: Array, u: Array, reach_mm: float = np.inf) -> Array:
-    """A start (m, 3) in mm of `started` whose struts give way to the waveguide that they hang on.
+    """A start (m, 3) in mm of `started`, relaxed so that struts fit the waveguide that they are tied to.
 
-    equilibrium: of the unit with its waveguide; u (n, 3): the unit's own state in mm. Struts' nodes that
-    follow bar or seats have left what is around them, by tenths of a millimetre where the unit is bent
-    far, and elements there may be inverted. The rest of the unit moves as it would, were it linear and
-    undeformed, with the waveguide held where it is, and all that is farther from it than reach_mm as drawn:
-    walls and struts that touch there would cross.
+    equilibrium: of the unit with its waveguide; u (n, 3): the unit's own state in mm. In `started`, struts'
+    nodes that follow bar or seats move away from their neighbours, by tenths of a millimetre at large
+    bending, and elements there may be inverted. Here the unit moves as a linear, undeformed one would. The
+    waveguide is held, and so is all that is farther from it than reach_mm as drawn: walls and struts that
+    touch there would cross.
     """
     from scipy.spatial import cKDTree
 
@@ -109,7 +109,7 @@ def eased(equilibrium: Equilibrium, start: Array, u: Array, reach_mm: float = np
 
 
 def _bent(unit: Mesh, path: Array, u: Array, points: Array) -> Array:
-    """Places (k, 3) in mm of points (k, 3) of a waveguide, bent with the joints of its path (h, 3)."""
+    """Positions (k, 3) in mm of points (k, 3) of a waveguide, bent with the joints of its path (h, 3)."""
     from scipy.spatial.transform import Rotation, Slerp
 
     joints = numbers_of(unit, path)
@@ -148,8 +148,8 @@ def _no_shorter(points: Array, length: Array) -> Array:
 def _turns(around: Array, way: Array, bent: Array) -> Array:
     """Rotations (h, 3, 3) of a path's joints: those that fit the legs before and after best.
 
-    way, bent (h - 1, 3): legs at rest and deformed; around (h, 3, 3): deformation gradients of what is around
-    the joints, which decide about the axes of straight legs alone. By Kabsch's method.
+    way, bent (h - 1, 3): legs at rest and deformed; around (h, 3, 3): deformation gradients around the
+    joints, used only for the rotation about straight legs. By Kabsch's method.
     """
     scale = np.linalg.norm(way, axis=1)[:, None, None] ** 2
     leg = bent[:, :, None] * way[:, None, :] / scale

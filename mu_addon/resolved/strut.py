@@ -30,7 +30,7 @@ _CLOSE = 1e-15
 
 
 class Struts(Protocol):
-    """What of a unit's `Dimensions` its struts' mesh depends on, in mm."""
+    """The part of a unit's `Dimensions` that determines its struts' mesh, in mm."""
 
     @property
     def cell(self) -> float:
@@ -38,7 +38,7 @@ class Struts(Protocol):
 
     @property
     def kind(self) -> LatticeKind:
-        """Where struts run, and how their radius changes along them."""
+        """Course of the struts, and their radius along them."""
 
     @property
     def junction_diameter(self) -> float:
@@ -46,7 +46,7 @@ class Struts(Protocol):
 
     @property
     def midspan_diameter(self) -> float:
-        """Diameter half way."""
+        """Diameter at mid-span."""
 
 
 def strut_mesh(d: Struts, rings: int, layers: int) -> Mesh:
@@ -101,7 +101,7 @@ def strut_mesh(d: Struts, rings: int, layers: int) -> Mesh:
 
 
 def is_half_diagonal(d: Struts) -> bool:
-    """Whether the struts of a unit's lattice are the half diagonals of its cells."""
+    """Return True if the struts of a unit's lattice are the half diagonals of its cells."""
     return d.kind.is_half_diagonals
 
 
@@ -131,21 +131,21 @@ def disc(rings: int) -> tuple[Array, Array]:
 
 
 def radius_of(d: Struts) -> Radius:
-    """Radius of a unit's struts along them."""
+    """Radius of a unit's struts as a function of the position along them."""
     return lambda t: d.kind.radius(t, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
 
 
 def thickened(half: float, points: Array, law: Radius, other: Radius) -> Array:
-    """Points (n, 3) in mm of an octant's mesh where a strut of another radius has them.
+    """Points (n, 3) in mm of an octant's mesh, moved to those of a strut of another radius.
 
     half: edge of the octant [0, half]^3 in mm; law: the radius that the mesh was made with. Nodes keep their
-    place along the strut and, in radii, across it; those on the octant's planes stay on them.
+    position along the strut and, in radii, across it; those on the octant's planes stay on them.
     """
     return placed(half, other, places_of(half, law, points))
 
 
 def places_of(half: float, law: Radius, points: Array) -> Array:
-    """Places (n, 3) of points (n, 3) in mm of an octant, as `placed` takes them; law: the strut's radius."""
+    """Coordinates (n, 3), as for `placed`, of points (n, 3) in mm of an octant; law: the strut's radius."""
     along = points @ _ALONG
     across = ((points - along[:, None] * _ALONG) @ _ACROSS.T) / law(_fraction(half, along))[:, None]
     low, high = ends(half, law, across)
@@ -153,7 +153,7 @@ def places_of(half: float, law: Radius, points: Array) -> Array:
 
 
 def placed(half: float, law: Radius, at: Array, near: tuple[Array, Array] | None = None) -> Array:
-    """Points (n, 3) in mm of places (n, 3): two across the strut in radii, and 0 .. 1 from end to end.
+    """Points (n, 3) in mm of coordinates (n, 3): two across the strut in radii, and 0 .. 1 from end to end.
 
     law: of the radius at n fractions of the way; near: `ends` of a strut near to it.
     """
@@ -170,7 +170,7 @@ def ends(
 ) -> tuple[Array, Array]:
     """Both ends (n,) in mm of lines along the strut in its octant; across (n, 2): off its axis, in radii.
 
-    near: those of a strut near to it, from where few steps will do.
+    near: those of a similar strut, as a start that needs few steps.
     """
     length = half * math.sqrt(3.0)
     off = across @ _ACROSS

@@ -1,4 +1,4 @@
-"""Ties of several parts joined into one table, each to nodes that are tied to nothing themselves."""
+"""Ties of several parts joined into one table, each to nodes that are not tied themselves."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def tie(rows: Array, points: Array, to: Mesh, first: int = 0) -> Ties:
 
 
 def joined(parts: list[Ties], count: int) -> Ties:
-    """All ties of a body of `count` nodes, each node in one of them at most.
+    """All ties of a body of `count` nodes, each node tied once at most.
 
-    A node that follows tied ones follows what these do: weights multiply. Chains are two ties long at most.
+    A node that follows tied ones follows their nodes: weights multiply. Chains are two ties long at most.
     """
     width = max(part.to.shape[1] for part in parts)
     padded = [(part, width - part.to.shape[1]) for part in parts]

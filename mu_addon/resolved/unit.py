@@ -1,4 +1,4 @@
-"""The mesh of a printed unit: its wall, and its struts tied to it."""
+"""Mesh of a printed unit: its wall, and its struts tied to it."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from .strut import is_half_diagonal
 Progress = Callable[[str, float], None]
 
 TIE_MM = 0.1
-"""Struts' nodes this near the wall outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
+"""Struts' nodes this near the wall's outside are tied to it, too, for a cell of 12.5 mm at a refinement of 1.
 
-Nodes within the wall alone leave it free to dent between them: three chambers then bend by 5 to 10 % more
-than in a mesh that joins both (docs/engineering/method.md). The distance shrinks with the elements.
+Ties of nodes within the wall alone leave it free to dent between them: three chambers then bend by 5 to 10 %
+more than in a mesh that joins both (docs/engineering/method.md). The distance shrinks with the elements.
 """
 
 
@@ -67,7 +67,7 @@ def mesh_of(
     cache: Path | None = None,
     body: Body | None = None,
 ) -> Mesh:
-    """The unit's analysis mesh of the fidelity that the settings ask for: `mesh_printed` or `mesh_unit`.
+    """Analysis mesh of a unit by the fidelity of the settings: `mesh_printed` or `mesh_unit`.
 
     Raises InputError and MeshingError.
     """
@@ -131,7 +131,7 @@ def mesh_printed(
 
 
 def wall_grid(d: Dimensions, sizes: Sizes) -> WallGrid:
-    """The grid of a unit's wall and caps at x >= 0."""
+    """Grid of a unit's wall and caps at x >= 0."""
     scale = d.cell / CELL_MM
     return WallGrid(
         d,
@@ -157,11 +157,12 @@ def wall_of(found: Membrane, d: Dimensions) -> Mesh:
 
 
 def tied(wall: Mesh, lattice: Mesh, clear_mm: Array) -> Mesh:
-    """One mesh of a wall and of struts, whose nodes inside it move as the wall does there.
+    """Mesh of a wall and of struts, whose nodes inside it follow the wall.
 
-    clear_mm (n,): distance of the struts' nodes from where they are tied, negative within. Beyond the wall's
-    inner face and just outside it, its displacement is continued with its gradient (`embed`). Nodes of which
-    next to nothing is filled are tied, too. Struts in the plane of the wall's base are clamped with it.
+    clear_mm (n,): distance of the struts' nodes from the region where they are tied, negative within. Beyond
+    the wall's inner face and just outside it, its displacement is continued with its gradient (`embed`).
+    Nodes with almost no filled volume around them are tied, too. Struts in the plane of the wall's base are
+    clamped with it.
     """
     within = np.flatnonzero((clear_mm <= 0) | (support(lattice) < LEAST_SUPPORT))
     follows = embed(wall, lattice.nodes[within])

@@ -1,4 +1,4 @@
-"""A printed waveguide in the mesh of a printed unit: bar, wells and seats in place of what they cut away."""
+"""A printed waveguide in the mesh of a printed unit: bar, wells and seats, and the struts they cut."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LEAST = 0.02
 
 
 def bar_of(unit: Unit, path: Window | ArrayLike, body: Body | None = None) -> Bar:
-    """The waveguide that is printed along a window of anchors or lattice nodes (n, 3) in mm, as printed.
+    """Waveguide along a window of anchors or lattice nodes (n, 3) in mm, as printed.
 
     body: a closed surface that cuts the lattice in place of its box. Raises InputError for a path that no
     waveguide fits, and for struts that it would thicken in a lattice that is not swept (`strut_mesh`).
@@ -49,10 +49,10 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     """The mesh of a printed unit with a waveguide, of `bar_of`.
 
     mesh: of `mesh_printed`, a half or a whole; its own nodes and elements come first, in their order. Nodes
-    of struts that the waveguide thickens are moved. What of the struts lies within bar or seats counts no
-    longer, nor do struts whose place the bar takes; their nodes there follow the bar, the seats are tied to
-    it likewise, and whatever lies within the wall follows the wall. Raises InputError for a half mesh of a
-    waveguide that is not its own mirror image, MeshingError where elements are inverted.
+    of struts that the waveguide thickens are moved. Parts of struts within bar or seats count no longer, nor
+    do struts that the bar replaces; their nodes there follow the bar, as the seats do, and nodes within the
+    wall follow the wall. Raises InputError for a half mesh of a waveguide that is not its own mirror image,
+    MeshingError where elements are inverted.
     """
     half = "x" in mesh.symmetry
     if half and not is_own_mirror_image(bar):
@@ -121,7 +121,7 @@ def _dimensions(unit: Unit, body: Body | None) -> Dimensions:
 
 
 def _thickened(mesh: Mesh, bar: Bar, d: Dimensions, body: Body | None) -> tuple[Mesh, Ties]:
-    """The mesh with struts as thick as the bar that they meet makes them, and its nodes' ties to the wall."""
+    """The mesh with struts thickened by the bar that they meet, and its nodes' ties to the wall."""
     before = Ties(mesh.tied, mesh.tied_to, mesh.tied_weights)
     if not is_thickening(d, bar):
         return mesh, before

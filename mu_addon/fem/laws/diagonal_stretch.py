@@ -1,4 +1,4 @@
-"""Stretch of struts along the diagonals of a cell, whose length is all but kept."""
+"""Stretch of struts along the diagonals of a cell, whose lengths hardly change."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def diagonal_stiffness(E: mat33, m: Any) -> mat99:
 class DiagonalStretch(Law):
     """W(E) = C/2 (tr E)^2, where tr E/3 is the mean Green strain along the four diagonals of a cube.
 
-    It resists what lengthens or shortens struts from a cell's centre to its corners, and so nothing that
-    keeps the sum of squared stretches: the volume may shrink under tension as under compression, as that of
-    a body-centred lattice does. In parallel with CubicShear of G = C it is four springs along the diagonals.
-    C adds to C11 and C12. Under compression from all sides the springs buckle: a companion with shear modulus
+    It resists changes of length of the struts from a cell's centre to its corners, but no deformation that
+    keeps the sum of squared stretches: the volume may shrink under tension as under compression, as that of a
+    body-centred lattice does. In parallel with CubicShear of G = C it is four springs along the diagonals. C
+    adds to C11 and C12. Under compression from all sides the springs buckle: a companion with shear modulus
     mu keeps the body elliptic up to a trace of about -mu/C.
     """
 

@@ -1,4 +1,4 @@
-"""Compressible foam, stiffer or softer in tension than in compression."""
+"""Compressible foam, with different stiffness in tension and in compression."""
 
 from __future__ import annotations
 
@@ -95,16 +95,16 @@ def foam_difference(stretch: vec3, m: Any) -> vec3:
 
 
 class Foam(Law):
-    """Ogden-Storakers foam whose principal stretches above 1 and below 1 have moduli of their own.
+    """Ogden-Storakers foam with separate moduli for principal stretches above and below 1.
 
     W = sum over principal stretches a of 2 mu/alpha ((a^alpha - 1)/alpha - ln a), with mu and alpha of
-    tension for a >= 1 and of compression for a < 1, + lambda/gamma (ln J + (J^-gamma - 1)/gamma). With one
-    mu and alpha, and gamma = alpha beta, lambda = 2 mu beta, this is the hyperfoam of one term.
+    tension for a >= 1 and of compression for a < 1, + lambda/gamma (ln J + (J^-gamma - 1)/gamma). With one mu
+    and alpha, and gamma = alpha beta, lambda = 2 mu beta, this is the hyperfoam of one term.
 
-    Energy and stress are continuous; the tangent is where mu of tension and compression agree, and else
-    jumps by a finite amount where a principal stretch passes 1. lambda is the first Lame constant (0: no
-    lateral strain). A large alpha in compression gives a plateau. Meant for open lattices from about 0.4
-    to 1.5. Source: Storakers, J. Mech. Phys. Solids 34 (1986) 125.
+    Energy and stress are continuous; the tangent is where mu of tension and compression agree, and else jumps
+    by a finite amount where a principal stretch passes 1. lambda is the first Lame constant (0: no lateral
+    strain). A large alpha in compression gives a plateau. Meant for open lattices from about 0.4 to 1.5.
+    Source: Storakers, J. Mech. Phys. Solids 34 (1986) 125.
     """
 
     name = "foam"

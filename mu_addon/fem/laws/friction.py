@@ -21,7 +21,7 @@ _history = wp.types.vector(length=6, dtype=wp.float64)
 
 @wp.func
 def _elastic(E: mat33, m: Any) -> mat33:
-    """Deviator of the strain less what has slid."""
+    """Deviator of the elastic strain: the strain less the plastic one."""
     return E - (THIRD * wp.trace(E)) * wp.identity(3, dtype=f64) - symmetric_at(m, 2)
 
 

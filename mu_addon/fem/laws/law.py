@@ -1,4 +1,4 @@
-"""What every law gives."""
+"""Interface of every law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the layers of a print add to an isotropic law: stiffness along them, or across, at any strain."""
+"""Anisotropy of a print's layers added to an isotropic law: stiffness along or across them, at any strain."""
 
 from __future__ import annotations
 

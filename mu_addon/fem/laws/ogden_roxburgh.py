@@ -1,4 +1,4 @@
-"""Ogden-Roxburgh softening of a Yeoh law: rubber is softer below the largest strain it has seen."""
+"""Ogden-Roxburgh softening of a Yeoh law: rubber is softer below the largest strain it has reached."""
 
 from __future__ import annotations
 

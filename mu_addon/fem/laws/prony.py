@@ -31,7 +31,7 @@ def _decay(branch: int, m: Any) -> wp.float64:
 
 @wp.func
 def _gain(branch: int, m: Any) -> wp.float64:
-    """What a branch keeps of a stress that grew evenly over the step: beta (1 - e^-x)/x, x = dt/tau."""
+    """Share of a stress increment, uniform in a step, that a branch keeps: beta (1 - e^-x)/x, x = dt/tau."""
     x = m[_DT] / m[5 + 2 * branch]
     share = f64(1.0)
     if x > f64(1.0):
@@ -44,7 +44,7 @@ def _gain(branch: int, m: Any) -> wp.float64:
 
 @wp.func
 def _instant(m: Any) -> wp.float64:
-    """The step's stiffness over the long-term one."""
+    """Stiffness of the step over the long-term stiffness."""
     total = f64(1.0)
     for i in range(wp.static(_BRANCHES)):
         total += _gain(i, m)
@@ -53,7 +53,7 @@ def _instant(m: Any) -> wp.float64:
 
 @wp.func
 def _remembered(m: Any) -> mat33:
-    """The branches' second Piola-Kirchhoff stress if the elastic one went back to none in this step."""
+    """Second Piola-Kirchhoff stress of the branches if the elastic stress returned to 0 in this step."""
     H = mat33()
     for i in range(wp.static(_BRANCHES)):
         H += _decay(i, m) * symmetric_at(m, _FIRST + 6 + 6 * i) - _gain(i, m) * symmetric_at(m, _FIRST)

@@ -1,4 +1,4 @@
-"""What parameters a law admits: errors that name the parameter, its value and what to do."""
+"""Checks of a law's parameters: errors name the parameter, its value and the remedy."""
 
 from __future__ import annotations
 
