@@ -1,4 +1,4 @@
-"""Whether a gauge that is not straight explains more than the effects that were chosen."""
+"""Test of whether a curved gauge explains more than the chosen effects."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ ONE_EFFECT = 9.2
 
 
 def curved_reading(fitter: Fitter, base: Fit, chosen: Fit) -> str:
-    """Which readings, were they a curved function of what is read, would explain more than effects do.
+    """Readings that would explain more than the effects if their gauge were curved, in words; else empty.
 
-    In words, empty where none would. Of a channel's prediction y without effects the reading is taken as
-    y + a |y| + b y**2: another slope on either side of zero, and a slope that changes. Both sizes are fitted
-    with the nuisances, and compared with the chosen effects by Akaike's criterion; several effects that act
-    on one curve imitate most others.
+    A channel's reading is taken as y + a |y| + b y**2 of its prediction y without effects: a change of slope
+    at zero, and one with size. Both sizes are fitted with the nuisances, and compared with the chosen effects
+    by Akaike's criterion; several effects that act on one curve imitate most others.
     """
     if chosen is base:
         return ""

@@ -1,7 +1,7 @@
-"""What was done to a specimen, freed of the noise of the gauge that read it.
+"""Drives of a specimen, freed of the noise of the gauge that read them.
 
-A model is driven by readings. Taken as they are, whatever smooths them (friction, a lag, a clock that is off)
-would predict better than the model that is right, and be named for it: errors in variables.
+A model is driven by readings. Noise in them (errors in variables) favours any effect that smooths them, such
+as friction, a lag or a clock offset, over the right model.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _widest(time_s: Array, values: Array, sd: float, before: bool, after: bool) 
 
 
 def _lines(time_s: Array, values: Array, before: int, after: int) -> tuple[Array, Array]:
-    """Least-squares lines' values (n,) at each sample over so many samples around it, and variances."""
+    """Values (n,) of least-squares lines at each sample over so many samples around it, and variances."""
     n = len(values)
     first = np.maximum(np.arange(n) - before, 0)
     last = np.minimum(np.arange(n) + after, n - 1) + 1
@@ -115,9 +115,9 @@ def denoised_drives(
 
     Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
     `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, denoised
-    again: what a model driven by the copy misses of data made with the first list is due to the gauge's noise
-    alone. A drive in steps of a display is freed of them (`between_steps`), and its copy is as it was read.
-    None in its place where no drive is noisy.
+    again, so that the misfit of a model driven by it to data made with the first list is due to the gauge's
+    noise alone. A drive in steps of a display is freed of them (`between_steps`), and its copy stays as read.
+    The copy is None where no drive is noisy.
     """
     rng = np.random.default_rng(0)
     found, again = [], []

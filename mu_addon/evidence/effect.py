@@ -1,4 +1,4 @@
-"""Effects a model may lack: each a mechanism with parameters that leave the model as it is at their null."""
+"""Effects a model may lack: mechanisms with parameters that leave the model unchanged at their null."""
 
 from __future__ import annotations
 
@@ -197,11 +197,11 @@ class Parameter:
     """A parameter of a model that can be fitted: unit, bounds, source, and `null`, where it has no effect.
 
     low, high, null and starts are in `unit`. starts: values from which a fit begins. linear: the prediction
-    is affine in it, with one slope whatever the other values are. spread: standard deviation of what is known
-    before any data, in `unit`; inf where nothing is. experiment: name of the only experiment whose prediction
-    depends on it; empty where any may. plausible: what a real specimen may have, in `unit`; a value beyond is
-    a sign that the data are not what their columns say. Raises InputError where low is not below high, or the
-    null or a start is out of bounds.
+    is affine in it, with one slope whatever the other values are. spread: standard deviation of prior
+    knowledge, in `unit`; inf without any. experiment: name of the only experiment whose prediction depends on
+    it; empty where any may. plausible: range for a real specimen, in `unit`; a value beyond suggests that a
+    column's unit or sign is wrong. Raises InputError where low is not below high, or the null or a start is
+    out of bounds.
     """
 
     name: str
@@ -254,11 +254,10 @@ class Effect:
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
     mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
-    experiment that has it, "specimen B"; empty where all have. among: what differs in it, "specimen",
-    each with a parameter of its own; spread: their standard deviation, in the parameters' unit, with its 95 %
-    interval. refines: a law with more freedom than another one of its name, fitted only in that one's place.
-    tried: how many alternatives its starts were the best of, in the data themselves. Raises InputError for a
-    name not in `LIBRARY`.
+    experiment that has it, "specimen B"; empty for all. among: owners with separate sizes, "specimen";
+    spread: their standard deviation, in the parameters' unit, with its 95 % interval. refines: a law with
+    more freedom than another one of its name, fitted only in its place. tried: number of alternatives in the
+    data that its starts were chosen from. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -298,7 +297,7 @@ class Effect:
 
     @property
     def title(self) -> str:
-        """Its name, and whose it is."""
+        """Its name, with its specimen or experiment if it belongs to one."""
         if self.among:
             return f"{self.name} among {self.among}s"
         return f"{self.name}{OF}{self.whose}" if self.whose else self.name

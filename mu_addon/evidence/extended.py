@@ -1,4 +1,4 @@
-"""The extended model: effects that were named, as a file that simulations accept."""
+"""The extended model: named effects, as a file that simulations accept."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Fitted:
 
 @attrs.frozen
 class ExtendedModel:
-    """The parameters that a verdict leaves for simulations: of effects by effect and name, nuisances by name.
+    """Fitted parameters of a verdict for simulations: of effects by effect and name, nuisances by name.
 
     verdict: kind of the verdict, one of `verdict.KINDS`. lattice: response of the printed lattice to a print
     offset, from virtual tests; None where a power law of slender struts was used.
@@ -79,11 +79,10 @@ class ExtendedModel:
 
 
 def stacked(before: ExtendedModel, found: ExtendedModel) -> ExtendedModel:
-    """A model with what was found before, and what a later diagnosis that started from it found.
+    """A model joined with the results of a later diagnosis that started from it.
 
-    A mechanism that is found in another kind of experiment, by parameters of its own, keeps the earlier ones
-    beside them. Later values of nuisances, and a later response of the lattice, take the place of earlier
-    ones.
+    A mechanism that is also found in another kind of experiment, with other parameters, keeps the earlier
+    ones. Later values of nuisances, and a later response of the lattice, take the place of earlier ones.
     """
     names = dict.fromkeys((*before.effects, *found.effects))
     return ExtendedModel(
@@ -103,7 +102,7 @@ def _numbers(f: Fitted) -> dict[str, float | str]:
 
 
 def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:
-    """The model that a verdict leaves: the base with the named effects, or alone where none is named.
+    """The model of a verdict: the base with the named effects, or alone where none is named.
 
     units: of the nuisances, by name; empty where one is missing. Intervals are the verdict's 95 % ones, nan
     where it has none.

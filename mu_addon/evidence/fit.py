@@ -68,7 +68,7 @@ class Fit:
 
 
 def logarithmic(p: Parameter) -> bool:
-    """Whether a parameter is fitted by its logarithm: low and null positive, high more than 30 times low."""
+    """Return True if a parameter is fitted by its logarithm: low, null positive, high > 30 times low."""
     return p.low > 0 and p.high / p.low > 30 and p.null > 0
 
 
@@ -76,9 +76,9 @@ class Fitter:
     """Fits models to one record of N values by generalised least squares under given noise.
 
     sources: noise by group of series. kept (N,) bool: values that count, all by default. whitening: of the
-    record by these sources, where it is at hand. Attributes: curved, nuisances that are not linear; known,
-    those of them with prior knowledge; zeros_basis (N, z), orthonormal whitened columns that span what linear
-    nuisances (zeros of channels) can do.
+    record by these sources, if already computed. Attributes: curved, nuisances that are not linear; known,
+    those of them with prior knowledge; zeros_basis (N, z), orthonormal whitened columns that span the linear
+    nuisances (zeros of channels).
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class Fitter:
         return Fitter(self.record, self.simulator, self.sources, kept, self.whitening)
 
     def left_out(self, rows: Array, model: Fit) -> float:
-        """Chi squared of the values rows (N,) by a model fitted to the others; inf without prediction."""
+        """Chi squared of the values rows (N,) under a model fitted to the others; inf without prediction."""
         found = self.without(rows).fit(model.effects, model.values)
         predicted = self.possible(found.values)
         if predicted is None:
@@ -133,7 +133,7 @@ class Fitter:
         return w
 
     def project(self, columns: Array, zeros: bool = True) -> Array:
-        """Columns (N,) or (N, k) whitened and, if `zeros`, orthogonal to what linear nuisances can do."""
+        """Columns (N,) or (N, k) whitened and, if `zeros`, orthogonal to the linear nuisances."""
         w = self.whitened(columns)
         return w - self.zeros_basis @ (self.zeros_basis.T @ w) if zeros and self.zeros_basis.shape[1] else w
 
@@ -152,7 +152,7 @@ class Fitter:
         return found
 
     def under_its_own_noise(self, fit: Fit) -> tuple[Fitter, Fit]:
-        """A fitter with the noise that a fit's residual shows if it has no cause, and the fit redone by it.
+        """A fitter with the noise of a fit's residual, as if that had no cause, and the fit redone by it.
 
         Only a constant is set aside in each series (`noise.estimate`), and no more is noise than the readings
         show (`scatter.bounded`). Results are kept by fit.
@@ -301,7 +301,7 @@ class Fitter:
     def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
         """The fit of least chi squared among those from each of the starts (see `fit`), one or more.
 
-        One of infinite chi squared where no start has a prediction; `Composite.refused` then says why.
+        Of infinite chi squared where no start has a prediction; `Composite.refused` then says why.
         """
         found, why = [], ""
         for start in starts:
@@ -324,7 +324,7 @@ def _impossible(effects: Sequence[Effect], values: Mapping[str, float], n: int) 
 
 
 def _step(gram: Array, gradient: Array, damping: float, x: Array, low: Array, high: Array) -> Array:
-    """Damped Gauss-Newton step; coordinates at a bound that would leave it stand still."""
+    """Damped Gauss-Newton step; coordinates at a bound that it would leave stay fixed."""
     free = ~(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)))
     free &= np.diag(gram) > 0
     step = np.zeros_like(x)

@@ -1,4 +1,4 @@
-"""What zeros of a load cell, fitted test by test, take of an error that would be seen without them."""
+"""Zeros of a load cell, fitted test by test, that hide an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an extended model gains on experiments it has not seen, against three models that know no cause."""
+"""Gain of an extended model on unseen experiments, against three models without a cause."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ class Errors:
 class Gain:
     """Errors on the experiments that were fitted, and on those held out (None without any).
 
-    fit and held_out are of one quantity: the first that an effect is about and that is clearly served better,
-    an angle before markers. by_quantity: fitted and held-out errors of every group of series ("unit_pressure
-    angle"), None where nothing of it was held out. refused: why experiments that were held out are in none of
-    it, by their names: a model has no prediction for them.
+    fit and held_out are of one quantity: the first that an effect concerns and that clearly improves, an
+    angle before markers. by_quantity: fitted and held-out errors of every group of series ("unit_pressure
+    angle"), None where nothing of it was held out. refused: reasons, by name, why held-out experiments
+    without a prediction are left out.
     """
 
     fit: Errors
@@ -94,7 +94,7 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
 
 
 def _refusal(fitter: Fitter, experiment: Experiment, base: Fit, extended: Fit) -> str:
-    """Why a model of the gain has no prediction for an experiment; "" where all have one."""
+    """Return why a model of the gain has no prediction for an experiment; "" if all have one."""
     try:
         found = [fitter.simulator.predict(experiment, v) for v in (base.values, extended.values)]
     except MuError as error:
@@ -107,9 +107,10 @@ _CLEAR = 16.0
 
 
 def _best_served_group(base: Fit, extended: Fit, judged: Record) -> str:
-    """The first group of series of a kind that an effect is about and that is clearly served better.
+    """First group of series of a kind that an effect concerns and that clearly improves.
 
-    Others gain as well, where the modulus no longer makes up for what was missing. The first of all, if none.
+    Others improve as well, as the modulus no longer compensates the missing effect. The first of all, if
+    none.
     """
     gained = dict.fromkeys(judged.groups, 0.0)
     for s in judged.series:
@@ -195,7 +196,7 @@ def _permuted(fitter: Fitter, judged: Record, base: Fit, extended: Fit) -> Array
 
 
 def _black_box(fitter: Fitter, judged: Record, base: Fit, many: int) -> Array:
-    """The base with as many corrections of its response as the effects have parameters, of no meaning."""
+    """The base with as many arbitrary corrections of its response as the effects have parameters."""
     return _with_columns(
         fitter,
         judged,
@@ -206,7 +207,7 @@ def _black_box(fitter: Fitter, judged: Record, base: Fit, many: int) -> Array:
 
 
 def _corrections(fitter: Fitter, r: Record, base: Fit, many: int) -> Array:
-    """The base's response to its modulus times powers of what drives it, and of the time since its start."""
+    """The base's response to its modulus times powers of its drives, and of the time since its start."""
     plain = r.predict(fitter.simulator, base.values)
     response = np.ones(len(r))
     if fitter.curved:
@@ -228,7 +229,7 @@ def _corrections(fitter: Fitter, r: Record, base: Fit, many: int) -> Array:
 
 
 def _with_columns(fitter: Fitter, judged: Record, base: Fit, fitted: Array, applied: Array) -> Array:
-    """Prediction (N,) of the base plus columns whose sizes, with the nuisances', were fitted."""
+    """Prediction (N,) of the base plus columns, with sizes fitted together with the nuisances."""
     p = list(fitter.curved)
     plain = fitter.predict(base.values)
     tangent = [

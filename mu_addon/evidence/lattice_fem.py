@@ -1,4 +1,4 @@
-"""The lattice's own response to a print offset, from virtual tests of blocks of it between plates."""
+"""Response of the lattice itself to a print offset, from virtual tests of blocks of it between plates."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Block:
     poisson: float
 
     def key(self) -> str:
-        """Hash (32 hex digits) of all that the response depends on: cell, count, plates, mesh, offsets."""
+        """Hash (32 hex digits) of cell, count, plates, mesh and offsets: all that the response depends on."""
         cell = {a.name: getattr(self.cell, a.name) for a in attrs.fields(StrutCell) if a.name != "kind"}
         mesh = attrs.asdict(MESH)
         parts = [REVISION, self.cell.kind.name, cell, self.cells, self.plates, self.poisson]
@@ -160,7 +160,7 @@ def scalings(
     cache: Path | None = None,
     report: Progress = _silent,
 ) -> tuple[dict[str, Scaling], list[str]]:
-    """How stiffness and mass of each compressed block respond to printing, by name of the experiment.
+    """Response of each compressed block's stiffness and mass to printing, by name of the experiment.
 
     Also returns the modelling assumptions, in words. All moduli are relative to that of the first block as
     drawn at 1.0x; the unit's own print offset and skin come before any effect's. Experiments without a count

@@ -1,4 +1,4 @@
-"""Which point of the unit a marker sits on, and where that point goes."""
+"""Material points that markers sit on, and their motion."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Marker:
     """A marker's measured position at rest (3,), the material point (3,) that stands for it, both in mm.
 
     The frame is that of DESIGN section 2: z along the axis from the inlet, x = 0 the sagittal plane, +y the
-    side with more lattice. axes: coordinates that were measured; without x, the marker is taken to lie in
-    the sagittal plane. distance_mm: between the two, over the measured coordinates.
+    side with more lattice. axes: measured coordinates; without x, the marker is taken to lie in the sagittal
+    plane. distance_mm: between the two, over the measured coordinates.
     """
 
     number: int
@@ -68,7 +68,7 @@ def attached(mesh: Mesh, experiments: Sequence[Experiment], farthest_mm: float) 
 
 
 def _again(e: Experiment) -> dict[int, tuple[str, Array, str]]:
-    """As `at_rest` of one experiment, without those it does not show at rest."""
+    """Return `at_rest` of one experiment, without the markers it does not show at rest."""
     try:
         return at_rest([e])
     except InputError:
@@ -125,7 +125,7 @@ class MaterialPoints:
 
 
 def material_points(mesh: Mesh, points: Array) -> MaterialPoints:
-    """Material points at the places of a mesh nearest to `points` (p, 3), in mm.
+    """Material points at the positions of a mesh nearest to `points` (p, 3), in mm.
 
     The mesh may be a half or quarter of the unit; see `MaterialPoints`.
     """

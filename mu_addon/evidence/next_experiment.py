@@ -1,4 +1,4 @@
-"""Which experiment to make next: the one, of those a bench can make, that best separates what is left."""
+"""Choice of the next experiment: the one, of those a bench can make, that best separates the rivals."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def propose_experiment(
 
 
 def _divergence(fitter: Fitter, e: Experiment, models: Sequence[Any]) -> float:
-    """Least delta chi squared between two of the models in one experiment, nuisances as they were fitted."""
+    """Least difference in chi squared between two of the models in one experiment, nuisances held."""
     planned = record([e], fitter.simulator)
     if any(g not in fitter.sources for g in planned.groups):
         return 0.0
@@ -88,7 +88,7 @@ def _divergence(fitter: Fitter, e: Experiment, models: Sequence[Any]) -> float:
 
 
 def _variations(made: Sequence[Experiment]) -> list[Experiment]:
-    """Experiments made before, faster, slower, to higher pressure, under vacuum, or turned."""
+    """Variations of earlier experiments: faster, slower, to higher pressure, under vacuum, or turned."""
     found = []
     for e in made:
         if "time_s" not in e.columns or "pressure_kPa" not in e.columns:

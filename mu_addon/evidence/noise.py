@@ -72,10 +72,10 @@ class Whitening:
 
 @attrs.frozen(eq=False)
 class _Factor:
-    """Whitens rows (n, k): each over its scale, less what persists of the one before, solved by the band.
+    """Whitens rows (n, k): scales each, less the part carried over from the one before, solved by the band.
 
-    inverse (n,), carried (n - 1,): of scale, and of what persists. band (2, n): the covariance's factor with
-    ones on its diagonal, whose inverse is diagonal (n,).
+    inverse (n,), carried (n - 1,): of the scale, and of the part carried over. band (2, n): the covariance's
+    factor with ones on its diagonal, whose inverse is diagonal (n,).
     """
 
     inverse: Array
@@ -192,10 +192,10 @@ def estimate(record: Record, residual: Array, columns: Sequence[Array]) -> dict[
 
 
 def _rounded(source: Source, series: Sequence[Series]) -> Source:
-    """A source no smaller than what rounding to a gauge's steps does to its readings.
+    """A source no smaller than the rounding of readings to a gauge's steps.
 
-    A reading is off by up to half a step, evenly. Where it stays for several samples so does the error: it is
-    slow, for as long as readings stay on average.
+    Rounding errors are uniform within half a step. Where readings stay for several samples the error does
+    too: it is slow noise, with the mean length of such runs as its time.
     """
     white = max(source.white, *(s.step / math.sqrt(12.0) for s in series))
     staying = [s for s in series if s.stays > STAYS and not math.isnan(s.sample_s)]
@@ -246,9 +246,9 @@ def _estimate(
 
 
 def _pure_error(record: Record, series: Sequence[Series], residual: Array) -> float | None:
-    """Standard deviation of rows that repeat what was done to the digit; None without two such.
+    """Standard deviation of rows whose drives repeat to the digit; None without two such.
 
-    Few repeats tell it badly, so it is the bound that four in five such estimates keep below.
+    Few repeats estimate it badly, so the bound is taken that four in five such estimates keep below.
     """
     from scipy.stats import chi2
 
@@ -269,7 +269,7 @@ def _pure_error(record: Record, series: Sequence[Series], residual: Array) -> fl
 
 
 def _some(members: Sequence[int], most: int) -> list[int]:
-    """At most so many members, evenly from the first to the last."""
+    """Return at most so many members, spaced evenly from the first to the last."""
     chosen = np.unique(np.round(np.linspace(0, len(members) - 1, most)).astype(int))
     return [members[i] for i in chosen]
 
@@ -335,7 +335,7 @@ def _source(x: Array, sample_s: float, longest_s: float, size: float = 1.0) -> S
 
 
 def span(record: Record, signatures: Array) -> list[Array]:
-    """Orthonormal columns (b, k) for each series that span what causes, known or not, may do to it smoothly.
+    """Orthonormal columns (b, k) for each series that span the smooth changes by causes, known or not.
 
     signatures (N, m): changes of the prediction by effects and nuisances. Beside them stand a constant, a
     linear drift of timed series, and the harmonics of a cycle that the record repeats. Directions with less

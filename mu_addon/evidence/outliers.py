@@ -1,4 +1,4 @@
-"""Readings that stand out of what a fit leaves, where nothing else does: they decide no verdict."""
+"""Outlying readings of a fit whose residual is otherwise clean: they decide no verdict."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ NAME = "outlier"
 def without_outliers(
     experiments: Sequence[Experiment], fitter: Fitter, fit: Fit, tests: int
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without readings whose residual is beyond chance, and which those are, in words.
+    """The experiments without readings whose residual exceeds chance, and these readings in words.
 
     By a normal deviate each, at the rate at which `residuals.structure` sees an outlier among so many tests.
-    Unchanged where a series has more of them than `MOST_WRONG`, and where readings are off as a late clock or
-    a lag would have them: by no more than the prediction changes there, and not one in `TIMES_MORE` of those
+    Unchanged where a series has more of them than `MOST_WRONG`, and where readings are off as by a clock
+    offset or a lag: by no more than the prediction changes there, and more than one in `TIMES_MORE` of those
     that change as fast.
     """
     from scipy.stats import norm
@@ -65,7 +65,7 @@ def without_outliers(
 
 
 def _where_it_is_fast(fitter: Fitter, fit: Fit, series: Sequence[Series], off: Array) -> bool:
-    """Whether readings `off` (N,) may be so because the prediction is late where it changes fast."""
+    """Return True if a late prediction may explain readings `off` (N,), as they lie where it changes fast."""
     predicted, values = fitter.predict(fit.values), fitter.record.values
     change = np.zeros(len(predicted))
     for s in series:
@@ -82,9 +82,9 @@ def _where_it_is_fast(fitter: Fitter, fit: Fit, series: Sequence[Series], off: A
 
 
 def _alone(i: int, at: slice, change: Array, left: Array) -> bool:
-    """Whether those beside reading i, where the prediction changes as fast, are right: none of them is late.
+    """Return True if readings beside i, where the prediction changes as fast, are right: it is not late.
 
-    at: the series; change (N,), left (N,): of the prediction from sample to sample, and what it leaves.
+    at: the series; change (N,), left (N,): the prediction's change from sample to sample, and the residual.
     """
     beside = [
         j for j in (i - 2, i - 1, i + 1, i + 2) if at.start <= j < at.stop and change[j] > 0.5 * change[i]

@@ -1,4 +1,4 @@
-"""Effects of one specimen or of one experiment: one may leak, slip or drift while the others do not."""
+"""Effects of one specimen or experiment: one may leak, slip or drift while the others do not."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ FASTER = 1.5
 
 
 def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """Every effect as one of a single specimen, or of a single experiment, that is not alone in its kinds.
+    """Every effect of one specimen or experiment alone, for kinds with several of them.
 
-    With them comes what most often tells specimens apart (`of_specimens`).
+    Also the usual differences between specimens (`of_specimens`).
     """
     found = [] if not experiments else list(coincident_effects(experiments))
     for effect in (*effects, *of_specimens(experiments)):
@@ -87,17 +87,17 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
 
 
 def of_specimens(experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """What is always of some specimens alone: another modulus, and in a lattice other struts."""
+    """Effects that specimens always differ in: another modulus, and in a lattice other struts."""
     kinds = tuple(dict.fromkeys(e.kind for e in experiments))
     struts = (THICKNESS_EFFECT,) if set(THICKNESS_EFFECT.kinds) & set(kinds) else ()
     return (attrs.evolve(BATCH_EFFECT, kinds=kinds), *struts)
 
 
 def coincident_effects(experiments: Sequence[Experiment]) -> dict[Effect, frozenset[str]]:
-    """What scales the force of some experiments in a testing machine together, and their names.
+    """Effects that scale the force of some experiments in a testing machine together, and their names.
 
-    The height typed for one specimen, a change between two tests that stays, and what all tests above a
-    rate have in common. A cause that is of the same experiments cannot be told from them.
+    The height typed for one specimen, a lasting change between two tests, and a factor common to all tests
+    above a rate. A cause in the same experiments cannot be distinguished from them.
     """
     own = [e for e in experiments if e.kind in MACHINE and "strain" in e.columns]
     kinds = tuple(dict.fromkeys(e.kind for e in own))
@@ -119,7 +119,7 @@ def coincident_effects(experiments: Sequence[Experiment]) -> dict[Effect, frozen
 
 
 def strain_rate(experiment: Experiment) -> float:
-    """The rate in 1/s at which a specimen is strained while it is, in the median; 0 without a clock."""
+    """Median strain rate in 1/s of a specimen while it is strained; 0 without a clock."""
     if "time_s" not in experiment.columns or len(experiment) < 3:
         return 0.0
     strain = experiment["strain"]
@@ -129,7 +129,7 @@ def strain_rate(experiment: Experiment) -> float:
 
 
 def _owners(name: str, experiments: Sequence[Experiment]) -> dict[str, list[str]]:
-    """Names of experiments by what they belong to, "specimen B", "session 2" or "experiment hold 2"."""
+    """Names of experiments by owner: "specimen B", "session 2" or "experiment hold 2"."""
     found: dict[str, list[str]] = {}
     if name not in OF_THE_BENCH:
         for e in experiments:
@@ -150,10 +150,10 @@ def select_owned(
     found: Selection,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[Selection, list[Sensitivity]]:
-    """A selection that explains too little, with the effect of one specimen or experiment that explains it.
+    """Add to an insufficient selection the effect of one specimen or experiment that explains the data.
 
-    Unchanged where there is none. Which specimen is a choice that chance has, too: the false-alarm rate is
-    that of the whole library and of every effect of every owner. Returned beside it: sensitivities of all.
+    Unchanged where there is none. The choice of the specimen adds to chance, too: the false-positive rate is
+    that of the whole library for every owner. Also returned: sensitivities of all.
     """
     record = fitter.record
     owned = owned_effects(fitter.simulator.effects, record.experiments)
@@ -208,11 +208,11 @@ def select_owned(
 def coinciding(
     fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """A selection whose causes have, as rivals, what scales the same experiments' force as well as they do.
+    """Add, as rivals of a selection's causes, effects that scale the same experiments' force equally well.
 
-    Where one specimen was tested along x, or all fast tests came last, a cause that is of x, or of the rate,
-    is one of that specimen, of its height as typed, or of what changed before those tests. Each is fitted in
-    the place of each cause; what comes within `RIVAL_DELTA_CHI2` is not told from it.
+    If one specimen was tested along x, or all fast tests came last, a cause that acts along x, or by rate,
+    may also be that specimen's height as typed, or a change before those tests. Each is fitted in place of
+    each cause, and is a rival within `RIVAL_DELTA_CHI2`.
     """
     chosen = found.chosen
     scales = [e for e in fitter.simulator.effects if e.name == "force_scale"]
@@ -248,11 +248,11 @@ def coinciding(
 def further_owners(
     fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """A selection whose last effect belongs to one owner, with the same effect of every other who has it.
+    """Add to a selection whose last effect belongs to one owner the same effect of every other who has it.
 
-    Beside a large leak of one specimen a small one of another passes for slow noise, and leaves no structure.
-    An owner is added where the gain is beyond chance among all owners, left-out data are predicted better,
-    no value is at a bound and no structure is left. Unchanged where no effect belongs to one specimen.
+    Beside a large leak of one specimen a small one of another passes for slow noise and leaves no structure.
+    An owner is added where the gain exceeds chance among all owners, left-out data are predicted better, no
+    value is at a bound and no structure is left. Unchanged where no effect belongs to one specimen.
     """
     from scipy.stats import chi2
 
@@ -295,7 +295,7 @@ def _owner(fit: Fit) -> str:
 
 
 def _pool(fitter: Fitter, seed: Fit, effects: Sequence[Effect], progress: Callable[[str], None]) -> list[Fit]:
-    """Fits of a model with one more effect, of those that promise most, best first."""
+    """Fits of a model with one more effect, of the most promising ones, best first."""
     promised = [(promise(fitter, seed, e), e) for e in effects if e.name not in seed.names]
     promised.sort(key=lambda pair: -pair[0])
     found = []

@@ -1,4 +1,4 @@
-"""What no specimen can have: a sign that a column is not in the unit, or of the sign, that its name says."""
+"""Implausible values of nuisances: a sign that a column's unit or sign is not what its name says."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ AGAINST = -0.8
 def require_plausible(fitter: Fitter, base: Fit) -> None:
     """Raise InputError where a fit without effects needs a value that no specimen has.
 
-    Which those are `Parameter.plausible` says. The error names the experiment's file and column, and the
-    factor, or the sign, that would make the value plausible.
+    `Parameter.plausible` holds the range. The error names the experiment's file and column, and the factor,
+    or the sign, that would make the value plausible.
     """
     for p in fitter.curved:
         low, high = p.plausible

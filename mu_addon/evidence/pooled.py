@@ -1,4 +1,4 @@
-"""Specimens, sessions and experiments that differ: values of their own, of one distribution."""
+"""Effects whose size differs between specimens, sessions or experiments, with one distribution."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ RISE = 3.84
 class Spread:
     """Standard deviation of values between owners, in their parameter's unit, by restricted likelihood.
 
-    Of values of one sign it is that of the normal distribution whose positive half they have, their root mean
-    square. low95, high95: profile interval. gain: of -2 log L over no spread at all; what chi squared falls
-    more than that is paid for the freedom of the values. values (j,): of each owner, the most likely ones,
-    drawn toward their common mean (of one sign: toward 0) by as much as the data leave them uncertain.
+    For values of one sign it is their root mean square, that of the full normal distribution. low95, high95:
+    profile interval. gain: of -2 log L over no spread at all; a further fall of chi squared is the cost of
+    the values' freedom. values (j,): of each owner, the most likely ones, drawn toward their common mean (of
+    one sign: toward 0) by as much as the data leave them uncertain.
     """
 
     value: float
@@ -57,15 +57,15 @@ class Spread:
 
 
 def spread_of(slopes: Array, residual: Array, most: float, one_sign: bool = False) -> Spread:
-    """The spread of j owners' values that a residual shows.
+    """Spread of j owners' values, estimated from a residual.
 
     slopes (n, j): of the whitened prediction by the value of each owner, orthogonal to all that is fitted
     anyway; residual (n,): whitened, with every value at 0. Values are normal about 0 with a standard
-    deviation s: the residual's covariance is I + s^2 Z Z^T, and -2 log L = log det(I + s^2 G)
-    - s^2 b^T (I + s^2 G)^-1 b with G = Z^T Z, b = Z^T r (Harville, J. Am. Stat. Assoc. 72 (1977) 320).
-    most: largest standard deviation that is tried. one_sign: no value is below 0; the likelihood is that
-    above times the probability of this by the values' posterior (the product of each one's own, which is
-    exact where owners share no data) over that before, 2^-j.
+    deviation s: the residual's covariance is I + s^2 Z Z^T, and -2 log L = log det(I + s^2 G) - s^2 b^T (I +
+    s^2 G)^-1 b with G = Z^T Z, b = Z^T r (Harville, J. Am. Stat. Assoc. 72 (1977) 320). most: largest
+    standard deviation that is tried. one_sign: no value is below 0; the likelihood is that above times the
+    probability of this by the values' posterior (the product of each one's own, which is exact where owners
+    share no data) over that before, 2^-j.
     """
     from scipy.optimize import nnls
     from scipy.special import log_ndtr
@@ -97,17 +97,17 @@ def spread_of(slopes: Array, residual: Array, most: float, one_sign: bool = Fals
 
 
 def has_one_sign(p: Parameter) -> bool:
-    """Whether a size can lie on one side of its null only, as a leak's does."""
+    """Return True if a size can lie on one side of its null only, as a leak's does."""
     return p.null in (p.low, p.high)
 
 
 def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """Effects whose size may be another one in each specimen, session or experiment, before any is known.
+    """Effects whose size may differ between specimens, sessions or experiments, before any is known.
 
-    What measures differs by session, where sessions are given, and by experiment; what is printed by
-    specimen, and so do the modulus and a leak. The size, the first parameter, is one an owner; the shape,
-    all others, is shared. By experiment only what has a size of either sign and no shape: experiments differ
-    in what was done, too, and a leak or a drift of each would pass for another law of the same unit.
+    Effects of instruments differ by session, where sessions are given, and by experiment; effects of
+    printing, the modulus and leaks by specimen. The size, the first parameter, is one an owner; the shape,
+    all others, is shared. Only sizes of either sign without a shape vary by experiment: experiments differ in
+    their protocol, too, and a leak or a drift of each would pass for another law of the same unit.
     """
     found = []
     for effect in (*effects, *of_specimens(experiments)):
@@ -130,7 +130,7 @@ def sizes_of(effect: Effect) -> tuple[tuple[str, Parameter], ...]:
 
 
 def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
-    """Names of owners by what they are: specimens, or sessions and experiments for what measures."""
+    """Names of owners by group: specimens, or sessions and experiments for instruments."""
     named = {"specimen": [e.specimen for e in experiments]}
     if name in OF_THE_BENCH:
         named = {"session": [e.session for e in experiments]}
@@ -144,7 +144,7 @@ def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str
 
 
 def _own(p: Parameter, owner: str) -> Parameter:
-    """The size of one owner; its fit begins at the least start alone, not at every owner's every start."""
+    """Size of one owner; its fit begins at the least start only, not at every owner's every start."""
     least = sorted(p.starts, key=lambda v: abs(v - p.null))[:1]
     return attrs.evolve(p, name=f"{p.name}{OF}{owner}", starts=tuple(least))
 
@@ -152,13 +152,13 @@ def _own(p: Parameter, owner: str) -> Parameter:
 def select_pooled(
     fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """A selection that explains too little, with the effect in which owners differ that explains it.
+    """Add to an insufficient selection the effect whose differences among owners explain the data.
 
     Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
-    a chi squared of one degree), times the number of effects and groupings that were tried. What every second
-    quarter of the records tells of each owner must predict the other quarters. Neither a step
-    change nor an effect of one size for all may explain more. Rivals are other effects, or groupings, whose
-    likelihood is as good, to what an error of their law would cost (`LAW`).
+    a chi squared of one degree), times the number of effects and groupings tried. Owners' values from every
+    second quarter of the records must predict the other quarters. Neither a step change nor an effect of one
+    size for all may explain more. Rivals are other effects, or groupings, with as good a likelihood within
+    their law's error (`LAW`).
     """
     from scipy.stats import chi2
 
@@ -206,7 +206,7 @@ def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | No
 
 
 def _shapes(effect: Effect) -> list[dict[str, float]]:
-    """Combinations of the starts of what owners share, by key, with every size at its null."""
+    """Combinations of the starts of shared parameters, by key, with every size at its null."""
     sizes = {key: p.null for key, p in sizes_of(effect)}
     found: list[dict[str, float]] = []
     for start in effect.starts():
@@ -218,7 +218,7 @@ def _shapes(effect: Effect) -> list[dict[str, float]]:
 def _settled(
     fitter: Fitter, base: Fit, effect: Effect, spread: Spread, values: Mapping[str, float]
 ) -> tuple[float, Fit] | None:
-    """Gain and fit with the spread, the values and the shape estimated in turn, from a first spread."""
+    """Gain and fit with spread, values and shape estimated in turn, from a first spread."""
     sizes = sizes_of(effect)
     own = {key for key, _ in sizes}
     fit = base
@@ -247,7 +247,7 @@ def _settled(
 
 
 def _spread(fitter: Fitter, fit: Fit, effect: Effect, values: Mapping[str, float]) -> Spread | None:
-    """The spread that is seen about values of an effect's sizes and shape; None where there is none.
+    """Spread about values of an effect's sizes and shape; None where there is none.
 
     fit: without the effect, or with it at these values.
     """
@@ -276,14 +276,14 @@ def _spread(fitter: Fitter, fit: Fit, effect: Effect, values: Mapping[str, float
 
 
 def _directions(columns: Array) -> Array:
-    """Orthonormal columns that span those given, without directions that are none."""
+    """Orthonormal basis of the given columns, without null directions."""
     length = np.linalg.norm(columns, axis=0)
     u, s, _ = np.linalg.svd(columns[:, length > 0] / length[length > 0], full_matrices=False)
     return np.asarray(u[:, s > 1e-9 * max(s.max(initial=0.0), 1e-300)])
 
 
 def _predicts(fitter: Fitter, base: Fit, best: Fit) -> bool:
-    """Whether owners' values from every second quarter of the records predict the quarters between."""
+    """Return True if owners' values from every second quarter of the records predict the other quarters."""
     record = fitter.record
     quarter = np.zeros(len(record), int)
     for s in record.series:

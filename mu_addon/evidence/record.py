@@ -1,4 +1,4 @@
-"""Measured series as the fit sees them: block means, and their places in one long vector."""
+"""Measured series as used in a fit: block means, and their positions in one long vector."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Series:
 
     experiment: its number in the record. group: name that series of the same noise share. row: of the
     prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
-    count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: in which its
-    readings come, in the channel's unit, 0 where they come in none; stays: how many follow one another
-    unchanged, around a reading (`resolution.stretch`). louder (b,): white noise of each block over the usual,
-    None where it is 1 throughout (`scatter.with_bursts`).
+    count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: of its
+    readings' resolution, in the channel's unit, 0 without one; stays: number of unchanged readings in a row,
+    around a reading (`resolution.stretch`). louder (b,): white noise of each block over the usual, None where
+    it is 1 throughout (`scatter.with_bursts`).
     """
 
     experiment: int
@@ -69,7 +69,7 @@ class Series:
         return self._seen.tobytes(), spread
 
     def samples(self, block: int) -> slice:
-        """Which of the experiment's samples a block holds, by its number among those with a value."""
+        """Samples of the experiment in a block, numbered among those with a value."""
         at = int(np.flatnonzero(self._kept)[block])
         end = int(self._first[at + 1]) if at + 1 < len(self._first) else len(self._seen)
         return slice(int(self._first[at]), end)
@@ -120,10 +120,9 @@ class Record:
         return found
 
     def possible(self, simulator: Composite, values: Mapping[str, float]) -> Array | None:
-        """As `predict`; None where the model has no prediction, or one that is not finite.
+        """Return `predict`; None where the model has no prediction, or one that is not finite.
 
-        A law beyond its range, or a body without equilibrium: such values cannot be those of what was
-        measured.
+        A law beyond its range or a body without equilibrium cannot be that of measured data.
         """
         try:
             found = self.predict(simulator, values)
@@ -133,7 +132,7 @@ class Record:
 
     @cached_property
     def _together(self) -> list[tuple[Series, list[int], Array]]:
-        """Series of one experiment and the same blocks: the first, rows of the prediction, places (r, b)."""
+        """Series of one experiment with the same blocks: the first, prediction's rows, positions (r, b)."""
         alike: dict[Any, list[Series]] = {}
         for s in self.series:
             alike.setdefault((s.experiment, s.blocks), []).append(s)
@@ -151,7 +150,7 @@ class Record:
         return chosen
 
     def driven(self, experiment: int, column: str) -> bool:
-        """Whether a column of an experiment is a drive: present and not predicted."""
+        """Return True if a column of an experiment is a drive: present and not predicted."""
         predicted = {s.channel for s in self.series if s.experiment == experiment}
         return column in self.experiments[experiment].columns and column not in predicted
 
@@ -184,9 +183,9 @@ ALIKE = 0.05
 
 
 def repeats(record: Record, one: Series, other: Series) -> bool:
-    """Whether two series are one channel of experiments in which the same was done, sample by sample.
+    """Return True if two series are one channel of experiments with the same protocol, sample by sample.
 
-    Their clocks must agree to a sample, each drive to `ALIKE` of its range, and all else that was set.
+    Their clocks must agree to a sample, each drive to `ALIKE` of its range, and all other settings.
     """
     a, b = (record.experiments[s.experiment] for s in (one, other))
     if (one.channel, a.kind, len(a)) != (other.channel, b.kind, len(b)) or "time_s" not in a.columns:

@@ -1,4 +1,4 @@
-"""What a model leaves of the data: the residual against everything it should not depend on."""
+"""Tests of a model's residual against everything it should not depend on."""
 
 from __future__ import annotations
 
@@ -87,10 +87,10 @@ CONDITIONS = (
 
 
 def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
-    """Every test of a fit's residual, in a fixed order, but for quantities that do not vary.
+    """Every test of a fit's residual, in a fixed order, except for quantities that do not vary.
 
-    The noise is the fitter's, which was estimated with every smooth cause set aside: a test shows what a
-    model misses, and now and then the slowest part of the noise, of which such data tell little.
+    The noise is the fitter's, estimated with every smooth cause set aside. A test thus shows the model's
+    misfit, and now and then the slowest part of the noise, which such data hardly determine.
     """
     spare = dict.fromkeys(fitter.deviance(fit), 0.0)
     return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter, fit)]
@@ -100,7 +100,7 @@ def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """The tests of `dependence_table` under two estimates of the noise; the larger p-value of each counts.
 
     A dependence must gain more likelihood than the noise does when it is estimated from the residual itself,
-    as if nothing in it had a cause. Tests that fit nothing are made again under that second noise.
+    as if that had no cause. Tests that fit nothing are repeated under that second noise.
     """
     own, refitted = fitter.under_its_own_noise(fit)
     before, after = fitter.deviance(fit), own.deviance(refitted)
@@ -176,7 +176,7 @@ def _response(fitter: Fitter, fit: Fit) -> Array:
 
 
 def taken_by_scales(fitter: Fitter, fit: Fit) -> float:
-    """Chi squared that a scale of each experiment's own response takes from what a fit leaves."""
+    """Chi squared that a scale of each experiment's own response takes from a fit's residual."""
     record = fitter.record
     response = _response(fitter, fit)
     own = response[:, None] * (record.of_experiment[:, None] == np.arange(len(record.experiments)))
@@ -189,9 +189,9 @@ def _channels(record: Record) -> tuple[str, ...]:
 
 
 def _angles(fitter: Fitter, fit: Fit) -> dict[int, Array]:
-    """The angle (n,) at each sample, by experiments that have one: as predicted, which has no noise.
+    """Angle (n,) at each sample, by experiments that have one: as predicted, which has no noise.
 
-    What was read has the noise that it would be compared with; where the angle is what was done, it has none.
+    A measured angle has the noise of the residual that it would be compared with; as a drive it has none.
     """
     found = {}
     for i, e in enumerate(fitter.record.experiments):
@@ -234,7 +234,7 @@ def _by_condition(record: Record, values: Array, response: Array) -> Array | Non
 
 @attrs.frozen(eq=False)
 class _Fitted:
-    """What was fitted anyway: k orthonormal columns span it, and the residual (N,) lies `along` (k,) them.
+    """Fitted subspace: k orthonormal columns span it, with the residual's (N,) components `along` (k,) them.
 
     rows, own: of each channel, its rows of the record, and the columns there.
     """
@@ -262,10 +262,10 @@ def _fitted(fitter: Fitter, fit: Fit) -> _Fitted:
 
 
 def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
-    """Whether markers answer to the modulus more or less by the chamber beside which they sit.
+    """Test whether markers' response to the modulus depends on the chamber beside which they sit.
 
-    A chamber that bends otherwise than the rest moves the markers beyond it, and none before it. `where`
-    names the marker that stands out most, and its place at rest counted in chambers from the inlet.
+    A chamber that bends unlike the rest moves the markers beyond it, and none before it. `where` names the
+    marker that stands out most, and its place at rest counted in chambers from the inlet.
     """
     from scipy.stats import chi2
 
@@ -297,7 +297,7 @@ def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, flo
 
 
 def _marker_places(record: Record) -> dict[str, float]:
-    """Where on the axis the markers sit at rest, by their channels, in chambers from the inlet."""
+    """Positions of the markers on the axis at rest, by their channels, in chambers from the inlet."""
     bent = [e for e in record.experiments if e.kind == UNIT]
     try:
         seen = at_rest(bent)
@@ -314,9 +314,9 @@ def _marker_places(record: Record) -> dict[str, float]:
 def _tested(
     fitted: _Fitted, name: str, columns: Array | None, spare: Mapping[str, float]
 ) -> list[Dependence]:
-    """The joint test of all channels and the best single one, each given half of the chance.
+    """Joint test of all channels and the best single one, each at half of the false-alarm rate.
 
-    columns (N, d): of all channels, each of which has sizes of its own.
+    columns (N, d): of all channels, each with separate sizes.
     """
     from scipy.stats import chi2
 
@@ -349,9 +349,9 @@ def _tested(
 
 
 def _gained(gram: Array, along: Array) -> tuple[float, int]:
-    """Chi squared that columns take, and how many count, by their products and those with the residual (d,).
+    """Chi squared that columns take, and their rank, from their products and those with the residual (d,).
 
-    Near dependences are left out, as in `_basis`; so is a column of unit length of which nothing is left but
+    Near dependences are left out, as in `_basis`; so is a column of unit length that is zero but for
     rounding.
     """
     size = np.sqrt(np.maximum(np.diag(gram), 0.0))
@@ -371,7 +371,7 @@ def _unit(columns: Array) -> Array:
 
 
 def _basis(columns: Array) -> Array:
-    """Orthonormal columns that span these, near dependences left out."""
+    """Orthonormal basis of columns, near dependences left out."""
     if not columns.shape[1]:
         return columns
     u, sizes, _ = np.linalg.svd(_unit(columns), full_matrices=False)
@@ -383,7 +383,7 @@ def _clocked(record: Record) -> list[Series]:
 
 
 def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
-    """What comes back in every cycle: harmonics of it, a channel and an experiment."""
+    """Test for structure that repeats in every cycle: its harmonics, by channel and experiment."""
     from scipy.stats import chi2
 
     gains, groups, worst = [], set(), (1.0, "", 0.0, 0)
@@ -416,8 +416,8 @@ def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
 def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Power of the whitened residual by bands of frequency, series of a group and of one clock together.
 
-    Readings in steps are off by a sawtooth where what is read rises steadily: a tone. Where it stays between
-    two steps they go to and fro by a whole one. A band is expected to hold both beside the noise.
+    The rounding error of readings in steps is a sawtooth, a tone, where the quantity rises steadily. Where it
+    stays between two steps readings alternate by a whole one. Both are expected in a band beside the noise.
     """
     from scipy.stats import chi2
 
@@ -457,9 +457,9 @@ STILL = 0.1
 
 
 def _rounding(fitter: Fitter, fit: Fit, series: Series) -> tuple[Array, float]:
-    """What rounding to a channel's steps changes in a fit's prediction of a series (b,), in its unit.
+    """Rounding error to a channel's steps in a fit's prediction of a series (b,), in its unit.
 
-    With it the variance of readings that go to and fro between two steps, over all of the series.
+    Also the variance of readings that alternate between two steps, over all of the series.
     """
     if not series.step:
         return np.zeros(series.at.stop - series.at.start), 0.0
@@ -472,7 +472,7 @@ def _rounding(fitter: Fitter, fit: Fit, series: Series) -> tuple[Array, float]:
 
 
 def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
-    """Whether the whitened residual of a cycle is like that of the next."""
+    """Test whether the whitened residuals of successive cycles correlate."""
     from scipy.stats import norm
 
     sums, count = 0.0, 0
@@ -493,7 +493,7 @@ def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
 
 
 def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
-    """Whether repeats of a protocol leave the same residual; what differs is noise."""
+    """Test whether repeats of a protocol leave the same residual; their difference is noise."""
     from scipy.stats import norm
 
     sums, count = 0.0, 0
@@ -512,7 +512,7 @@ def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
 
 
 def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
-    """Whether a channel jumped once, in an experiment or between two: every place of the jump is tried."""
+    """Test whether a channel jumped once, in an experiment or between two: every position is tried."""
     from scipy.stats import norm
 
     r = fit.residual
@@ -546,8 +546,8 @@ def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
 def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
     """The clearest jump between two experiments, in standard deviations and words, and how many were tried.
 
-    Of channels whose one zero is fitted for all experiments: a marker that was glued anew, or a camera that
-    was moved, has another one from then on.
+    Of channels whose one zero is fitted for all experiments: a reglued marker or a moved camera has another
+    one from then on.
     """
     record = fitter.record
     every: dict[str, list[Series]] = {}
@@ -587,9 +587,9 @@ def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
 
 
 def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
-    """Whether from some moment on the response was another: every eighth of every experiment is tried.
+    """Test whether the response changed at some moment: every eighth of every experiment is tried.
 
-    Each channel has a size of its own, and its zero and what was fitted are free in each.
+    Each channel has a separate size, and its zero and the fitted parameters are free in each.
     """
     from scipy.stats import chi2
 
@@ -643,14 +643,15 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
 
 
 def _beyond(v: Array) -> Array:
-    """Sums (n, ...) over all that come after each one of v (n, ...)."""
+    """Sums (n, ...) of v (n, ...) over all later rows."""
     return np.asarray(v.sum(axis=0) - np.cumsum(v, axis=0))
 
 
 def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
-    """Whether what is under pressure goes on swinging after each change of it: one size for all channels.
+    """Test whether a unit under pressure swings after each change of it: one size for all channels.
 
-    The residual along the motion of a mass that the fitted model drives, by the largest of many modes.
+    The residual is tested along the motion of a mass that the fitted model drives, by the largest of many
+    modes.
     """
     from scipy.stats import chi2
 

@@ -1,4 +1,4 @@
-"""What readings cannot tell: steps of a display, samples at uneven times, single readings that are wrong."""
+"""Limits of readings: steps of a display, samples at uneven times, single wrong readings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MOST_CLIPPED = 0.6
 
 
 def quantum(values: Array) -> float:
-    """The step in which readings (n,) come, in their unit; 0 where they show none.
+    """Step of readings (n,), in their unit; 0 where they show none.
 
     The largest number of which all of them and all of their differences are whole multiples: with `DIGITS`
     digits at most, or any, as a converter's share of its range or a force over a section is.
@@ -64,7 +64,7 @@ def _decimal(seen: Array) -> float:
 
 
 def _any_step(seen: Array, values: Array) -> float:
-    """The least difference of readings, or up to a fourth of it, that all differences are multiples of."""
+    """Least difference of readings, or down to a fourth of it, of which all differences are multiples."""
     if len(seen) < FEWEST:
         return 0.0
     away = seen - seen[0]
@@ -89,8 +89,8 @@ def _any_step(seen: Array, values: Array) -> float:
 def display_steps(experiments: Sequence[Experiment], simulator: Composite) -> dict[tuple[str, str], float]:
     """The step of each predicted channel, by kind and channel, of the readings of all experiments together.
 
-    One record that is mostly held has few levels, from which no step is sure; the same instrument reads all.
-    Of instruments or zeros that differ there is none in common: 0.
+    A record that is mostly held has too few levels for a sure step, but the same instrument reads all.
+    Different instruments or zeros have no step in common: 0.
     """
     every: dict[tuple[str, str], list[Array]] = {}
     for e in experiments:
@@ -100,7 +100,7 @@ def display_steps(experiments: Sequence[Experiment], simulator: Composite) -> di
 
 
 def dwell(values: Array) -> float:
-    """How many readings (n,) follow one another without a change, in the median of all such runs.
+    """Median length of runs of unchanged readings (n,).
 
     1 where they change at every sample, as in a ramp before a hold.
     """
@@ -110,7 +110,7 @@ def dwell(values: Array) -> float:
 
 
 def stretch(values: Array) -> float:
-    """How many readings (n,) the run is long in which a reading lies, on average over readings.
+    """Mean over readings (n,) of the length of the run of unchanged readings that each lies in.
 
     Long where a part of a record is held, however fast the rest of it changes.
     """
@@ -121,10 +121,10 @@ def stretch(values: Array) -> float:
 
 
 def between_steps(time_s: Array, values: Array) -> Array:
-    """Quantised readings (n,) at times (n,) in s as what may have been read: lines from change to change.
+    """Quantised readings (n,) at times (n,) in s made continuous: lines from change to change.
 
     Where a reading changes to the next step the quantity lies halfway; where it turns back, or stays to the
-    end, the middle of the step is the best that is known.
+    end, the middle of the step is the best estimate.
     """
     changed = np.flatnonzero(np.diff(values))
     if not len(changed):
@@ -140,7 +140,7 @@ def between_steps(time_s: Array, values: Array) -> Array:
 
 
 def divided(time_s: Array, values: Array, order: int) -> Array:
-    """Differences (n - order,) of readings (n,) at any times (n,) in s that no polynomial below `order` has.
+    """Differences (n - order,) of readings (n,) at any times (n,) in s, zero for polynomials below `order`.
 
     Of white noise each has its standard deviation: divided differences with weights of unit length.
     """
@@ -157,12 +157,12 @@ def divided(time_s: Array, values: Array, order: int) -> Array:
 
 
 def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
-    """Which readings (n,) at times (n,) in s stand alone, away from all around them: (n,) bool.
+    """Mask (n,) of readings (n,) at times (n,) in s that stand alone, away from all around them.
 
     Each is compared with the lines through its neighbours on both sides, through the next but one on both
-    sides, and through two before and two after it. A corner or a step agrees with one of the latter two; what
-    lies beyond all four, on one side and by `WRONG` deviations, belongs to nothing. step: of the display, in
-    the readings' unit, where it is known from other records.
+    sides, and through two before and two after it. A corner or a step agrees with one of the latter two; a
+    reading beyond all four, on one side and by `WRONG` deviations, is wrong. step: of the display, in the
+    readings' unit, where it is known from other records.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
@@ -187,7 +187,7 @@ def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
 
 
 def clipped_readings(time_s: Array, values: Array) -> Array:
-    """Which readings (n,) at times (n,) in s are at the end of their channel's range: (n,) bool.
+    """Mask (n,) of readings (n,) at times (n,) in s that lie at the end of their channel's range.
 
     Those that stay at the record's largest or smallest value for `CLIPPED` samples, though the channel is
     noisy and does not read in steps; with them those between, whose noise is cut off on one side.
@@ -215,7 +215,7 @@ def clipped_readings(time_s: Array, values: Array) -> Array:
 def without_wrong_readings(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without predicted readings that stand alone or were clipped, and which, in words.
+    """The experiments without predicted readings that stand alone or were clipped, and these in words.
 
     See `wrong_readings` and `clipped_readings`.
     """
@@ -240,11 +240,11 @@ def without_wrong_readings(
 
 
 def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> Array:
-    """Which readings (n,) lie away from their prediction (n,) as those around them do not: (n,) bool.
+    """Mask (n,) of readings (n,) that lie away from their prediction (n,) unlike those around them.
 
-    By `WRONG` deviations from the median of what `AROUND_ONE` readings are off, one or two together. A clock
-    or a lag that the prediction lacks does that wherever the prediction changes fast: what it could do counts
-    only where ten times as many readings, of changes as fast, are not off. step: as in `wrong_readings`.
+    By `WRONG` deviations from the median residual of `AROUND_ONE` readings, one or two together. A clock
+    offset or a lag does that wherever the prediction changes fast, so a residual it could explain counts only
+    where ten times as many readings, of changes as fast, have none. step: as in `wrong_readings`.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(predicted))
@@ -272,9 +272,9 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
 def without_unpredicted_readings(
     experiments: Sequence[Experiment], simulator: Composite, values: Mapping[str, float]
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without readings that stand alone in what a fit of these values leaves, and which.
+    """The experiments without readings that stand alone in a fit's residual, and these in words.
 
-    Where what is read changes fast from sample to sample, only what is predicted shows that one is wrong.
+    Where a quantity changes fast from sample to sample, only the prediction shows that a reading is wrong.
     """
     found: list[Experiment] = []
     words: list[str] = []

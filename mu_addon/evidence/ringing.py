@@ -1,4 +1,4 @@
-"""How a mass on a spring that is driven would ring: what its motion adds to one without inertia."""
+"""Ringing of a driven mass on a spring: the motion added by inertia."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def modes(low_Hz: float, high_Hz: float) -> tuple[Array, Array]:
 
 
 def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
-    """What inertia adds (n, c, k) to signals (n, c), by k modes that start at rest, in the signals' unit.
+    """Motion (n, c, k) added by inertia to signals (n, c), of k modes that start at rest, in their unit.
 
     time_s (n,): ascending, in s; still (n, c): the signals without inertia; hertz (k,), damping (k,): as from
     `modes`. Solves x'' + 2 damping w x' + w^2 x = w^2 still and returns x - still; exact for signals linear
@@ -53,11 +53,10 @@ def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
 
 
 def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array:
-    """Signals (c, n) of a mode that is driven, of those without inertia (c, n), in the signals' unit.
+    """Signals (c, n) of a driven mode, from those without inertia (c, n), in the signals' unit.
 
-    As `ringing`, whose result is what this adds to `still`, for one mode: exact for signals linear between
-    their samples, from rest. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical
-    one, below 1.
+    `still` plus the result of `ringing`, for one mode: exact for signals linear between their samples, from
+    rest. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical one, below 1.
     """
     from scipy.linalg.lapack import ztbtrs
 

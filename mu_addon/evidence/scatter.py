@@ -1,4 +1,4 @@
-"""The noise that readings show by themselves: what bounds any noise that is estimated from a misfit."""
+"""Noise shown by readings alone, which bounds any noise estimated from a misfit."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LOUDEST = 1e3
 
 
 def scatter(record: Record, series: Series) -> float:
-    """Standard deviation of a series' readings from one to the next, in its unit; nan for too few to tell."""
+    """Standard deviation of a series' readings from one to the next, in its unit; nan for too few."""
     e = record.experiments[series.experiment]
     values = e[series.channel]
     seen = np.isfinite(values)
@@ -67,8 +67,8 @@ def shown_noise(record: Record, series: Series) -> float:
 def by_repeats(record: Record, series: Series, left: Array) -> float:
     """The largest standard deviation of noise that a series' repeats allow, in its unit; inf without any.
 
-    left (N,): a misfit in the record's units. What repeats have in common is no noise, however slow or fast.
-    No instrument repeats better than to its steps, or to `REPEATABLE` of the largest reading.
+    left (N,): a misfit in the record's units. A residual common to repeats is no noise. No instrument repeats
+    better than its steps, or `REPEATABLE` of the largest reading.
     """
     own = left[series.at]
     apart = [
@@ -86,7 +86,7 @@ def by_repeats(record: Record, series: Series, left: Array) -> float:
 def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
     """Sources of noise by group, none larger than its readings show (`shown_noise`, in the root mean square).
 
-    A larger one is made smaller as a whole, so that it stays as slow as it is.
+    A larger one is scaled down as a whole, so that its correlation time stays.
     """
     found = {}
     for group, source in sources.items():
@@ -99,7 +99,7 @@ def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
 
 @attrs.frozen
 class Excess:
-    """The series whose error is most beyond what its noise may be.
+    """The series whose error exceeds its noise the most.
 
     error, noise: root mean square of the misfit and largest noise that the readings show, in `unit`. where:
     its experiment and channel.
@@ -116,9 +116,9 @@ class Excess:
 
 
 def excess(record: Record, left: Array) -> Excess | None:
-    """The series of a misfit (N,), in the record's units, that is most beyond its noise; None within it.
+    """Series of a misfit (N,), in the record's units, that exceeds its noise the most; None within it.
 
-    Series by series: neither their number nor their length dilutes one that misses.
+    Series by series, so that neither their number nor their length dilutes one misfit.
     """
     found = []
     for s in record.series:
@@ -132,10 +132,10 @@ def excess(record: Record, left: Array) -> Excess | None:
 
 
 def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
-    """The record with each block's noise where it comes in bursts or grows with load, and where, in words.
+    """The record with each block's noise where it varies in time or with load, and where, in words.
 
-    By the scatter of a misfit (N,) from block to block, in windows: of a smooth error of the model there is
-    none, so that no burst hides one. Unchanged where the scatter is even.
+    By the scatter of a misfit (N,) from block to block, in windows, to which a smooth error of the model does
+    not contribute. Unchanged where the scatter is even.
     """
     found, words = [], []
     for s in record.series:
@@ -151,10 +151,10 @@ def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
 
 
 def _loudness(time_s: Array, left: Array) -> Array | None:
-    """Noise (b,) of each block of a misfit (b,) over the usual, where it is `LOUD` or more; None for even.
+    """Noise (b,) of each block of a misfit (b,) over the usual, where it is `LOUD` or more; None if even.
 
-    By the scatter of windows, and of single blocks by how far they are from those around them: up to
-    a share `MOST` of all may be so.
+    By the scatter of windows, and of single blocks by their distance from those around them: at most a share
+    `MOST` of all.
     """
     from scipy.ndimage import maximum_filter1d, median_filter
 
@@ -178,9 +178,9 @@ def _loudness(time_s: Array, left: Array) -> Array | None:
 
 
 def within_scatter(record: Record, left: Array) -> bool:
-    """Whether a misfit (N,) is below `NEAR` times the readings' scatter, no stretch beyond `TIMES`.
+    """Return True if a misfit (N,) is below `NEAR` times the scatter, and no stretch above `TIMES`.
 
-    And within what repeats allow (`by_repeats`).
+    It must also be within the scatter of repeats (`by_repeats`).
     """
     for s in record.series:
         own = left[s.at] if s.louder is None else left[s.at] / s.louder

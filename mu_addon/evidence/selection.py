@@ -1,4 +1,4 @@
-"""Which effects, if any, explain the data: each rival refitted, each step paid for by the library's size."""
+"""Selection of the effects that explain the data: rivals refitted, steps corrected for the library's size."""
 
 from __future__ import annotations
 
@@ -73,13 +73,13 @@ class Cause:
 
 @attrs.frozen(eq=False)
 class Selection:
-    """The base model, the chosen one, its causes, and what either leaves.
+    """The base model, the chosen one, its causes, and the residuals of both.
 
     singles: the fit of every single effect, best first. p_best: p-value (a probability) of the best single
-    effect. doubted: why a model was not accepted, empty if it was. table: tests that `strict_table` makes of
-    the chosen model's residual. table_base: `dependence_table` of the base model; by the strict tests where
-    nothing is wrong. wider: fits of effects of one owner, or that differ among owners. excused: why
-    structure that is left does not count, in words.
+    effect. doubted: why a model was not accepted, else empty. table: `strict_table` of the chosen model's
+    residual. table_base: `dependence_table` of the base model; by the strict tests where nothing is wrong.
+    wider: fits of effects of one owner, or that differ among owners. excused: why structure that is left does
+    not count, in words.
     """
 
     base: Fit
@@ -95,7 +95,7 @@ class Selection:
 
     @property
     def left(self) -> tuple[str, ...]:
-        """Names of what the residual of the chosen model still depends on (`structure`)."""
+        """Names of quantities that the residual of the chosen model still depends on (`structure`)."""
         return () if self.excused else structure(self.table)
 
 
@@ -106,8 +106,8 @@ def select(
 
     Each must gain more chi squared than noise would at `FALSE_ALARM_RATE`, over the whole library, and must
     reduce the leave-one-experiment-out error. seen: sensitivities of the effects; those not worth a fit are
-    not tried. progress: called with the names of the effects that are fitted. A record that nothing explains
-    keeps the base model and the structure that is left.
+    not tried. progress: called with the names of the effects that are fitted. Without an explanation the base
+    model stays, with the structure that is left.
     """
     base = fitter.fit()
     table_base = tuple(dependence_table(fitter, base))
@@ -182,7 +182,7 @@ def select(
 
 
 def too_far(fitter: Fitter, fit: Fit) -> str:
-    """By how much a fit misses beyond any noise that the readings show, in words; empty where it does not."""
+    """Excess of a fit's error over any noise that the readings show, in words; empty without one."""
     found = excess(fitter.record, fitter.record.values - fitter.predict(fit.values))
     if found is None:
         return ""
@@ -202,7 +202,7 @@ def pairs_for(
     """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
 
     A camera's fault changes what each channel shows in proportion, which two physical effects can do together
-    where neither does anything alone. Those `SEEDS` pairs are fitted that take most to first order.
+    where neither does anything alone. The `SEEDS` pairs that take most to first order are fitted.
     """
     physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
     columns = {id(s): s.column[: len(base.residual)] for s in physical}
@@ -230,10 +230,10 @@ def _hidden_pair(
     singles: Sequence[Fit],
     progress: Callable[[str], None],
 ) -> tuple[float, Fit] | None:
-    """The two effects that a record shows where neither alone does better than slow noise; None without.
+    """Two effects visible together where neither alone does better than slow noise; None without.
 
-    Sought where one alone gains by the noise with every cause set aside, and not by the noise that
-    is left if none is. The chance that noise does as well is that of the best of all pairs.
+    Sought where one alone gains by the noise with every cause set aside, and not by the noise of the residual
+    as if without cause. The probability that noise gains as much is that of the best of all pairs.
     """
     from scipy.stats import chi2
 
@@ -253,9 +253,9 @@ def _hidden_pair(
 
 
 def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit, chosen: Fit) -> Fit:
-    """A fit without the effect that the others make needless: it came first, and they took its place.
+    """A fit without the effect that later ones make needless.
 
-    Its gain beside them is no more than noise or an error of their law would be.
+    Its gain beside them is no more than noise or an error of their law would give.
     """
     found = []
     for e in chosen.effects:
@@ -268,15 +268,15 @@ def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit,
 
 
 def _of_the_law(less: Fit, more: Fit, taken: float) -> bool:
-    """Whether an effect gains as little beside others as an error of their own law would be."""
+    """Return True if an effect gains as little beside others as an error of their own law would."""
     return more.names[-1] != NUMERICS and less.chi2 - more.chi2 < LAW**2 * taken
 
 
 def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """A fit with a law of more freedom in place of one of its effects' where that fits better; else itself.
+    """A fit with a law of more freedom for one of its effects where that fits better; else itself.
 
     Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and its law is chosen by the data, anew with
-    every effect that comes beside it.
+    every effect added.
     """
     for law in fitter.simulator.refinements:
         for i, e in enumerate(fit.effects):
@@ -298,8 +298,8 @@ def by_all_laws(
 ) -> list[Fit]:
     """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked anew.
 
-    The first one's, and where structure is left with it or it lies at a bound, or for `every`, those of the
-    `SEEDS` next mechanisms that have any: what does little by its first law may be what is right by another.
+    Refined are the first and, where structure is left with it or it lies at a bound, or for `every`, the next
+    `SEEDS` mechanisms that have such laws: the right mechanism may gain little by its first law.
     """
     found = [refined(fitter, pool[0], progress), *pool[1:]]
     if not every and not at_a_bound(found[0]) and not structure(strict_table(fitter, found[0])):
@@ -316,7 +316,7 @@ def by_all_laws(
 
 
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
-    """A selection repeated under the noise of another fitter: no effect is added.
+    """Repeat a selection under the noise of another fitter; no effect is added.
 
     Each effect's p-value is computed again, and rivals anew; an effect no longer significant is reported in
     `doubted`.
@@ -350,12 +350,12 @@ def one_more(
     found: Selection,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Selection:
-    """A selection that left structure, with the effect added that takes all of it; unchanged without such.
+    """Add to a selection that left structure the effect that takes all of it; unchanged without such.
 
-    For noise that was estimated anew around the causes: what is smaller than the noise assumed before may now
-    be significant. An effect is not taken if its p-value reaches `FALSE_ALARM_RATE`, if structure is left, if
-    it does not predict left-out experiments better, if a step change explains more or if one experiment alone
-    (a share above `ALONE`) tells of it.
+    For noise that was estimated anew around the causes: an effect smaller than the noise assumed before may
+    now be significant. An effect is rejected if its p-value reaches `FALSE_ALARM_RATE`, if structure is left,
+    if it does not predict left-out experiments better, if a step change explains more, or if one experiment
+    (a share above `ALONE`) alone supports it.
     """
     if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
         return found
@@ -383,13 +383,13 @@ def one_more(
 
 
 def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
-    """Share of the base model's misfit that another one takes: of chi squared beyond what noise leaves."""
+    """Share of the base model's misfit that another model takes: of chi squared beyond noise."""
     noise = float(len(fitter.record))
     return 1.0 - max(fit.chi2 - noise, 0.0) / max(base.chi2 - noise, 1.0)
 
 
 def mainly(fitter: Fitter, found: Selection) -> Selection | None:
-    """A selection of the effects that take most of a misfit, though structure is left; None without.
+    """Selection of the effects that take most of a misfit, though structure is left; None without.
 
     Their law may be another than the library's. Several: see `_mainly_several`. A single one, of all, of one
     owner or among owners, must take `GRADED` of the misfit, have no value at a bound but its null, and do
@@ -436,7 +436,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
 
 
 def _by_count(base: Fit, best: Fit, tried: int) -> float:
-    """Probability that noise alone lets the best of so many fits gain as much, at most (Bonferroni)."""
+    """Probability that noise alone lets the best of so many fits gain as much, by Bonferroni's bound."""
     from scipy.stats import chi2
 
     gain = base.chi2 - best.chi2 - by_search(best)
@@ -444,9 +444,9 @@ def _by_count(base: Fit, best: Fit, tried: int) -> float:
 
 
 def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
-    """A selection of three causes or more without the least, which has rivals; None without such a cause.
+    """A selection of three causes or more without the least if that has rivals; else None.
 
-    Such a cause stands in for errors of the others' laws, and can move them to bounds that they do not need.
+    Such a cause compensates errors of the others' laws, and can push them to bounds that they do not need.
     """
     if len(found.causes) < 3 or not found.causes[-1].rivals:
         return None
@@ -461,10 +461,10 @@ def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
 
 
 def _mainly_several(fitter: Fitter, found: Selection) -> bool:
-    """Whether several causes take most of a misfit, each of them plainly, though structure is left.
+    """Return True if several causes take most of a misfit, each of them clearly, though structure is left.
 
-    What is left is less than 1 - `GRADED` of what any of them takes, and no other effect in the place of one
-    comes within `CLEAR` times that. None has a value at a bound or rests on a single experiment.
+    The residual is less than 1 - `GRADED` of each cause's loss, and no other effect in the place of one comes
+    within `CLEAR` times the residual. None has a value at a bound or rests on a single experiment.
     """
     base, chosen = found.base, found.chosen
     if found.doubted or at_a_bound(chosen) or any(c.rivals for c in found.causes):
@@ -486,7 +486,7 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
 
 
 def _any_within(fitter: Fitter, found: Selection, others: Sequence[Effect], margin: float) -> bool:
-    """Whether another effect beside the others comes within a margin of chi squared of the chosen model."""
+    """Return True if some effect beside the others comes within a margin of the chosen chi squared."""
     chosen = found.chosen
     less = fitter.best(others, [chosen.values])
     for f in found.singles:
@@ -500,14 +500,14 @@ def _any_within(fitter: Fitter, found: Selection, others: Sequence[Effect], marg
 
 
 def at_a_bound(fit: Fit) -> bool:
-    """Whether a fitted value of an effect lies at a bound that is not its null."""
+    """Return True if a fitted value of an effect lies at a bound that is not its null."""
     return any(
         _bounded(p, fit.values[key]) for e in fit.effects for key, p in zip(e.keys, e.parameters, strict=True)
     )
 
 
 def size_at_bound(fit: Fit) -> bool:
-    """Whether the size of the last effect, its first parameter, lies at a bound that is not its null."""
+    """Return True if the size of the last effect, its first parameter, lies at a bound not its null."""
     last = fit.effects[-1]
     return _bounded(last.parameters[0], fit.values[last.keys[0]])
 
@@ -525,12 +525,12 @@ def _bounded(p: Parameter, value: float) -> bool:
 
 
 def _doubts(fitter: Fitter, table_base: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
-    """Why a fit's effects are not believed though they fit, in words; empty without a reason."""
+    """Reason to doubt a fit's effects although they fit, in words; empty without one."""
     return sudden(table_base, base, chosen) or _too_large(chosen) or curved_reading(fitter, base, chosen)
 
 
 def _too_large(chosen: Fit) -> str:
-    """Which effect would have to be larger than it can be, in words; empty where none would."""
+    """Effect whose size would exceed its bound, in words; empty if there is none."""
     for e in chosen.effects:
         if _bounded(e.parameters[0], chosen.values[e.keys[0]]):
             return f"{e.name} would have to be larger than its bound allows"
@@ -538,10 +538,10 @@ def _too_large(chosen: Fit) -> str:
 
 
 def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0) -> str:
-    """What something that broke or slipped at one moment would explain better than the chosen effects do.
+    """Sudden change that explains more than the chosen effects, in words; empty if there is none.
 
-    By Akaike's criterion; its moment is one parameter more than its sizes. margin: of chi squared, by which
-    the effects must be better.
+    By Akaike's criterion; its moment counts as one parameter besides its sizes. margin: of chi squared, by
+    which the effects must be better.
     """
     if chosen is base:
         return ""
@@ -557,12 +557,12 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
 
 
 def cost(fit: Fit) -> float:
-    """Akaike's, with `by_search`: of models that fit alike the one with fewer parameters leads."""
+    """Akaike's criterion plus `by_search`: of models that fit alike the one with fewer parameters leads."""
     return fit.chi2 + 2.0 * len(fit.keys) + by_search(fit)
 
 
 def by_search(fit: Fit) -> float:
-    """Chi squared that noise gives the effects of a model by the search that their starts were the best of.
+    """Chi squared that noise gives a model's effects by the search among alternatives for their starts.
 
     The best of m chi squareds exceeds g with at most m times the probability of one (Bonferroni), which in
     the tail falls as exp(-g/2): m alternatives are worth 2 ln m.
@@ -596,9 +596,9 @@ def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
 
 
 def promise(fitter: Fitter, fit: Fit, effect: Effect) -> float:
-    """Chi squared that an effect, at any of its starts or in the small, takes from what a fit leaves.
+    """Chi squared that an effect, at any of its starts or in the small, takes from a fit's residual.
 
-    To first order. A fit of it takes many predictions: above `PROMISING` it is worth its time.
+    To first order. A fit takes many predictions, and is worth its time above `PROMISING`.
     """
     size = effect.parameters[0]
     plain = fitter.predict(fit.values)
@@ -662,8 +662,8 @@ def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
-    swollen by a cause would hide it. What the gauges' noise alone would let it gain is taken off, and what
-    a search for its starts would (`by_search`).
+    swollen by a cause would hide it. The gains by gauges' noise alone and by a search for its starts
+    (`by_search`) are subtracted.
     """
     searched = by_search(more) - by_search(less)
     gain = less.chi2 - more.chi2 - searched
@@ -677,10 +677,10 @@ def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
 
 
 def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
-    """What the last effect of a model may gain by smoothing what gauges read, which the right model cannot.
+    """Gain of a model's last effect by smoothing the gauges' noise, which the right model cannot have.
 
-    On data that the model without it made, driven by other readings of the same noise; taken twice, since
-    that is one draw, and of readings that were quieter before.
+    On data that the model without it predicts, driven by other readings of the same noise. It is doubled,
+    since that is one draw, and of readings that were denoised before.
     """
     other = fitter.driven_again(less) if math.isfinite(less.chi2) else None
     if other is None:
@@ -693,10 +693,10 @@ def _by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
 
 
 def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
-    """Chi squared of experiments left out in turn that a model loses against one with an effect more.
+    """Rise in chi squared of experiments left out in turn, of a model over one with an effect more.
 
-    An experiment that holds most of what is known of the effects is left out in parts, not whole. What was
-    known before any data counts as an experiment.
+    An experiment with most of the information on the effects is left out in parts. Prior knowledge counts as
+    an experiment.
     """
     lost = fitter.deviance(less)[PRIOR] - fitter.deviance(more)[PRIOR]
     for rows in _folds(fitter, more):
@@ -706,7 +706,7 @@ def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
 
 
 def _share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
-    """The share of what is known of the last effect's size that each experiment tells."""
+    """Share of each experiment in the information on the last effect's size."""
     record = fitter.record
     every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
     last = every[:, -own]
@@ -751,9 +751,9 @@ def causes_of(
     ps: Sequence[float],
     levels: Sequence[Sequence[Fit]],
 ) -> tuple[Cause, ...]:
-    """The chosen effects, the most needed first, each with what would do in its place.
+    """The chosen effects, the most needed first, each with its rivals.
 
-    Beside others also what leaves no more than an error of their law would (`LAW`).
+    Rivals are also effects beside the others whose residual is within their law's error (`LAW`).
     """
     found = []
     for e in chosen.effects:
@@ -787,7 +787,7 @@ def causes_of(
 def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
     """Rivals of one cause, the nearest of them with laws of more freedom where those fit better.
 
-    The cause's own law was chosen so. `WORTH_LAWS` of what it takes must be taken by a rival before.
+    The cause's own law was chosen likewise. A rival must first take `WORTH_LAWS` of the cause's gain.
     """
     found = ranked(rivals)
     reach = chosen.chi2 + (1.0 - WORTH_LAWS) * (less.chi2 - chosen.chi2)
@@ -805,10 +805,10 @@ def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fi
 def _by_numerics(
     fitter: Fitter, effects: Sequence[Effect], chosen: Fit, tried: Sequence[Fit]
 ) -> dict[str, float]:
-    """Chi squared of models that only the error of the model's own mesh tells from the chosen one, by rival.
+    """Chi squared of models that differ from the chosen one only by the error of its mesh, by rival.
 
-    No mesh is exact, and its error is another one with the effect than without it. So an effect is not told
-    from one that explains the data as well once either has as much of that error as it likes.
+    No mesh is exact, and its error differs with and without the effect. So an effect has as a rival any that
+    explains the data as well once either has a free size of that error.
     """
     mesh = next((e for e in effects if e.name == NUMERICS), None)
     if mesh is None or NUMERICS in chosen.names:

@@ -1,4 +1,4 @@
-"""What each effect does to a record, what nuisances can hide of it, and which effects look alike."""
+"""Signature of each effect in a record, the part absorbed by nuisances, and which effects look alike."""
 
 from __future__ import annotations
 
@@ -70,11 +70,11 @@ def signatures(
 class Sensitivity:
     """Whitened derivative of the data by the size of one effect, at its null, nuisances fitted too.
 
-    column (N + m,): what of it nuisances leave, for the shape that is seen best, and what it costs to move
-    the m nuisances of which something is known; unabsorbed: its length over the length before; limit: size
-    at which delta chi squared is 16, in the parameter's unit; absorbed_by: the nuisances that take most, by
-    how much of the rest each takes; at_bounds: root of delta chi squared at the effect's largest size, nan
-    where that was not computed.
+    column (N + m,): the part not absorbed by nuisances, for the best visible shape, and the cost of moving
+    the m nuisances with prior knowledge; unabsorbed: its length over the length before; limit: size at which
+    delta chi squared is 16, in the parameter's unit; absorbed_by: the nuisances that take most, by how much
+    of the rest each takes; at_bounds: root of delta chi squared at the effect's largest size, nan where that
+    was not computed.
     """
 
     effect: Effect
@@ -87,14 +87,14 @@ class Sensitivity:
 
     @property
     def linear(self) -> bool:
-        """Whether the effect's detection limit, to first order, lies within its bounds."""
+        """True if the effect's detection limit, to first order, lies within its bounds."""
         p = self.effect.parameters[0]
         reach = max(abs(p.high - p.null), abs(p.low - p.null))
         return self.unabsorbed > ABSORBED and self.limit < reach
 
     @property
     def identifiable(self) -> bool:
-        """Whether the effect is above its detection limit at some size within its bounds.
+        """True if the effect is above its detection limit at some size within its bounds.
 
         To first order (`linear`), or because `at_bounds` is at least `SEEN`; nuisances must not absorb it.
         """
@@ -102,7 +102,7 @@ class Sensitivity:
 
     @property
     def worth_a_fit(self) -> bool:
-        """Whether the effect is worth a fit: `linear`, or `at_bounds` at least `WORTH` and not absorbed."""
+        """True if a fit is worthwhile: `linear`, or `at_bounds` at least `WORTH` and not absorbed."""
         return self.linear or (self.unabsorbed > ABSORBED and self.at_bounds >= WORTH)
 
 
@@ -154,10 +154,10 @@ def sensitivities(
 
 
 def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]) -> list[Sensitivity]:
-    """The same sensitivities, with `at_bounds` computed for effects that are not visible to first order.
+    """The same sensitivities, with `at_bounds` computed for effects not visible to first order.
 
-    The prediction at each bound of the size is taken for measured and the base model fitted to it; the root
-    of chi squared (no unit) that this leaves counts. Bounds without a solution are skipped.
+    The base model is fitted to the prediction at each bound of the size, and `at_bounds` is the root of the
+    chi squared left (no unit). Bounds without a solution are skipped.
     """
     judged = []
     for s in found:
@@ -183,7 +183,7 @@ def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensi
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:
     """Derivative (N,) of the prediction by one value, central unless a bound is in the way.
 
-    Of one side alone where the other has no prediction. 0 where neither has: `Composite.refused` says why.
+    One-sided where the other side has no prediction. 0 where neither has: `Composite.refused` says why.
     """
     at, h = values.get(key, p.null), 1.0 if p.linear else 0.05 * p.step
     up = fitter.possible({**values, key: at + h})
@@ -203,9 +203,9 @@ def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) 
 
 
 def _secant(fitter: Fitter, values: Mapping[str, float], effect: Effect) -> Array:
-    """Mean slope (N,) up to the start that moves the prediction most, of an effect that only then begins.
+    """Mean slope (N,) to the start that moves the prediction most, of an effect without slope at its null.
 
-    A wall that a unit does not reach is at first no nearer for being moved.
+    A wall that the unit does not reach has no effect until it is near enough.
     """
     size, plain = effect.parameters[0], fitter.predict(values)
     tried = {s: fitter.possible({**values, effect.keys[0]: s}) for s in size.starts if s != size.null}
@@ -235,7 +235,7 @@ def best_seen(found: Sequence[Sensitivity]) -> dict[str, Sensitivity]:
 def similarity(found: Sequence[Sensitivity]) -> Array:
     """Cosines (m, m) between the whitened signatures of m sensitivities, after nuisances were projected out.
 
-    0 for an effect of which nuisances leave nothing.
+    0 for an effect that nuisances absorb entirely.
     """
     unit = _unit(found)
     return np.asarray(unit.T @ unit)

@@ -1,4 +1,4 @@
-"""What predicts an experiment: one simulator a kind, and one that holds them all."""
+"""Simulators of experiments: one a kind, and one that holds them all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MODULUS = "modulus"
 
 
 class Simulator(Protocol):
-    """Predicts what the instruments of an experiment read; one class for each kind of experiment.
+    """Predicts the instruments' readings of an experiment; one class for each kind of experiment.
 
     nuisances: parameters that are fitted whatever the cause; effects: mechanisms that the base model may
     lack.
@@ -31,7 +31,7 @@ class Simulator(Protocol):
 
     @property
     def nuisances(self) -> tuple[Parameter, ...]:
-        """Parameters that are fitted in every model."""
+        """Parameters free in every model."""
         ...
 
     @property
@@ -111,7 +111,7 @@ class Composite:
         self.unseen = tuple(dict.fromkeys(n for k in known if (n := k.partition(".")[0]) not in seen))
 
     def knows(self, experiment: Experiment) -> bool:
-        """Whether there is a simulator for that experiment's kind."""
+        """Return True if there is a simulator for that experiment's kind."""
         return experiment.kind in self._simulators
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ class Composite:
 
 
 def _of_height(experiment: Experiment, off: float) -> Experiment:
-    """The experiment of a specimen that is higher than was typed by a share, so that it was strained less."""
+    """The experiment of a specimen higher than typed by a share, so that it was strained less."""
     if not off:
         return experiment
     strain = experiment["strain"] / (1.0 + off)

@@ -1,4 +1,4 @@
-"""Records of very many readings as means of a few readings each."""
+"""Very long records reduced to means of a few readings each."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ MOST = 20_000
 def thinned(experiments: Sequence[Experiment], simulator: Composite) -> tuple[list[Experiment], list[str]]:
     """The experiments with no more than `MOST` rows where they have a clock, and which were longer, in words.
 
-    Consecutive rows are averaged, all columns alike, so many of them each: exact for what is linear within
-    them, as what was done and what was read nearly are in a twenty-thousandth of a record, and white noise
-    loses nothing by it. A missing reading is left out of its mean. Where a predicted channel stays on the
-    steps of a display, its readings tell no more together than one does, and every so-manieth row is taken.
+    Equal numbers of consecutive rows are averaged, all columns alike. That is exact for quantities linear
+    within them, as nearly holds over a twenty-thousandth of a record, and loses no information in white
+    noise. A missing reading is left out of its mean. Where a predicted channel stays on the steps of a
+    display, several readings hold no more information than one, and rows are sampled instead.
     """
     found, words = [], []
     for e in experiments:
@@ -46,7 +46,7 @@ def _every(values: Array, each: int) -> Array:
 
 
 def _means(values: Array, each: int) -> Array:
-    """Means (m,) of each so many values (n,), those left over at the end too; nan where all are."""
+    """Means (m,) of so many values (n,) each, the last of what is left; nan where all are."""
     first = np.arange(0, len(values), each)
     seen = np.isfinite(values)
     count = np.add.reduceat(seen.astype(float), first)

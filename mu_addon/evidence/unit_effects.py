@@ -1,4 +1,4 @@
-"""How each static effect of the unit enters its finite-element model."""
+"""Static effects of the unit in its finite-element model."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ OBSTACLE_HALVINGS = 2
 
 @lru_cache(maxsize=2)
 def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
-    """A unit's mesh, kept: a process makes many runs of one unit, and moves this mesh for most others."""
+    """A unit's mesh, cached: a process makes many runs of one unit, and most others move this mesh."""
     from ..resolved.unit import mesh_of
 
     return mesh_of(unit, settings, cache=cache)
@@ -61,14 +61,13 @@ def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
 
 @attrs.frozen
 class Body:
-    """What a run of the unit is made from, before it has a mesh.
+    """Inputs of a run of the unit, before it has a mesh.
 
     finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
     lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
     `pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None where it is free. drawn:
-    the unit whose mesh is moved to this one's dimensions, since another mesh would bring noise as large as a
-    small effect. self_contact: whether walls and struts of a resolved unit keep apart. device: Warp's, of a
-    model.
+    the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small effect.
+    self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
     """
 
     unit: Unit
@@ -96,13 +95,13 @@ class Body:
 
     @property
     def down(self) -> Array:
-        """Unit vector (3,) along which things fall; toward +x, which is the mirror image of toward -x."""
+        """Unit vector (3,) of gravity; toward +x, which is the mirror image of toward -x."""
         x, y, z = down(self.orientation_deg, self.orientation_axis).round(12).tolist()
         return np.array([abs(x), y, z])
 
     @property
     def whole(self) -> Body:
-        """The body that shows its weight's direction: whole where that leaves the plane of bending."""
+        """The body made whole if its weight leaves the plane of bending."""
         if not self.down[0]:
             return self
         mesh, finer = (attrs.evolve(m, fraction="full") for m in (self.mesh, self.finer))
@@ -136,15 +135,15 @@ class Body:
 
 @attrs.frozen
 class UnitEffect:
-    """A static effect of the unit: its parameter, the sizes that are run, and what of the model it changes.
+    """A static effect of the unit: its parameter, the sizes that are run, and its change of the model.
 
     sizes: at 1.0x, in the parameter's unit, ascending, the null among them; larger: more of them, for units
     at whose scale the bound is beyond the last. body: of a body and a size; materials: of those without it,
     the mesh and a size; model, in place of the base's, and load (n, 3) in N: of a body, its mesh and a size.
-    They act side by side: each changes what the others have left. has_gravity: whether it depends on
-    gravity's direction. newton: of its runs. length: the power of a length by which the size of the same
-    change grows with the unit, at the same moduli and pressures. Raises InputError where sizes lack the null
-    or leave the bounds.
+    Effects combine, each applied to the result of the others. has_gravity: whether it depends on gravity's
+    direction. newton: of its runs. length: the power of a length by which the size of the same change grows
+    with the unit, at the same moduli and pressures. Raises InputError where sizes lack the null or leave the
+    bounds.
     """
 
     name: str
@@ -237,7 +236,8 @@ def _refined(body: Body, share: float) -> Body:
 def _in_region(mesh: Mesh, region: int) -> Array:
     """Elements (m,) that an effect of the wall's resin, or of the lattice, acts on.
 
-    Struts of a resolved mesh are of the wall's resin, and what is the lattice's law else is the resin's.
+    Struts of a resolved mesh are of the wall's resin, and effects of the lattice's law act on the resin
+    there.
     """
     return np.ones(len(mesh.tets), bool) if mesh.resolved else mesh.region == region
 
@@ -284,7 +284,7 @@ def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Material
 
 
 def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
-    """Lattice stiffer by `excess` where it shortens; below 0 less stiff there, as if its struts buckled.
+    """Lattice stiffer by `excess` in compression; below 0 less stiff, as if its struts buckled.
 
     In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
     tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
@@ -328,7 +328,7 @@ def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
 
 
 def _shared(effects: Sequence[Effect], name: str) -> Parameter:
-    """The parameter that another kind of experiment has for an effect: one effect, one value."""
+    """Parameter of the effect in another kind of experiment: one effect, one value."""
     return next(e.parameters[0] for e in effects if e.name == name)
 
 

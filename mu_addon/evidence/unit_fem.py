@@ -66,13 +66,13 @@ class UnitResponseWarning(UserWarning):
 
 @attrs.frozen
 class UnitSettings:
-    """How the unit is simulated for the evidence.
+    """Settings of the unit's simulation for the evidence.
 
-    mesh: the model's; finer: what mesh_error compares it with. pressures: how many, about; margin: how far
-    beyond the measured ones, as a share of their range. effects: names of those to run. distal: chambers
-    behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a marker
-    from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. self_contact: whether
-    walls and struts of a resolved unit keep apart. workers: processes, one a core by default.
+    mesh: the model's; finer: the one that mesh_error compares with. pressures: their approximate number;
+    margin: beyond the measured ones, as a share of their range. effects: names of those to run. distal:
+    chambers behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a
+    marker from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. self_contact: of
+    walls and struts of a resolved unit. workers: processes, one a core by default.
     """
 
     mesh: MeshSettings = COARSE
@@ -89,7 +89,7 @@ class UnitSettings:
 
     @classmethod
     def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
-        """The settings by which a unit is simulated homogenised or resolved (`MeshSettings.fidelity`)."""
+        """Settings for a unit simulated homogenised or resolved (`MeshSettings.fidelity`)."""
         if fidelity != HOMOGENISED:
             return cls(mesh=STRUTS, finer=STRUTS_FINE, self_contact=self_contact)
         return cls(self_contact=self_contact)
@@ -114,8 +114,7 @@ class UnitSettings:
 def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ...]:
     """About `count` pressures in kPa, ascending through 0, from a little below the readings to above.
 
-    margin: how far beyond the readings, as a share of their range. Raises InputError where all readings are
-    0.
+    margin: beyond the readings, as a share of their range. Raises InputError where all readings are 0.
 
     >>> pressures(np.array([0.02, 29.98]), 4, 0.05) == pressures(np.array([-0.02, 30.02]), 4, 0.05)
     True
@@ -138,9 +137,9 @@ def pressures(readings_kPa: Array, count: int, margin: float) -> tuple[float, ..
 
 
 def _outward(end: float, margin: float) -> float:
-    """The end and the margin together in two digits, so that a longer record finds the same runs.
+    """The end plus the margin, in two digits, so that a longer record finds the same runs.
 
-    In three where two would take most of the margin away, as 105 becomes 100.
+    In three where two would take most of the margin, as 105 becomes 100.
     """
     found = float(f"{end + margin:.2g}")
     return found if abs(found) > abs(end + margin / 2) else float(f"{end + margin:.3g}")
@@ -153,15 +152,15 @@ def unit_responses(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> tuple[UnitResponse, ...]:
-    """The unit's response at each scale and orientation of the experiments, of those given, that bend freely.
+    """Response of the freely bending unit at each scale and orientation of the experiments given.
 
     Of unit_pose experiments those are the `pose.STATIONS` about their axis.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
     `cache` and found again there, also by another call; `progress` is called with what is done and the share.
-    Sizes of an effect that cannot be computed are left out with a UnitResponseWarning, and so are
-    pressures that the base model does not reach. Raises InputError for markers out of place (`attached`) and
-    added masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
+    Sizes of an effect that cannot be computed are left out with a UnitResponseWarning, and so are pressures
+    that the base model does not reach. Raises InputError for markers out of place (`attached`) and added
+    masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
     """
     return _computed([e for e in experiments if e.kind in FREE], unit, settings, cache, progress)
 
@@ -173,7 +172,8 @@ def blocked_responses(
     cache: Path | None = None,
     progress: Progress | None = None,
 ) -> tuple[UnitResponse, ...]:
-    """As `unit_responses`, the force in N on a load cell that holds the tip, of blocked_force experiments.
+    """Force response in N on a load cell that holds the tip, as `unit_responses`, of blocked_force
+    experiments.
 
     One response for each scale, gap and orientation. A unit of s times the size presses with s^2 times the
     force at the same pressures.
@@ -230,7 +230,7 @@ def _orientations(experiments: Sequence[Experiment]) -> tuple[tuple[float, Direc
 
 
 def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
-    """The responses with a wall's reach counted from where the free unit gets in any of them."""
+    """The responses with a wall's reach counted from the farthest motion of the free unit in any of them."""
     farthest = {
         s: max(r.walls[s].farthest_mm for r in responses if s in r.walls)
         for s in {s for r in responses for s in r.walls}
@@ -249,7 +249,7 @@ def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
 def similar(unit: Unit) -> Unit:
     """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
 
-    An elastic body has no length of its own: enlarged as a whole, at the same pressures and moduli, it turns
+    An elastic body has no intrinsic length: enlarged as a whole, at the same pressures and moduli, it rotates
     by the same angles. The print's offsets and skin depth in mm do not grow with the unit, so here they are
     divided by its scale.
     """
@@ -268,7 +268,7 @@ def similar(unit: Unit) -> Unit:
 
 @attrs.frozen
 class _Plan:
-    """What is to be run for one scale: `body`, similar to the unit, which is `enlarged` times as large."""
+    """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large."""
 
     body: Body
     scale: float
@@ -320,7 +320,7 @@ class _Plan:
 
     @property
     def held(self) -> bool:
-        """Whether a load cell holds the tip."""
+        """True if a load cell holds the tip."""
         return self.body.gap_mm is not None
 
     def names(self, settings: UnitSettings) -> list[str]:
@@ -341,7 +341,7 @@ class _Plan:
         return Run(body, self.pressures_kPa, points, effect, size, outline)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
-        """The base first, then what takes longest."""
+        """The base first, then the longest runs."""
         yield self.case()
         for name in sorted(set(self.names(settings)), key=lambda n: (n != "mesh_error", n)):
             effect = effect_of(name)
@@ -358,7 +358,7 @@ class _Plan:
         return Result(result.values[: 2 + 3 * len(self.markers)], result.why)
 
     def free(self, found: dict[str, Result]) -> dict[int, tuple[Array, Array]]:
-        """By side, 1 for +y: the free unit's pressures from 0 on, and its outline's moves in mm."""
+        """Pressures of the free unit from 0 on, and its outline's moves in mm, by side, 1 for +y."""
         outline = found[self.case().key()].values[-2:] * self.enlarged
         at = np.array(self.pressures_kPa)
         sides: dict[int, tuple[Array, Array]] = {}
@@ -411,7 +411,7 @@ class _Plan:
 
     @property
     def larger(self) -> Array:
-        """What each row of a result is multiplied by: lengths grow with the unit, an angle does not."""
+        """Factor on each row of a result: lengths grow with the unit, an angle does not."""
         if self.held:
             return np.array([[self.enlarged**2]])
         lengths = [self.enlarged] * (3 * len(self.markers))
@@ -486,7 +486,7 @@ def _warn(text: str) -> None:
 
 
 def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Progress) -> dict[str, Result]:
-    """Results by key, from the cache where they are there, and kept there as soon as one is found."""
+    """Results by key, from the cache where they are there, and stored as soon as one is found."""
     table = None if cache is None else Cache(cache)
     found: dict[str, Result] = {}
     for key, case in cases.items():
@@ -515,7 +515,7 @@ def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterat
 
 
 def _stored(table: Cache, key: str, case: Run) -> Result | None:
-    """A kept result, or None where there is none that can be read whole."""
+    """Stored result, or None where there is none that can be read completely."""
     kept = table.get("unit", key)
     if kept is None or not {"values", "why"} <= set(kept):
         return None

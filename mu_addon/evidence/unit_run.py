@@ -32,7 +32,7 @@ HELD_STEPS = 4
 
 
 def effect_of(name: str) -> UnitEffect:
-    """The static effect of a name, walls and a load cell's place included."""
+    """Static effect of a name, walls and a load cell's place included."""
     return FLAT_OBSTACLE if name == CONTACT else {**EFFECTS, HELD.name: HELD}[name]
 
 
@@ -40,8 +40,8 @@ def effect_of(name: str) -> UnitEffect:
 class Run:
     """One quasi-static simulation: a body, an effect and its size, pressures in kPa, points in mm.
 
-    points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: whether to
-    find, beside angle and places, how far the outline moves toward +y and -y, in mm.
+    points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: also
+    compute how far the outline moves toward +y and -y, in mm.
     """
 
     body: Body
@@ -101,7 +101,7 @@ class Run:
 
 @attrs.frozen(eq=False)
 class Result:
-    """What a run found: values (rows, k) at k pressures, in degrees, mm3 and mm; nan where not reached.
+    """Result of a run: values (rows, k) at k pressures, in degrees, mm3 and mm; nan where not reached.
 
     why: the reason where values are nan, else empty.
     """
@@ -111,7 +111,7 @@ class Result:
 
 
 def run(case: Run, cache: Path | None = None) -> Result:
-    """Angle in degrees, growth of the chambers in mm3 and places of points in mm at every pressure.
+    """Angle in degrees, growth of the chambers in mm3 and positions of points in mm at every pressure.
 
     cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
@@ -155,14 +155,14 @@ def run(case: Run, cache: Path | None = None) -> Result:
 
 
 def _turned(body: Body) -> Any:
-    """What of a body's orientation its weight depends on: degrees about x, or a direction."""
+    """The part of a body's orientation that its weight depends on: degrees about x, or a direction."""
     if tuple(body.orientation_axis) == X:
         return body.orientation_deg
     return tuple(body.down.tolist())
 
 
 def _held(equilibrium: Equilibrium, start: State, gap_mm: float) -> tuple[HeldTip, State]:
-    """The load cell that holds the tip gap_mm away from a state without pressure, and the state there."""
+    """Load cell that holds the tip gap_mm away from a state without pressure, and the state there."""
     held = HeldTip(equilibrium.model.mesh, gap_mm, start.u[:, 1])
     equilibrium.model.obstacles = (held,)
     if gap_mm == 0.0:
@@ -176,7 +176,7 @@ def _held(equilibrium: Equilibrium, start: State, gap_mm: float) -> tuple[HeldTi
 
 
 def _states(equilibrium: Equilibrium, pressures_kPa: Array, start: State) -> Iterator[tuple[int, State]]:
-    """Number of a pressure and its state, as far as they are reached; the last ConvergenceError is raised.
+    """Yield number and state of each pressure as far as they are reached; raise the last ConvergenceError.
 
     start: without pressure.
     """

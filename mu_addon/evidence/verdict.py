@@ -1,4 +1,4 @@
-"""The verdict on a folder of measured data: what is wrong, how sure, what it gains, what to measure next."""
+"""The verdict on a folder of measured data: cause, confidence, gain, and next measurement."""
 
 from __future__ import annotations
 
@@ -74,17 +74,16 @@ ROUNDS = 3
 
 @attrs.frozen(eq=False)
 class Verdict:
-    """What the data say of the model: the causes named, their rivals, the gain, and what to measure next.
+    """Verdict of the data on the model: the causes named, their rivals, the gain, the next experiment.
 
     kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
     their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
     95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings that do not count, in words (`resolution.wrong_readings`). refused: why
-    models that were tried have no prediction, by the titles of their effects. share_taken: of the base
-    model's misfit by the chosen one; a verdict `named` or `ambiguous` may leave structure
-    (`selection.mainly`). nearest: title of the best single explanation, named or not, and its share of the
-    misfit. far: nuisances that are far from what was known of them, the farthest first. zeros: of a load
-    cell, where they hide an error.
+    the reason. set_aside: readings left out, in words (`resolution.wrong_readings`). refused: why models that
+    were tried have no prediction, by the titles of their effects. share_taken: of the base model's misfit by
+    the chosen one; a verdict `named` or `ambiguous` may leave structure (`selection.mainly`). nearest: title
+    of the best single explanation, named or not, and its share of the misfit. far: nuisances that are far
+    from what was known of them, the farthest first. zeros: of a load cell, where they hide an error.
     `as_json` is the content of verdict.json.
     """
 
@@ -121,7 +120,7 @@ class Verdict:
         return frozenset(self.names) | rivals
 
     def _share(self, cause: Cause) -> float:
-        """Share of the base model's misfit that is lost where one of several causes is taken away."""
+        """Share of the base model's misfit that returns where one of several causes is taken away."""
         gained = self.selection.base.chi2 - self.selection.chosen.chi2
         return self.share_taken * min(cause.loss / gained, 1.0) if gained > 0 else 0.0
 
@@ -187,8 +186,8 @@ def noise_of(
     """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
 
     values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
-    base model's fit where None. What any effect of the library, and those of `effects`, can do to the data is
-    not counted as noise.
+    base model's fit where None. Changes by any effect of the library, and by those of `effects`, do not count
+    as noise.
     """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
@@ -200,13 +199,13 @@ def noise_of(
 
 
 def _rough(measured: Record, group: str) -> Source:
-    """Sizes only: white noise of a hundredth of the group's range."""
+    """Rough sizes: white noise of a hundredth of the group's range."""
     values = np.concatenate([measured.values[s.at] for s in measured.series if s.group == group])
     return Source(max(float(np.ptp(values)), 1e-9) / 100.0, 1e-6, 1.0)
 
 
 def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
-    """What each effect of the library does to the data beside the base model's values."""
+    """Sensitivity to each effect of the library beside the base model's values."""
     curved = {p.name: base.values[p.name] for p in fitter.curved}
     return at_bounds(fitter, curved, sensitivities(fitter, curved))
 
@@ -217,10 +216,10 @@ def diagnose(
     """Judge a model by measured experiments: which effects explain the misfit, and how surely.
 
     experiments: from `measured.read_folder`; those with the role "held_out" are used for the gain alone.
-    simulator: of their kinds. progress: called with what is being done. Noise is estimated first and the
-    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where
-    it is significant, predicts left-out experiments better and leaves no structure. Raises InputError where
-    no experiment can be predicted, and where `require_plausible` does.
+    simulator: of their kinds. progress: called with the step in progress. Noise is estimated first and the
+    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where it
+    is significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
+    experiment can be predicted, and where `require_plausible` does.
     """
     experiments, set_aside = without_wrong_readings(experiments, simulator)
     experiments, averaged = thinned(experiments, simulator)
@@ -365,9 +364,9 @@ def diagnose(
 def _loud_alone(
     fitter: Fitter, seen: Sequence[Sensitivity], found: Selection, progress: Callable[[str], None]
 ) -> tuple[Fitter, Selection, list[str]] | None:
-    """Fitter, selection and remarks under noise in bursts, where that had passed for causes; else None.
+    """Fitter, selection and remarks under noise in bursts if that explains the causes away; else None.
 
-    Noise that grows with load is largest where every law of the material says most.
+    Noise that grows with load is largest where laws of the material differ most.
     """
     left = fitter.record.values - fitter.predict(found.chosen.values)
     measured, bursts = with_bursts(fitter.record, left)
@@ -388,7 +387,7 @@ def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
 
 
 def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Why a misfit that no significant effect explains is none, in words: it is as small as the scatter."""
+    """Reason why a misfit without a significant effect is none, in words: it is as small as the scatter."""
     left = fitter.record.values - fitter.predict(found.base.values)
     if found.causes or not within_scatter(fitter.record, left):
         return ""
@@ -407,7 +406,7 @@ def _by_curvature(fit: Fit, key: str) -> tuple[float, float]:
 def _base(
     experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
 ) -> tuple[Record, Fitter, Fit]:
-    """The record of what is fitted, a fitter with its noise, and the fit without effects."""
+    """Record of the fitted experiments, a fitter with its noise, and the fit without effects."""
     measured = _measured(experiments, again, simulator)
     fitter = Fitter(measured, simulator, noise_of(measured, simulator))
     return measured, fitter, fitter.fit()
@@ -416,7 +415,7 @@ def _base(
 def _measured(
     experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
 ) -> Record:
-    """The record of what is fitted, with what a second reading of its gauges would have driven it by."""
+    """Record of the fitted experiments, with drives by a second reading of their gauges."""
     found = record([e for e in experiments if e.role == "fit"], simulator)
     if not again:
         return found
@@ -425,7 +424,7 @@ def _measured(
 
 
 def _among(effect: Effect) -> dict[str, Any] | None:
-    """What differs in an effect, and by how much: a standard deviation with its interval."""
+    """Owners among which an effect differs, and its standard deviation with an interval."""
     if not effect.among:
         return None
     value, low, high = effect.spread
@@ -434,7 +433,7 @@ def _among(effect: Effect) -> dict[str, Any] | None:
 
 
 def _wandering(found: Selection) -> list[Effect]:
-    """Chosen effects that the estimate of noise does not set aside by itself."""
+    """Chosen effects that the estimate of noise does not set aside itself."""
     return [e for e in found.chosen.effects if e.whose or e.name in WANDERING]
 
 
@@ -443,13 +442,13 @@ def _total(source: Source) -> float:
 
 
 def _apart(one: Source, other: Source) -> bool:
-    """Whether two estimates of one noise differ more than such estimates do."""
+    """Return True if two estimates of one noise differ more than such estimates do."""
     total = [_total(s) for s in (one, other)]
     return max(total) > RENEWED * min(total)
 
 
 def _strained(fitter: Fitter, fit: Fit) -> bool:
-    """Whether a nuisance is much farther from what was known of it than a nuisance is."""
+    """Return True if a nuisance is much farther from its prior value than its spread allows."""
     return any(abs(fit.values[p.name] - p.null) > STRAINED * p.spread for p in fitter.known)
 
 
@@ -462,13 +461,13 @@ def _kind(fitter: Fitter, found: Selection) -> str:
 
 
 def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
-    """Nuisances whose values are far from what was known of them, the farthest first."""
+    """Nuisances with values far from prior knowledge, the farthest first."""
     away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
     return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
 
 
 def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:
-    """Effects that these data cannot show, with the reason and what would show them."""
+    """Effects that these data cannot show, with the reason and a way to show them."""
     found = {}
     shown = {f.names[0] for f in chosen.singles if chosen.base.chi2 - f.chi2 >= SEEN**2}
     for name, s in best_seen(seen).items():

@@ -1,1 +1,1 @@
-"""What the model predicts of each kind of experiment, every effect of the library included."""
+"""Predictions of each kind of experiment, with every effect of the library."""

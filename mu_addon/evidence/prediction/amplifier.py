@@ -1,4 +1,4 @@
-"""What a load cell and its amplifier do: a gain that is off or changes with load, a mean over time."""
+"""Faults of a load cell and its amplifier: gain, curve, and averaging over time."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def amplifier(kind: str) -> tuple[Effect, ...]:
 
 
 def amplified(force: Array, values: Mapping[str, float], largest: float) -> Array:
-    """Force or stress (n,) with the gain that a load cell has beside the right one (`amplifier`).
+    """Force or stress (n,) with the gain error of a load cell (`amplifier`).
 
     largest: reading at which its curve is straight again, in the unit of force; 0 where none is known.
     """
@@ -53,7 +53,7 @@ def amplified(force: Array, values: Mapping[str, float], largest: float) -> Arra
 
 
 def filtered(time_s: Array, force: Array, values: Mapping[str, float]) -> Array:
-    """Force or stress (n,) as a load cell's amplifier delays it, at times (n,) in s (`amplifier`)."""
+    """Force or stress (n,) as delayed by a load cell's amplifier, at times (n,) in s (`amplifier`)."""
     if (period := values.get("force_lag.period_s", 0.0)) > 0.0:
         return swinging(time_s, force[None], 1.0 / period, values.get("force_lag.damping", 0.87))[0]
     return first_order_lag(time_s, force, values.get("force_lag.time_s", 0.0))

@@ -1,4 +1,4 @@
-"""Everything a bench measures beside the unit: which class predicts which kind."""
+"""Everything a bench measures beside the unit: the class that predicts each kind."""
 
 from __future__ import annotations
 

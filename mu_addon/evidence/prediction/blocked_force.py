@@ -1,4 +1,4 @@
-"""blocked_force: what the tip of a unit presses with on a load cell that holds it."""
+"""blocked_force: force of a unit's tip on a load cell that holds it."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def shares(values: Mapping[str, float]) -> tuple[tuple[float, float], ...]:
 
 
 def _weighed(t: Array, p: Array, relaxing: Sequence[tuple[float, float]]) -> Array:
-    """Load (n,) at which the unit without memory would stand, of loads p (n,) at times t (n,) in s."""
+    """Load (n,) that puts a unit without memory in the same state, for loads p (n,) at times t (n,) in s."""
     if not relaxing:
         return p
     now = 1.0 - sum(share for share, _ in relaxing)
@@ -173,12 +173,12 @@ def _weighed(t: Array, p: Array, relaxing: Sequence[tuple[float, float]]) -> Arr
 
 
 def pressing(t: Array, held: Array, relaxing: Sequence[tuple[float, float]] = ()) -> Array:
-    """Force (n,) on a cell that cannot pull, of the force (n,) that would hold a unit without memory.
+    """Force (n,) on a cell that cannot pull, from the force (n,) that would hold a unit without memory.
 
-    t (n,): times in s, ascending. relaxing: shares and times in s of the resin's elements. Pressure and force
-    act alike on what remembers: the unit stands where one without memory stands under both, each weighed by
-    its past (`_weighed`). While the tip touches, that of the force is `held`; else the force is 0, and what
-    is remembered of it fades.
+    t (n,): times in s, ascending. relaxing: shares and times in s of the resin's elements. Relaxation acts
+    alike on pressure and force: the unit stands where one without memory stands under both, each weighed by
+    its past (`_weighed`). While the tip touches, the force's load is `held`; else the force is 0, and its
+    past fades.
     """
     if not relaxing:
         return np.maximum(held, 0.0)
@@ -203,7 +203,7 @@ def _zero(experiment: Experiment) -> str:
 
 
 def _zero_parameter(experiment: Experiment) -> Parameter:
-    """The load cell's zero in an experiment, known to a share of the largest force: it is set before each."""
+    """Zero of the load cell in an experiment, known to a share of the largest force: set before each."""
     most = float(np.nanmax(np.abs(experiment[FORCE]))) or 1.0
     zero = Parameter(_zero(experiment), "N", -most, most, 0.0, (), "set by hand", spread=ZERO_SHARE * most)
     return attrs.evolve(zero, experiment=experiment.name)

@@ -1,4 +1,4 @@
-"""What a camera makes of a unit that bends in the plane it looks at: scale, angle of view, lens, turning."""
+"""Faults of a camera that looks at the plane of bending: scale, angle of view, lens, rotation."""
 
 from __future__ import annotations
 
@@ -70,10 +70,10 @@ def camera_effects(channels: Sequence[str], kind: str, experiments: Sequence[Exp
 
 
 def _perspectives(kind: str) -> tuple[Effect, ...]:
-    """Laws of a camera that looks at an angle: to first order, along the axis and across, and as it is.
+    """Laws of a camera at an angle: to first order, along the axis and across, and in full.
 
-    The last is tried where one of the others is found: what is turned away is foreshortened, too, by the
-    second order of the angle.
+    The last is tried where one of the others is found: it includes foreshortening, of second order in the
+    angle.
     """
     first = (Parameter(way, "", -KEYSTONE, KEYSTONE, 0.0, (0.01,), _KEYSTONE) for way in ("along", "across"))
     whole = (
@@ -98,7 +98,7 @@ def _perspectives(kind: str) -> tuple[Effect, ...]:
 def read_by_camera(
     channels: Sequence[str], y: Array, time_s: Array, scale: float, values: Mapping[str, float]
 ) -> Array:
-    """Channels (c, n) as a camera with its faults reads them, of what they are (c, n), in degrees and mm.
+    """Channels (c, n) as read by a camera with its faults, from the true ones (c, n), in degrees and mm.
 
     time_s (n,): in s; scale: of the unit; values: by "effect.parameter". The picture's middle is that of the
     unit at rest, half way along its axis. Positions there: y across and z along the axis; x is depth, which
@@ -142,11 +142,11 @@ def read_by_camera(
 
 
 def _view(values: Mapping[str, float]) -> tuple[Array, Array] | None:
-    """What a camera that looks at an angle makes of a place x (2,), across and along: M x / (1 + k . x).
+    """Matrix and vector of the map x -> M x / (1 + k . x) of a camera at an angle, x (2,) across and along.
 
     M (2, 2), and k (2,) for places in halves of the unit's length; None where it looks straight. Of a pinhole
-    turned by an angle v toward a direction n in the picture: M foreshortens along n by cos v, and k is
-    n sin v over its distance.
+    turned by an angle v toward a direction n in the picture: M foreshortens along n by cos v, and k is n sin
+    v over its distance.
     """
     get = values.get
     farther = np.array([get("camera_perspective.across", 0.0), get("camera_perspective.along", 0.0)])
@@ -160,11 +160,11 @@ def _view(values: Mapping[str, float]) -> tuple[Array, Array] | None:
 
 
 def _angle_misread(angle: Array, view: tuple[Array, Array] | None, lens: float, squeezed: float) -> Array:
-    """By how much the angle (n,) of the tip's cross-section is misread, in rad, as the angle itself.
+    """Error (n,) of the angle (n,) of the tip's cross-section as seen, both in rad.
 
-    The line that is seen is the tangent (sin a, cos a) at the tip of an arc, (1 - cos a)/a across and
-    sin a/a along of its length. Each fault turns it by its Jacobian: perspective (`_view`), then a lens of
-    x' = x (1 + k r^2).
+    The line that is seen is the tangent (sin a, cos a) at the tip of an arc, (1 - cos a)/a across and sin a/a
+    along of its length. Each fault turns it by its Jacobian: perspective (`_view`), then a lens of x' = x (1
+    + k r^2).
     """
     y = 2.0 * np.where(np.abs(angle) > 1e-6, (1.0 - np.cos(angle)) / np.where(angle, angle, 1.0), 0.5 * angle)
     z = 2.0 * np.sinc(angle / np.pi) - 1.0

@@ -156,7 +156,7 @@ def _first(mode: str, stretch: Array) -> Array:
 
 
 def _stiffer(slope: float, form: float, mode: str, stretch: Array) -> Array:
-    """W' over c1 (n,), see `POWER`; held where it would be without bound."""
+    """W' over c1 (n,), see `POWER`; held constant where it would be without bound."""
     x = slope * (_first(mode, stretch) - 3)
     if abs(form) < 1e-6:
         return np.asarray(np.exp(np.minimum(x, 20.0)))

@@ -1,4 +1,4 @@
-"""The curve of an instrument whose reading is off a straight line: its load cell's, its pressure gauge's."""
+"""The curve of an instrument that is not linear: of a load cell or a pressure gauge."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Array = np.ndarray[Any, Any]
 
 
 def bow(source: str) -> Parameter:
-    """How far a reading is off straight at half the largest one, as a share of that."""
+    """Deviation of a reading from a straight line at half the largest one, as a share of that."""
     return Parameter("bow", "", -0.05, 0.05, 0.0, (0.01,), source, spread=0.01)
 
 
 def curved(reading: Array, bow: float, largest: float) -> Array:
-    """Reading (n,) of an instrument off straight that should read (n,), in the same unit.
+    """Reading (n,) of a curved instrument at true values (n,), in the same unit.
 
     largest: reading at which its curve is straight again; 0 where none is known.
     """
@@ -27,7 +27,7 @@ def curved(reading: Array, bow: float, largest: float) -> Array:
 
 
 def straightened(reading: Array, bow: float, largest: float) -> Array:
-    """What an instrument off straight should read (n,) where it reads (n,): the inverse of `curved`."""
+    """True values (n,) at readings (n,) of a curved instrument: the inverse of `curved`."""
     if not bow or largest <= 0.0:
         return reading
     # The root of x (1 + 4 b (1 - x / L)) = |reading| that is |reading| at b = 0.

@@ -76,7 +76,7 @@ def drift(name: str, time_s: Array, values: Mapping[str, float]) -> Array | floa
 
 
 def zeroed(effects: Iterable[Effect], kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
-    """Effects of a kind, its gauge's offset no larger than a gauge's: a share of what it reads, or 1 kPa."""
+    """Effects of a kind, with its gauge's offset bounded by a share of the reading, or 1 kPa."""
     most = max(OFFSET_SHARE * largest_reading("pressure_kPa", kind, experiments), LEAST_OFFSET_kPa)
     return tuple(
         attrs.evolve(e, parameters=(e.parameters[0].narrowed(-most, most), *e.parameters[1:]))

@@ -1,4 +1,4 @@
-"""Pressure in time at which the unit without memory would stand where the unit with it stands.
+"""Effective pressure: that at which a unit without memory would stand where the real one does.
 
 All moduli scaled alike are the pressure scaled inversely; moduli that relax alike change it to first order of
 the hereditary integral. Each record begins in equilibrium.
@@ -41,10 +41,10 @@ def in_the_chambers(t: Array, p: Array, values: Mapping[str, float]) -> Array:
 def remembered(
     t: Array, p: Array, values: Mapping[str, float], reference_kPa: float, before_kPa: float = 0.0
 ) -> Array:
-    """Pressure (n,) in kPa at which the unit without memory would stand, of p (n,) in kPa in its chambers.
+    """Pressure (n,) in kPa that puts a unit without memory into the same state, from that in the chambers.
 
-    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (any law), hysteresis without a
-    rate and Mullins softening, applied in this order. reference_kPa: whose square the energy of softening is
+    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (any law), hysteresis without a rate
+    and Mullins softening, applied in this order. reference_kPa: whose square the energy of softening is
     relative to, where values do not say; before_kPa: the largest absolute pressure before t begins.
     """
     get = values.get
@@ -108,7 +108,7 @@ def spread_lag(t: Array, p: Array, values: Mapping[str, float], longer: float = 
 
 
 def lag_weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
-    """Weights by which `first_order_lag` goes over steps h in s, of where it is and of both ends of p."""
+    """Weights of `first_order_lag` over steps h in s, for its state and for both ends of p."""
     a = np.exp(-h / time_s)
     mean = -np.expm1(-h / time_s) * time_s / h
     return a, mean - a, 1.0 - mean

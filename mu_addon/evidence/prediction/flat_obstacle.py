@@ -1,4 +1,4 @@
-"""A wall beside the unit: from where on it stops the unit, and what that changes."""
+"""A wall beside the unit: the pressure at which it stops the unit, and the change by it."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class ObstacleResponse:
     """The unit's response to a flat wall on one side of it, along its axis.
 
     pressures_kPa (k,): of the free unit, from 0 on to its last one on this side, up or down; outward_mm (k,):
-    how far it then leaves its outline at rest, ascending from 0. reaches_mm (m,): how far walls stand inside
-    the last of these, ascending; shares (t,): of the way from the pressure at which a wall is met to the last
-    one, ascending to 1; changes (m, t, c): of c channels. spare_mm: how much farther than here the free unit
-    gets in another of the experiments; sizes are counted from there. Raises InputError.
+    how far it then goes beyond its outline at rest, ascending from 0. reaches_mm (m,): how far walls stand
+    inside the last of these, ascending; shares (t,): of the way from the pressure at which a wall is met to
+    the last one, ascending to 1; changes (m, t, c): of c channels. spare_mm: how much farther than here the
+    free unit gets in another of the experiments; sizes are counted from there. Raises InputError.
     """
 
     pressures_kPa: Array = attrs.field(converter=_float64)
@@ -55,7 +55,7 @@ class ObstacleResponse:
 
     @property
     def farthest_mm(self) -> float:
-        """How far, in mm, the free unit leaves its outline at the last pressure."""
+        """Largest distance in mm of the free unit beyond its outline at rest, at the last pressure."""
         return float(self.outward_mm[-1])
 
     @cached_property

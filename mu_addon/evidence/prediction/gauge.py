@@ -1,4 +1,4 @@
-"""What a pressure gauge does to what it reads: its zero is off, its gain is off or changes with pressure."""
+"""Faults of a pressure gauge: its zero, its gain, and its curve."""
 
 from __future__ import annotations
 

@@ -234,9 +234,9 @@ class ChamberPressure:
 
 
 def _warmed(experiments: Sequence[Experiment], effect: Effect) -> Effect:
-    """The effect; a temperature drift no larger than gas can warm or cool as it is compressed or drawn out.
+    """Effect of a temperature drift no larger than that of gas compressed or expanded adiabatically.
 
-    Without any heat lost on the way (adiabatic): T / T0 = (P / P0)^((gamma - 1) / gamma), gamma of air.
+    T / T0 = (P / P0)^((gamma - 1) / gamma), gamma of air.
     """
     if effect.parameters[0].name != "cooling_K":
         return effect
@@ -375,7 +375,7 @@ def _seeping(loss: float, inertia: float, P: float) -> float:
 
 
 def _above(loss: float, opens: float, P: float) -> float:
-    """Flow in 1/s in proportion to what a pressure is above another one, both in atmospheres."""
+    """Flow in 1/s in proportion to the excess of a pressure over another, both in atmospheres."""
     return loss * max(P - opens, 0.0)
 
 

@@ -1,7 +1,7 @@
-"""Instants between samples: where a drive turned from one straight line to another, and steps of a fast way.
+"""Instants between samples: corners of a drive between straight lines, and substeps of fast changes.
 
-A regulator goes straight to where it turns, seldom at a sample. Whatever integrates over what it did (a mass,
-a line, a resin that relaxes) is driven by where it went, not by the chord from sample to sample.
+A regulator turns at corners, seldom at a sample. Anything that integrates the drive (a mass, a line, a resin
+that relaxes) depends on its true course, not on the chord from sample to sample.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ SHARE, MOST = 0.05, 8
 
 
 def finer(t: Array, drive: Array) -> tuple[Array, Array, Array]:
-    """Times (m,) in s, the drive (m,) there in its unit, and which of them (n,) the samples are.
+    """Times (m,) in s, the drive (m,) there in its unit, and the indices (n,) of the samples among them.
 
-    t (n,), drive (n,): samples, times ascending. Between two samples whose neighbours lie on straight lines
-    that meet there, on one side for two steps or more, a corner is inserted; then every fast way is divided
-    evenly. Linear between the samples elsewhere.
+    t (n,), drive (n,): samples, times ascending. Where the lines through the neighbours of two samples meet
+    between them, a corner is inserted, if on one side they hold for two steps or more; then fast changes are
+    divided evenly. Linear between the samples elsewhere.
     """
     if len(t) < 6 or not np.ptp(drive):
         return t, drive, np.arange(len(t))

@@ -1,4 +1,4 @@
-"""lattice_compression: a block of lattice between plates, and its mass where it was weighed."""
+"""lattice_compression: a block of lattice between plates, and its mass if it was weighed."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ EFFECTS = (
 
 
 class Scaling(Protocol):
-    """How printing changes the modulus and mass of a lattice, relative to the lattice as drawn.
+    """Change of a lattice's modulus and mass by printing, relative to the lattice as drawn.
 
     scale: factor on the lengths of the design, 1 as drawn at 1.0x; offsets in mm are of the printed part and
     do not grow with it.
@@ -148,10 +148,10 @@ SLENDER = Struts()
 class ComputedCell:
     """Stiffness and mass of a lattice's own cell, from virtual tests of it at several print offsets.
 
-    A thin skin is, to first order of its depth, as good as its excess modulus times its depth of more resin
-    on the surface, so that it stiffens by the slope of the offset's response. reference: the block to whose
-    modulus as drawn the stiffness is relative, where it is not this one (another count of cells, say).
-    printed_mm, printed_excess_mm: offset and skin that the lattice has before any effect.
+    To first order, a thin skin acts as additional resin of its excess modulus times its depth, so that it
+    stiffens by the slope of the offset's response. reference: the block to whose modulus as drawn the
+    stiffness is relative, where it is not this one (another count of cells, say). printed_mm,
+    printed_excess_mm: offset and skin that the lattice has before any effect.
     """
 
     response: OffsetResponse
@@ -233,12 +233,12 @@ class LatticeStress:
 
     @property
     def computed(self) -> OffsetResponse | None:
-        """The response of the block whose modulus as drawn is fitted; None where it is of slender struts."""
+        """Response of the block whose modulus as drawn is fitted; None for slender struts."""
         found = [s for s in self.scalings.values() if isinstance(s, ComputedCell)]
         return (found[0].reference or found[0].response) if found else None
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
-        """The predicted columns: nominal stress in kPa, and mass in g where it and the volume are given."""
+        """Predicted columns: nominal stress in kPa, and mass in g where it and the volume are given."""
         weighed = "mass_g" in experiment.columns and _volume_cm3(experiment) is not None
         return ("stress_kPa", "mass_g") if weighed else ("stress_kPa",)
 
@@ -280,7 +280,7 @@ class LatticeStress:
 
 
 def _within(effect: Effect, most: float) -> Effect:
-    """The effect with its size kept below some value."""
+    """The effect with its size bounded by a value."""
     size, *others = effect.parameters
     if size.high <= most:
         return effect

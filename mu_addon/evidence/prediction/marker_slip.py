@@ -1,4 +1,4 @@
-"""A marker that slips on the unit's surface at one moment, and stays where it slipped to."""
+"""A marker that slips on the unit's surface at one moment and stays there."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Recordings:
         return float(self._begins[-1])
 
     def place(self, moment_s: float) -> tuple[Experiment, float]:
-        """The record in which a moment of recording falls, and when by that record's own clock, both in s."""
+        """Record that contains a moment of recording, and the time by its own clock, both in s."""
         k = self._of(moment_s)
         first = float(self.experiments[k]["time_s"][0])
         return self.experiments[k], first + moment_s - float(self._begins[k]) - 0.5 * self._sample_s[k]
@@ -110,7 +110,7 @@ def markers(columns: Iterable[str]) -> dict[int, str]:
 
 
 def slip_effects(channels: Sequence[str], kind: str, recordings: Recordings) -> list[Effect]:
-    """The markers that may have slipped, as effects of a kind, with starts by a search of the records.
+    """Markers that may have slipped, as effects of a kind, with starts by a search of the records.
 
     channels: that are predicted. None where fewer than two markers are seen: one alone moves as it would if
     the camera were moved. The marker whose best moment gains most is always among them, others where theirs
@@ -131,9 +131,9 @@ def slip_effects(channels: Sequence[str], kind: str, recordings: Recordings) -> 
 
 @attrs.frozen
 class Slip:
-    """What a search found of one marker: the moment, in s of recording, and its step (y, z) in mm.
+    """Result of a search for one marker's slip: the moment, in s of recording, and its step (y, z) in mm.
 
-    gain: chi squared that the step takes; tried: how many moments it was the best of.
+    gain: chi squared of the step; tried: number of moments it is the best of.
     """
 
     marker: int
@@ -189,11 +189,11 @@ def slipped(
     recordings: Recordings,
     values: Mapping[str, float],
 ) -> Array:
-    """Channels (c, n) with the displacement, in the picture, of each marker that slipped, of those without.
+    """Channels (c, n) with the displacement, in the picture, of each marker that slipped.
 
-    y (c, n): in degrees and mm; rest (c,): at rest. values: by "effect.parameter", see `slip_effects`; those
-    of no effect leave the channels as they are. The displacement turns with the surface that the marker sits
-    on: by twice the angle of the line from the inlet, as on an arc. Along one axis it stays as it is.
+    y (c, n): without slips, in degrees and mm; rest (c,): at rest. values: by "effect.parameter", see
+    `slip_effects`; without any the channels stay. The displacement rotates with the surface that the marker
+    sits on: by twice the angle of the line from the inlet, as on an arc. Along one axis it stays as it is.
     """
     found = y
     for number, axes in markers(channels).items():
@@ -216,7 +216,7 @@ def slipped(
 
 
 def searched(recordings: Recordings) -> list[Slip]:
-    """The best step of each marker, in no order: every moment of every record that is fitted was tried.
+    """Best step of each marker, in no order, over every moment of every fitted record.
 
     Records of one specimen, scale and orientation are taken together.
     """
@@ -241,9 +241,9 @@ def searched(recordings: Recordings) -> list[Slip]:
 def _best_step(number: int, axes: str, members: Sequence[Experiment], recordings: Recordings) -> Slip | None:
     """The step of one marker that gains most in records of one specimen, scale and orientation.
 
-    What is left of its channels, regressed on powers of the pressure, the direction of loading and what else
-    is seen of the unit, is taken for noise of the first order, whose correlation is estimated around the step
-    found before. None where the records are too short.
+    Its channels are regressed on powers of the pressure, the direction of loading and the unit's other
+    channels. The residual is taken for noise of the first order, with its correlation estimated around the
+    step found before. None where the records are too short.
     """
     every = max(1, math.ceil(sum(len(e) for e in members) / SAMPLES))
     own = [f"marker{number}_{a}_mm" for a in axes]
@@ -288,10 +288,10 @@ def _best_step(number: int, axes: str, members: Sequence[Experiment], recordings
 def _step_of(
     target: Array, columns: Array, first: Array, correlation: float
 ) -> tuple[int, Array, float] | None:
-    """The sample from which a step in all channels (n, c) gains most chi squared, its sizes (c,), the gain.
+    """Sample of the step in all channels (n, c) that gains most chi squared, its sizes (c,), the gain.
 
-    Beside columns (n, d); first (n,): where records begin; correlation: of noise from sample to sample, whose
-    whitened value is the difference from so much of the one before. None where nothing is left of them.
+    Beside columns (n, d); first (n,): where records begin; correlation: of noise from sample to sample, by
+    which it is whitened. None where no residual is left.
     """
     n = len(target)
     start = math.sqrt(1.0 - correlation**2)
@@ -331,7 +331,7 @@ def _step_of(
 
 
 def _without_lone(left: Array) -> Array:
-    """Residuals (n, c) in which readings that stand alone are the middle one of their neighbours and them."""
+    """Residuals (n, c) with isolated readings replaced by the median of them and their neighbours."""
     middle = left.copy()
     middle[1:-1] = np.median(np.stack([left[:-2], left[1:-1], left[2:]]), axis=0)
     apart = np.abs(left - middle)
@@ -341,7 +341,7 @@ def _without_lone(left: Array) -> Array:
 
 
 def _basis(columns: Array) -> Array:
-    """Orthonormal columns that span these (n, d), near dependences left out."""
+    """Orthonormal basis of columns (n, d), near dependences left out."""
     length = np.linalg.norm(columns, axis=0)
     u, sizes, _ = np.linalg.svd(columns / np.where(length > 0, length, 1.0), full_matrices=False)
     return np.asarray(u[:, sizes > NEAR])

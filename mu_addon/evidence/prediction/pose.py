@@ -1,4 +1,4 @@
-"""unit_pose: where a unit under pressure stands when it is turned to any direction of gravity."""
+"""unit_pose: a unit at rest under pressure, turned to any direction of gravity."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ ANGLE = "angle_deg"
 
 
 class UnitPose:
-    """Predicts unit_pose experiments: one row a pose, read when nothing moves any more.
+    """Predicts unit_pose experiments: one row a pose, read at rest.
 
-    responses: at every scale and axis of the experiments, in each of `STATIONS` about that axis. A unit whose
-    weight bends it answers to the direction of gravity by its angle, of a softer unit by as much more; out of
-    the plane of bending it is the second order of the weight that shows. Without weight the angle is that of
-    the pressure, in every pose. Raises InputError without a response.
+    responses: at every scale and axis of the experiments, in each of `STATIONS` about that axis. The angle of
+    a unit bent by its weight depends on gravity's direction, more for a softer unit; out of the plane of
+    bending the effect is of second order in the weight. Without weight the angle is that of the pressure, in
+    every pose. Raises InputError without a response.
     """
 
     effects: tuple[Effect, ...]
@@ -92,7 +92,7 @@ class UnitPose:
 
 
 def between_stations(orientation_deg: Array) -> Array:
-    """Shares (s, n) of what the unit does at the `STATIONS` (s,), at orientations (n,) in degrees.
+    """Shares (s, n) of the responses at the `STATIONS` (s,), at orientations (n,) in degrees.
 
     Trigonometric interpolation at equally spaced points, which add up to 1 everywhere (Dirichlet's kernel).
     """

@@ -140,10 +140,9 @@ def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, 
 def load_zeros(experiments: Sequence[Experiment], kind: str) -> tuple[Parameter, ...]:
     """The load cell's zero in each experiment of a kind that was recorded over time, as stress in kPa.
 
-    Cells are set to zero before each test, and keep it to a share of the load (`ZERO_SHARE`): a zero that was
-    known to nothing would take the place of faces that close. Between plates a preload says where zero is
-    (`seating`), and cells have none of their own. Records of a few rows, and those of given
-    spread, have nothing to tell it by.
+    Cells are set to zero before each test, and keep it to a share of the load (`ZERO_SHARE`): an unknown zero
+    would imitate faces that close. Between plates a preload defines zero (`seating`), and cells have none.
+    Records of a few rows, and those of given spread, cannot determine it.
     """
     found = []
     for e in experiments:
@@ -220,7 +219,7 @@ def recorded(
 
 
 def _with_turns(experiment: Experiment) -> tuple[Experiment, Array]:
-    """The experiment with rows where it was strained to between samples (`finer`), and which its rows are."""
+    """The experiment with rows where strain turned between samples (`finer`), and its rows among them."""
     time, strain, rows = finer(experiment["time_s"], experiment["strain"])
     if len(time) == len(experiment):
         return experiment, rows
@@ -246,9 +245,9 @@ def _shared(alone: Array, strain: Array, give: float, law: Law, stress_of: Calla
     """Stress s (n,) in kPa with s = stress_of(strain - give s): a specimen in series with a frame.
 
     alone (n,): in kPa, without the frame. strain (n,): of both. give: strain that the frame takes a kPa. law:
-    in slow loading; stress_of: with what the specimen remembers, whose slope by a sample's own strain is not
-    known, and may be any where it turns. So each sample goes by the slope between its own last two values,
-    which changes little at a time. Raises ConvergenceError.
+    in slow loading; stress_of: with history, whose slope by a sample's own strain is not known, and arbitrary
+    where it turns. So the slope between each sample's last two values is used, which changes little at a
+    time. Raises ConvergenceError.
     """
     small = 1e-6
     slope = np.maximum((law(strain + small) - law(strain - small)) / (2 * small), 0.0)
@@ -271,7 +270,7 @@ def _shared(alone: Array, strain: Array, give: float, law: Law, stress_of: Calla
 
 
 def _factor(experiment: Experiment, values: Mapping[str, float], past: StrainHistory) -> float:
-    """What the modulus is multiplied by: direction, temperature, tests before."""
+    """Factor on the modulus by direction, temperature and earlier tests."""
     factor = 1.0
     if experiment.axis in ("x", "y"):
         factor *= 1 + values.get("anisotropy.in_plane", 0.0)
@@ -283,7 +282,7 @@ def _factor(experiment: Experiment, values: Mapping[str, float], past: StrainHis
 
 
 def _seated(experiment: Experiment, law: Law, values: Mapping[str, float]) -> Law:
-    """The law between faces that close, strain counted from the preload."""
+    """The law between faces that close, with strain counted from the preload."""
     gap = values.get("seating.gap_mm", 0.0)
     toe = gap / (experiment.length_mm or LENGTH_mm * experiment.scale)
     if not toe:
@@ -308,7 +307,7 @@ def _seated(experiment: Experiment, law: Law, values: Mapping[str, float]) -> La
 def _remembering(
     experiment: Experiment, law: Law, strain: Array, values: Mapping[str, float], past: StrainHistory
 ) -> Array:
-    """Stress (n,) of a specimen whose strain (n,) is known, with what it remembers of earlier strain."""
+    """Stress (n,) of a specimen of known strain (n,), with its history of earlier strain."""
     strain = elastic_strain(strain, values)
     stress = yielded(strain, law, values)
     if softening := values.get("mullins_softening.softening", 0.0):
@@ -340,7 +339,7 @@ def _remembering(
 
 
 def _below(experiment: Experiment, strain: Array, past: StrainHistory) -> tuple[Array, Array]:
-    """By how much (n,) strains (n,) are below the largest so far in size, and that (n,)."""
+    """Amount (n,) by which strains (n,) are below the largest so far in size, and that largest (n,)."""
     size = np.abs(strain)
     so_far = size
     if "time_s" in experiment.columns and len(strain) > 5:
@@ -352,8 +351,8 @@ def _below(experiment: Experiment, strain: Array, past: StrainHistory) -> tuple[
 def turns(t: Array, x: Array) -> Array:
     """The largest value (n,) since the sample before, where x turns downward between two samples.
 
-    t (n,), x (n,): times and samples. A machine goes straight to where it turns and straight back, seldom at
-    a sample: lines through the samples on either side meet there. x itself elsewhere, and where x is round.
+    t (n,), x (n,): times and samples. A machine moves straight to a turning point and back, seldom at a
+    sample: lines through the samples on either side meet there. x itself elsewhere, and where x is round.
     """
     found = x.copy()
     step = np.diff(t)

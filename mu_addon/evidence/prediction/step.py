@@ -1,4 +1,4 @@
-"""pressure_step: a unit after steps of pressure, whose inertia the camera sees."""
+"""pressure_step: a unit after steps of pressure, with its inertia."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class PressureStep(UnitPressure):
         )
 
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """As `UnitPressure.predict`, driven by what pressure did between samples, too (`instants.finer`)."""
+        """Return `UnitPressure.predict`, driven by the pressure between samples, too (`instants.finer`)."""
         if id(experiment) not in self._finer:
             time, pressure, rows = finer(experiment["time_s"], experiment["pressure_kPa"])
             self._picture_s[experiment.name] = float(np.median(np.diff(experiment["time_s"])))
@@ -125,10 +125,10 @@ class PressureStep(UnitPressure):
         return still
 
     def _seen(self, experiment: Experiment, still: Array, moved: Array, period_s: float) -> Array:
-        """What a camera sees (c, n) of channels that swing: less than all where a picture takes a period.
+        """Channels (c, n) of a swing as a camera sees them: reduced where an exposure takes a period.
 
-        Each picture is a mean over its exposure. Without that a swing much faster than the pictures comes out
-        as any slow one, and fits noise.
+        Each picture is a mean over its exposure. Otherwise a swing faster than the pictures would alias to
+        any slow one, and fit noise.
         """
         share = min(1.0, period_s / (2.0 * self._picture_s[experiment.name])) ** 2
         return np.asarray(still + share * (moved - still))
@@ -139,7 +139,7 @@ def _mean(experiment: str, start_s: float) -> str:
 
 
 def _lost_while_changing(experiment: Experiment) -> tuple[tuple[float, float, float], ...]:
-    """Intervals in which samples were lost and the pressure went far: begin and end in s, way in kPa."""
+    """Intervals in which samples were lost while pressure changed much: begin and end in s, change in kPa."""
     t, p = experiment["time_s"], experiment["pressure_kPa"]
     if len(t) < 3:
         return ()

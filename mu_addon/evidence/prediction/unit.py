@@ -1,4 +1,4 @@
-"""unit_pressure: the unit's quasi-static response, with what acts in time before and after it."""
+"""unit_pressure: quasi-static response of the unit, with effects in time before and after it."""
 
 from __future__ import annotations
 
@@ -73,10 +73,9 @@ class UnitResponse:
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
     of their effect. orientation_deg, orientation_axis: see `pose.down`. walls: by the side of the unit they
     stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and along their end slopes beyond the
-    last pressures. discrepancy: standard deviation of what another code of the same physics would find, as a
-    smooth change of the pressure over the largest one; 0 where the response is exact. gap_mm: of the load
-    cell that holds the tip, where one does. Raises InputError for fewer than four pressures and for shapes
-    that do not match.
+    last pressures. discrepancy: standard deviation between codes of the same physics, as a smooth change of
+    the pressure over the largest one; 0 where the response is exact. gap_mm: of the load cell that holds the
+    tip, where one does. Raises InputError for fewer than four pressures and for shapes that do not match.
     """
 
     channels: tuple[str, ...]
@@ -139,7 +138,7 @@ class UnitResponse:
         return self.at(np.zeros(1), {})[:, 0]
 
     def _curve(self, sizes: tuple[tuple[str, float], ...]) -> Any:
-        """The response over pressure with variants of given sizes, which many experiments ask for in turn."""
+        """Response over pressure with variants of given sizes, cached as many experiments use the same."""
         from scipy.interpolate import PPoly
 
         if sizes not in self._curves:
@@ -184,7 +183,7 @@ def pressure_histories(experiments: Sequence[Experiment]) -> dict[str, PressureH
 
 
 def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
-    """Parameters that every fit of a unit frees: modulus factor, and each channel's zero in its unit."""
+    """Parameters free in every fit of a unit: modulus factor, and each channel's zero in its unit."""
     zeros = [
         Parameter(_zero(c), c.rpartition("_")[2], -most, most, 0.0, source=f"set by the {by}", linear=True)
         for c in channels
@@ -197,10 +196,10 @@ def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
 def believed(
     free: tuple[Parameter, ...], asked: Sequence[tuple[UnitResponse, Experiment]]
 ) -> tuple[Parameter, ...]:
-    """Nuisances, with a modulus so low left out that a response would have to be guessed.
+    """Nuisances, with the modulus bounded so that no response has to be extrapolated far.
 
     free: the modulus first. asked: experiments, each with the response that predicts it. A softer unit stands
-    where this one stands at a higher pressure: little beyond those computed, it may balloon or collapse.
+    where this one stands at a higher pressure, and beyond those computed it may balloon or collapse.
     """
     low = free[0].low
     for response, e in asked:
@@ -216,7 +215,7 @@ DISCREPANCIES = ("discrepancy_second", "discrepancy_third")
 
 
 def discrepancies(spread: float) -> tuple[Parameter, ...]:
-    """What every model of a unit may miss, smoothly, by the square and the cube of the pressure; none at 0.
+    """Smooth discrepancies of any unit's model, by the square and the cube of the pressure; none at 0.
 
     spread: standard deviation of each at the largest pressure, as a share of it. Kennedy and O'Hagan, J. R.
     Stat. Soc. B 63 (2001) 425: a discrepancy of known size beside every hypothesis, so that no cause is named
@@ -422,7 +421,7 @@ class UnitPressure:
         return y if len(kept) == len(y) else y[kept]
 
     def _moving(self, experiment: Experiment, still: Array, values: Mapping[str, float]) -> Array:
-        """Channels (c, n) of a unit that moves, of those in equilibrium (c, n): the same, without inertia."""
+        """Channels (c, n) of a moving unit from those in equilibrium (c, n): the same, without inertia."""
         return still
 
     def discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
@@ -434,7 +433,7 @@ class UnitPressure:
         return np.asarray(pressure + self.reference_kPa * (second * x**2 + third * x**3))
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Pressure (n,) in kPa at which the base unit would stand where the unit of these values stands.
+        """Pressure (n,) in kPa at which the base unit stands where the unit of these values stands.
 
         values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
         of the gauge, leak and line lag (with an open valve), modulus with temperature and fatigue,
@@ -485,7 +484,7 @@ class UnitPressure:
 
 
 def cycles(p: Array) -> Array:
-    """Number of cycles gone through (n,): travel of the pressure p (n,) in kPa over twice its range.
+    """Number of cycles completed (n,): travel of the pressure p (n,) in kPa over twice its range.
 
     Reversals smaller than `DEADBAND_kPa` are ignored.
     """

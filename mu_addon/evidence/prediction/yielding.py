@@ -1,4 +1,4 @@
-"""A material that yields: elements side by side that slide at strains of their own (Ishlinskii), or one."""
+"""A material that yields: parallel elements with separate yield strains (Ishlinskii), or one."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def yielding(kind: str) -> Effect:
 
 
 def bouc_wen(kind: str) -> Effect:
-    """Another law of `yielding`, tried where that one is found: one element that yields gradually."""
+    """Alternative law of `yielding`, tried where that one is found: one element that yields gradually."""
     return Effect(
         NAME,
         (
@@ -74,7 +74,7 @@ def bouc_wen(kind: str) -> Effect:
 
 
 def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
-    """Strain (n,) that stress goes by, of the strain (n,) of a new specimen in the order it was strained.
+    """Elastic strain (n,), which determines stress, from the strain (n,) of a new specimen in order.
 
     values: by "effect.parameter", see `yielding`. First loading to e gives h e + (1 - h) m (1 - exp(-e/m)),
     with the mean yield strain m and the share h that never yields; after a reversal the same with twice m
@@ -120,7 +120,7 @@ def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
 
 
 def yielded(strain: Array, law: Callable[[Array], Array], values: Mapping[str, float]) -> Array:
-    """Stress (n,) by a law of strain of which a share yields as one element does, if any (`bouc_wen`).
+    """Stress (n,) by a law of strain, of which a share yields as one element if `bouc_wen` has a value.
 
     strain (n,): of a new specimen in the order it was strained. With the law's stress s and its first slope
     k, (1 - a) s + a k m z, where a is the share, m the yield strain, and dz/de is (1 - |z|^n)/m while |z|
