@@ -1,4 +1,4 @@
-"""A folder of measured data as the input of a run: named by its place and the digests of its files."""
+"""A folder of measured data as the input of a run: identified by its path and its files' digests."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def experiments_digest(measured: Measured) -> str:
 
 
 def described(measured: Measured) -> dict[str, list[str]]:
-    """What each experiment is, and the SHA-256 of its file, by name."""
+    """Kind, role and SHA-256 of each experiment's file, by name."""
     return {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
 
 
 def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -> None:
-    """Raise InputError where measured data are not those that a run was made with.
+    """Raise InputError if measured data differ from those that a run was made with.
 
-    before: what the run's inputs say of them by name, None where they say nothing; now: what they are.
+    before: in the run's inputs by name, or None; now: the present ones.
     """
     if before is None or before == now:
         return

@@ -1,4 +1,4 @@
-"""The use case that a folder's inputs belong to, and its run from where it stopped."""
+"""Resume of a run from its folder: the use case of its inputs, run from where it stopped."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MODULES = {
 
 
 def use_case_of(folder: Path) -> UseCase[Any]:
-    """The use case that a folder's inputs belong to; raises InputError where there is none."""
+    """Use case of a folder's inputs; raises InputError where there is none."""
     # Not the Path's own question, which raises for a name that the system refuses.
     there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
@@ -52,11 +52,11 @@ def use_case_of(folder: Path) -> UseCase[Any]:
 
 
 def resume(folder: Path, context: RunContext, given: Mapping[str, Any] = MappingProxyType({})) -> Any:
-    """Run what a folder's inputs say, taking from its cache what is finished; returns what was found.
+    """Run a folder's inputs, taking finished stages from its cache; returns the result.
 
-    given: fields of the job that take the place of the folder's, `workers` say, where its job has them.
-    Raises InputError where the inputs cannot be used or a file is missing that they name, and what the run
-    itself raises.
+    given: fields of the job that replace the folder's, such as `workers`, where its job has them. Raises
+    InputError where the inputs cannot be used or a file that they name is missing, and the errors of the run
+    itself.
     """
     use_case = use_case_of(folder)
     job = use_case.read(folder)

@@ -1,4 +1,4 @@
-"""What a chain is asked to do: its units, their pressures over time or a point to reach, and its loads."""
+"""Inputs of a chain: its units, their pressures over time or a point to reach, and its loads."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class ChainUnit:
 
 @attrs.frozen
 class Target:
-    """A point (3,) in mm, in the frame of the chain's base, that the tip is to reach."""
+    """A target point (3,) in mm for the tip, in the frame of the chain's base."""
 
     reach: tuple[float, float, float]
 

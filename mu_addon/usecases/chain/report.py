@@ -34,7 +34,7 @@ ASSUMED = (
 
 
 def write_report(run: Running, stopped: str = "") -> None:
-    """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
+    """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
     if not run.states:
         return
     with run.progress.stage("report", expected_s=10.0):

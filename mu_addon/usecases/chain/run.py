@@ -14,7 +14,7 @@ from .running import Running
 
 
 def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
-    """Learn the units' joints, solve the chain, write its motion, and report as far as it came."""
+    """Learn the units' joints, solve the chain, write its motion and a report of all finished stages."""
     run = Running(job, folder, context)
     context.report = lambda stopped: write_report(run, stopped)
     run.run()
@@ -22,7 +22,7 @@ def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a run found, in a few lines of text, of its `summary`."""
+    """Lines of text on a run's `summary`."""
     lines = []
     for joint in summary["joints"]:
         lines.append(
@@ -45,7 +45,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a chain's run with the seconds that each is expected to take on two cores."""
+    """Stages of a chain's run with the expected seconds of each on two cores."""
     # Alike units share a joint.
     units = range(1, len({one.unit.hash() for one in job.units}) + 1)
     learned = [(f"{what} of unit {n}", s) for n in units for what, s in (("mesh", 4.0), ("joint", 300.0))]

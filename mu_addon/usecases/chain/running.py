@@ -35,7 +35,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.define
 class Running:
-    """A chain's run under way: what was found so far is here, and in `folder` as soon as it is whole.
+    """State of a chain's run; results are also in `folder` as soon as they are complete.
 
     learned: by unit's number; states: at each instant of time_s.
     """
@@ -54,7 +54,7 @@ class Running:
 
     @property
     def progress(self) -> Progress:
-        """Where the run says how it goes."""
+        """Progress of the run."""
         return self.context.progress
 
     @property
@@ -63,12 +63,12 @@ class Running:
         return Cache(self.folder / "cache")
 
     def warn(self, words: str) -> None:
-        """Tell a warning, and keep it for the report."""
+        """Report a warning, and keep it for the report."""
         self.warnings.append(words)
         self.progress.warning(words)
 
     def run(self) -> None:
-        """Every stage in order."""
+        """Run every stage in order."""
         self.context.summary["versions"] = package_versions()
         self._learn()
         self._solve()
@@ -257,7 +257,7 @@ class Running:
             write_trajectory(self.folder / "chain.pvd", mesh, moving)
 
     def whole_mesh(self) -> Mesh:
-        """All units' meshes one on the other as drawn, for pictures and files: they share no nodes."""
+        """Meshes of all units stacked as drawn, for pictures and files: they share no nodes."""
         nodes, tets, region, first, height = [], [], [], 0, 0.0
         for one, mesh in zip(self.job.units, self.meshes, strict=True):
             nodes.append(mesh.nodes @ frame(one.turn_deg)[:3, :3].T + [0.0, 0.0, height])
@@ -277,7 +277,7 @@ class Running:
         )
 
     def places(self, state: ChainState) -> Array:
-        """Places (m, 3) in mm of the nodes of `whole_mesh` in a state of the chain, for display.
+        """Positions (m, 3) in mm of the nodes of `whole_mesh` in a state of the chain, for display.
 
         A unit's free state at its pressure, between base and plate moved on by the constant strain of both:
         exact on the plates, about right between them.

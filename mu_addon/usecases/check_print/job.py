@@ -1,4 +1,4 @@
-"""What a print check is asked to do: the part, its printer, the way up."""
+"""Inputs of a print check: the part, its printer, the build direction."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_diges
 from ...toml_writer import toml_text
 
 MOST_TRIANGLES = 1_000_000
-"""Of an STL file: nine units in one piece have 620 000. Each takes some 4 kB to check."""
+"""Largest number of triangles of an STL file (nine units in one piece: 620 000); each takes 4 kB."""
 # No STL is longer, in bytes: as text what so many triangles take.
 _LONGEST = 1 << 28
 # Of layers to draw: how many at most, and no part is so tall, in mm.
@@ -42,8 +42,8 @@ class Job:
     """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
 
     direction points away from the platform, in the part's frame. layers: heights in mm, above the part's
-    lowest point, of the layers to draw; some evenly spaced where there are none. repair: whether the file's
-    surface is repaired first, where there is only one way to.
+    lowest point, of the layers to draw; evenly spaced without any. repair: first repair the file's surface
+    where there is only one way to.
     """
 
     printer: Printer
@@ -77,12 +77,12 @@ class Job:
 
     @property
     def stl_name(self) -> str:
-        """Name of the STL file, or nothing."""
+        """Name of the STL file, or ""."""
         return "" if self.stl_file is None else self.stl_file.name
 
     @property
     def name(self) -> str:
-        """What is checked, in a few words."""
+        """Name of the part that is checked."""
         unit = "" if self.unit is None else self.unit.name
         path = "" if self.window is None else f", {self.window.name}"
         if self.stl is None:
@@ -135,7 +135,7 @@ def part_in(content: bytes, name: str) -> tuple[Vertices, Triangles]:
 
 
 def read_job(folder: Path) -> Job:
-    """The job that a folder of `check` describes, the STL file where it lay then; raises InputError."""
+    """The job that a folder of `check` describes, its STL file at its original path; raises InputError."""
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     stl = named_path(path, run, "stl", "STL file") if "stl_sha256" in values else None

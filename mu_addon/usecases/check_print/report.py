@@ -134,7 +134,7 @@ def _findings(found: PrintCheck) -> str:
 
 
 def _repair(mended: Repair) -> str:
-    """What was changed before the check, and by how much."""
+    """Changes by the repair before the check, and their size."""
     rows = [([change.what, str(change.count)], False) for change in mended.changes]
     rows += [
         (["largest move of a vertex, mm", f"{mended.largest_move_mm:.2g}"], False),
@@ -153,7 +153,7 @@ def _where(f: Finding) -> str:
 
 
 def _places(found: PrintCheck) -> str:
-    """Every place of every fault, in rows."""
+    """Table of all locations of every fault."""
     rows = []
     for f in found.findings:
         if f.is_fault and len(f.places) > 1:
@@ -211,7 +211,7 @@ def _limits(job: Job) -> str:
 
 
 def _layers(job: Job, vertices: Vertices, triangles: Triangles) -> str:
-    """Pictures of layers: those that were asked for, or some evenly spaced."""
+    """Pictures of the requested layers, or of some evenly spaced."""
     heights = job.layers or even_heights(vertices, job.direction, LAYERS)
     # A file's chamber may lie elsewhere than its unit's.
     within = chamber(job.unit) if job.stl is None and job.unit is not None else None

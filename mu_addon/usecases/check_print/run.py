@@ -23,7 +23,7 @@ from .report import write_report
 
 
 def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
-    """Check a part and leave part.stl, check.json and report.html; GateError if it must not be printed."""
+    """Check a part and write part.stl, check.json and report.html; GateError if it must not be printed."""
     progress = context.progress
     with progress.stage("part"):
         vertices, triangles = surface_of(job)
@@ -38,7 +38,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
         progress.warning(f"repaired: {'; '.join(mended.lines())}", job.stl_name, "look at part.stl")
 
     def verdict(found: PrintCheck) -> None:
-        """Tell what is known before build directions are compared, which adds no finding."""
+        """Report the findings before build directions are compared, which adds none."""
         for finding in found.findings:
             if finding.is_fault:
                 first = "not printable: " if finding.severity == "error" else ""
@@ -86,8 +86,9 @@ def surface_of(job: Job) -> tuple[Vertices, Triangles]:
 
 
 def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
-    """The surface (n, 3), (m, 3) that a file is compared with: its unit's solid. None where there is no unit,
-    or nothing but it. Raises GateError.
+    """The surface (n, 3), (m, 3) that a file is compared with: its unit's solid.
+
+    None without a unit, or with nothing else. Raises GateError.
     """
     if job.stl is None or job.unit is None:
         return None
@@ -96,7 +97,7 @@ def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
 
 
 def require_whole(mended: Repair, name: str) -> None:
-    """Raise GateError, with what was done and what remains, unless a repair left nothing."""
+    """Raise GateError, with the changes and the remaining faults, unless a repair left none."""
     if not mended.is_whole:
         done = "; ".join(f"{change.count} {change.what}" for change in mended.changes) or "nothing"
         raise GateError(
@@ -107,7 +108,7 @@ def require_whole(mended: Repair, name: str) -> None:
 
 
 def as_plain(job: Job, found: PrintCheck, mended: Repair | None = None) -> dict[str, Any]:
-    """What check.json holds."""
+    """Content of check.json."""
     return {
         "format": 1,
         "part": job.name,
@@ -123,7 +124,7 @@ def as_plain(job: Job, found: PrintCheck, mended: Repair | None = None) -> dict[
 
 
 def summary(found: PrintCheck, printer: Printer) -> dict[str, Any]:
-    """Key figures of a check for summary.json, and which of the printer's limits rest on what."""
+    """Key figures of a check for summary.json, and the grounds of the printer's limits."""
     count = {s: sum(f.severity == s for f in found.findings) for s in ("error", "warning", "pass")}
     best = {"orientation": attrs.asdict(found.builds[0])} if found.builds else {}
     faults = [f"{f.check}: {f.what}" for f in found.findings if f.is_fault]
@@ -140,7 +141,7 @@ def summary(found: PrintCheck, printer: Printer) -> dict[str, Any]:
 
 
 def standings(printer: Printer) -> dict[str, list[str]]:
-    """Names of a printer's limits by what they rest on: measured, published or assumed."""
+    """Names of a printer's limits by their grounds: measured, published or assumed."""
     found: dict[str, list[str]] = {"measured": [], "published": [], "assumed": []}
     for name, limit in printer.limits.items():
         found[limit.standing].append(name)
@@ -148,7 +149,7 @@ def standings(printer: Printer) -> dict[str, list[str]]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a check found, in a few lines of text, of its `summary`."""
+    """Lines of text on a check's `summary`."""
     count = summary["count"]
     lines = [f"{count['pass']} checks passed, {count['warning']} warnings, {count['error']} errors"]
     lines += summary.get("notes", [])
@@ -175,7 +176,7 @@ def _where(places: np.ndarray[Any, Any]) -> str:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a check with the seconds that each is expected to take on two cores."""
+    """Stages of a check with the expected seconds of each on two cores."""
     stages = {"part": 4.0, "faces": 2.0, "thickness and gaps": 2.5, "chambers and drains": 2.0}
     return [*stages.items(), ("layers", 1.0), ("build directions", 2.5), ("report", 9.0)]
 

@@ -43,7 +43,7 @@ LEAST_P = 1e-12
 
 
 def titled(channel: str) -> str:
-    """A column's name as an axis says it: angle_deg as "bending angle [deg]"."""
+    """Title of an axis from a column's name: "bending angle [deg]" from angle_deg."""
     head, _, unit = channel.rpartition("_")
     if head.startswith("marker"):
         number, _, axis = head[6:].partition("_")
@@ -52,7 +52,7 @@ def titled(channel: str) -> str:
 
 
 def panel(curve: Curve, extends: bool) -> str:
-    """One experiment: measured dots and predictions above, what either leaves beneath."""
+    """Chart of one experiment: measured dots and predictions above, residuals beneath."""
     column, title = AXES[curve.experiment.kind]
     x = curve.experiment[column]
     every = max(1, math.ceil(len(x) / DOTS))
@@ -108,7 +108,7 @@ def _short(name: str, most: int = 34) -> str:
 def dependence_chart(
     before: Sequence[Dependence], after: Sequence[Dependence], level: float, extends: bool
 ) -> str:
-    """How unlikely by chance each dependence of the residual is; beyond the line it is structure."""
+    """P-value of each dependence of the residual; those beyond the line are structure."""
     names = [d.against for d in before]
     later = {d.against: d for d in after}
     high = 0.72 + 0.25 * len(names)
@@ -151,7 +151,7 @@ def _unlikely(p: float) -> float:
 
 @attrs.frozen(eq=False)
 class Dependent:
-    """What is left (n,) by the base and the extended model against a quantity (n,), of one channel."""
+    """Residuals (n,) of the base and the extended model against a quantity (n,), of one channel."""
 
     name: str
     unit: str
@@ -162,7 +162,7 @@ class Dependent:
 
 
 def residual_panel(d: Dependent, extends: bool) -> str:
-    """Left-over against a quantity: means of its stretches with their scatter, before and after."""
+    """Residual against a quantity: means of its stretches with their scatter, before and after."""
     with canvas(2.45, 2.0) as (figure, svg):
         axes = figure.add_axes((0.24, 0.23, 0.73, 0.63))
         axes.axhline(0, color=QUIET, linewidth=0.8)
@@ -189,7 +189,7 @@ def residual_panel(d: Dependent, extends: bool) -> str:
 
 
 def _stretches(x: Array, values: Array, many: int = 14) -> tuple[Array, Array, Array, Array]:
-    """Means (b,) over stretches of x of equally many values, and their quartiles."""
+    """Means (b,) and quartiles over stretches of x with equally many values."""
     distinct = np.unique(x)
     if len(distinct) <= many:
         parts = [np.flatnonzero(x == v) for v in distinct]
@@ -202,7 +202,7 @@ def _stretches(x: Array, values: Array, many: int = 14) -> tuple[Array, Array, A
 
 
 def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, named: Sequence[str]) -> str:
-    """What each single effect leaves of the base model's misfit, as a share; those named in colour."""
+    """Share of the base model's misfit left by each single effect; the named ones in colour."""
     high = 0.75 + 0.24 * len(names)
     with canvas(WIDTH, high) as (figure, svg):
         aside = (0.15 + 0.066 * max(map(len, names))) / WIDTH
@@ -241,7 +241,7 @@ def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, nam
 
 
 def gain_chart(errors: Errors) -> str:
-    """Root mean square errors: the base model, the extended one, and the two that know no cause."""
+    """Root mean square errors: the base model, the extended one, and the two without a cause."""
     bars = [
         ("base model", errors.before, BASE),
         ("extended model", errors.after, CHOSEN),

@@ -65,7 +65,7 @@ ALIKE = 0.95
 
 @attrs.frozen(eq=False)
 class Plan:
-    """What experiments would show: every effect, those that are visible first; alike: pairs, their cosine."""
+    """Results of planned experiments: every effect, visible ones first; alike: pairs with their cosine."""
 
     experiments: tuple[Experiment, ...]
     seen: tuple[Sensitivity, ...]
@@ -74,7 +74,7 @@ class Plan:
 
 
 def noise_of(words: Sequence[str]) -> dict[str, float]:
-    """Noise by quantity, from words like "angle=0.5", the rest as in `NOISE`. Raises InputError."""
+    """Noise by quantity, from text like "angle=0.5", the rest as in `NOISE`. Raises InputError."""
     found = dict(NOISE)
     for word in words:
         name, _, text = word.partition("=")
@@ -94,9 +94,9 @@ def noise_of(words: Sequence[str]) -> dict[str, float]:
 class Job:
     """Inputs of a design of experiments.
 
-    measured: laid out as for `diagnose`; what would be measured may hold any numbers. unit: the preset
-    without one. noise: standard deviation of a reading, by quantity. fidelity: whether the unit is simulated
-    homogenised or resolved; self_contact: whether walls and struts of a resolved one keep apart.
+    measured: laid out as for `diagnose`; columns to be measured may hold any numbers. unit: the preset
+    without one. noise: standard deviation of a reading, by quantity. fidelity: homogenised or resolved unit;
+    self_contact: of a resolved one's walls and struts.
     """
 
     measured: Measured
@@ -110,7 +110,7 @@ class Job:
 
     @property
     def subject(self) -> Unit | None:
-        """The unit that the experiments are of."""
+        """Unit that the experiments are made with."""
         return unit_behind(self.measured.experiments, self.unit)
 
     def texts(self) -> dict[str, str]:
@@ -129,7 +129,7 @@ class Job:
 
 
 def read_job(folder: Path) -> Job:
-    """The job that a folder of `design-experiments` describes, its protocols where they lay; InputError."""
+    """The job that a folder of `design-experiments` describes, its protocols in place; InputError."""
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))
@@ -146,7 +146,7 @@ def read_job(folder: Path) -> Job:
 
 
 def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
-    """What experiments would show, made with instruments of some noise; writes limits.csv and report.html.
+    """Find detection limits of planned experiments with noisy instruments; writes limits.csv and report.html.
 
     Raises InputError, OutputError.
     """
@@ -168,7 +168,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
 
 
 def plan(experiments: Sequence[Experiment], simulator: Composite, noise: Mapping[str, float] = NOISE) -> Plan:
-    """What experiments would show, whatever they measured so far."""
+    """Plan of experiments, whatever they measured so far."""
     expected = tuple(_expected(e, simulator) for e in experiments if simulator.knows(e))
     planned = record(expected, simulator)
     fitter = Fitter(planned, simulator, _sources(planned, noise))
@@ -191,7 +191,7 @@ def plan(experiments: Sequence[Experiment], simulator: Composite, noise: Mapping
 
 
 def _expected(e: Experiment, simulator: Composite) -> Experiment:
-    """The experiment as the base model predicts it."""
+    """The experiment with the base model's prediction as its data."""
     columns = dict(zip(simulator.channels(e), simulator.predict(e, {}), strict=True))
     # Channels that are alike to the last digit would be taken for one.
     columns = {c: y + 1e-9 * k for k, (c, y) in enumerate(columns.items())}
@@ -293,7 +293,7 @@ def summary(found: Plan) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a plan would show, in a few lines of text, of its `summary`."""
+    """Lines of text on a plan's `summary`."""
     lines = [f"{readable(name)}: detectable from {limit}" for name, (limit, _) in summary["visible"].items()]
     if summary["hidden"]:
         lines.append(f"not detectable: {listed([readable(n) for n in summary['hidden']])}")

@@ -1,4 +1,4 @@
-"""What a diagnosis found, and its curves: measured beside predicted."""
+"""Result of a diagnosis, and its curves: measured beside predicted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Diagnosis:
-    """A verdict and what it was found with; remarks: of the reader, in words."""
+    """A verdict with its simulator and data; remarks: of the reader, in words."""
 
     measured: Measured
     simulator: Composite
@@ -40,7 +40,7 @@ class Diagnosis:
 
     @property
     def extends(self) -> bool:
-        """Whether any effect was added to the base model, named or not."""
+        """True if any effect was added to the base model, named or not."""
         return bool(self.verdict.selection.chosen.effects)
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis is asked to do: measured data, and the unit that they are of."""
+"""Inputs of a diagnosis: measured data, and the unit they belong to."""
 
 from __future__ import annotations
 
@@ -47,11 +47,10 @@ PRESET = "mu-1.0x"
 class Job:
     """Inputs of a diagnosis.
 
-    unit: what unit_pressure experiments and blocks of counted cells are of, whatever its scale; the preset
-    `PRESET` without one. fidelity: whether it is simulated homogenised or resolved; self_contact: whether
-    walls and struts of a resolved one keep apart. settings: how it is simulated, where not as these have it.
-    known: what an earlier diagnosis found, None without one: its effects are in the model from the start and
-    stay; moduli and zeros are fitted anew.
+    unit: of unit_pressure experiments and of blocks with counted cells, whatever its scale; the preset
+    `PRESET` without one. fidelity: homogenised or resolved; self_contact: of a resolved unit's walls and
+    struts. settings: of the simulation, in place of these. known: result of an earlier diagnosis, or None:
+    its effects are in the model from the start and stay; moduli and zeros are fitted anew.
     """
 
     measured: Measured
@@ -72,12 +71,12 @@ class Job:
 
     @property
     def subject(self) -> Unit | None:
-        """The unit that the experiments are of."""
+        """Unit that the experiments are made with."""
         return unit_behind(self.measured.experiments, self.unit)
 
     @property
     def unit_settings(self) -> UnitSettings:
-        """How the unit is simulated."""
+        """Settings of the unit's simulation."""
         from ...evidence.unit_fem import UnitSettings
 
         return self.settings or UnitSettings.of(self.fidelity, self.self_contact)
@@ -101,7 +100,7 @@ class Job:
 
 
 def read_job(folder: Path) -> Job:
-    """The job that a folder of `diagnose` describes, its data where they lay then; raises InputError."""
+    """The job that a folder of `diagnose` describes, its data at their original path; raises InputError."""
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     if "settings" in values:
@@ -129,7 +128,7 @@ def fidelity_in(values: Mapping[str, Any], path: Path) -> str:
 
 
 def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
-    """The unit that experiments are of, the preset where none is given; None where none of them is of one.
+    """Unit of the experiments, the preset where none is given; None where no experiment needs one.
 
     A block of lattice is a unit's where its cells are counted.
     """
@@ -140,7 +139,7 @@ def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> 
 
 @cache
 def _program() -> str:
-    """SHA-256 of the code that a verdict comes from."""
+    """SHA-256 of the code that a verdict depends on."""
     package = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):

@@ -1,4 +1,4 @@
-"""What to do about each cause, for the people at the bench and at the printer."""
+"""Remedy for each cause, for those at the bench and at the printer."""
 
 from __future__ import annotations
 
@@ -63,6 +63,6 @@ TO_DO = {
 
 
 def what_to_do(effects: tuple[str, ...]) -> str:
-    """What to do about these causes, a sentence each; empty where there is none."""
+    """Remedies for these causes, a sentence each; empty where there is none."""
     sentences = (TO_DO[name] for name in effects)
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

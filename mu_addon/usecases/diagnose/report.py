@@ -162,7 +162,7 @@ def _key(found: Diagnosis) -> str:
 
 
 def _chosen(every: Sequence[Curve]) -> tuple[list[Curve], int]:
-    """Channels worth a panel: of each experiment the first, and the two markers that move most."""
+    """Channels worth a chart: of each experiment the first, and the two markers that move most."""
     drawn: list[Curve] = []
     for name in dict.fromkeys(c.experiment.name for c in every):
         mine = [c for c in every if c.experiment.name == name]
@@ -315,7 +315,7 @@ def _titles(fit: Fit) -> list[str]:
 
 
 def _ended(p: Parameter, value: float) -> bool:
-    """Whether a fit stopped at a bound that is not the null, where an effect is just absent."""
+    """Return True if a fit stopped at a bound that is not the null, where an effect is just absent."""
     near = 1e-3 * (p.high - p.low)
     return any(abs(value - bound) < near and bound != p.null for bound in (p.low, p.high))
 
@@ -360,7 +360,7 @@ def _gain(found: Diagnosis) -> str:
 
 
 def _by_quantity(found: Diagnosis) -> str:
-    """Errors of every quantity that was measured, where there are several."""
+    """Table of errors of every measured quantity, where there are several."""
     every = found.verdict.gain.by_quantity
     if len(every) < 2:
         return ""
@@ -416,7 +416,7 @@ def _dependence(found: Diagnosis) -> str:
 
 
 def _dependents(found: Diagnosis, tested: Mapping[str, bool]) -> list[pictures.Dependent]:
-    """What the first quantity leaves against what was tested: its name, and whether there is structure."""
+    """Residuals of the first quantity against the tested ones: name, and True with structure."""
     record, simulator = found.verdict.record, found.simulator
     group = record.groups[0]
     members = [s for s in record.series if s.group == group]

@@ -39,18 +39,18 @@ from .words import advice, readable, sentence, to_do
 # Of a unit, but not before its weight, or the place of what holds it, is simulated.
 LATER = ("unit_pose", "blocked_force")
 SET = 3
-"""Experiments of the data whose verdict takes as long as the plan says."""
+"""Experiments of the data for which the plan's seconds of a verdict hold."""
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
-    """Make a folder a diagnosis's; a whole verdict on the same inputs that it holds goes into the summary."""
+    """Prepare a folder for a diagnosis; a complete verdict on the same inputs goes into the summary."""
     inputs = job.texts()
     context.summary |= _kept(folder, inputs)
     begin(context, folder, LAYOUT, inputs)
 
 
 def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """The summary of a verdict on the same inputs that a folder holds whole; empty where it does not."""
+    """Summary of a complete verdict on the same inputs in a folder; empty without one."""
     try:
         found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
     except (OSError, InputError):
@@ -69,8 +69,8 @@ def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
 def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | None:
     """Judge the model by measured data; writes verdict.json, model.toml, residuals.csv, report.html.
 
-    Where the folder held this program's verdict on these inputs, nothing is done again, and None is
-    returned. Raises InputError, OutputError.
+    Where the folder holds this program's verdict on these inputs, nothing is repeated, and None is returned.
+    Raises InputError, OutputError.
     """
     measured, unit, progress = job.measured, job.subject, context.progress
     for remark in measured.remarks:
@@ -118,12 +118,11 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
 def _first_look(
     job: Job, folder: Path, progress: Progress, known: Mapping[str, float]
 ) -> dict[str, str] | None:
-    """A verdict on a unit by its base simulation alone, told while the others are computed; None without one.
+    """Early verdict on a unit by its base simulation alone, reported while others run; None without one.
 
-    It knows instruments and what acts in time, and no weight, walls or print: those have simulations of their
-    own, most of the time that a verdict on a unit takes. Told as a stage, and kept in summary.json; what
-    stands in verdict.json is the verdict with all of them. A run that goes on, whose simulations were begun,
-    has had it.
+    It includes instruments and effects in time, but no weight, walls or print: those need further
+    simulations, which take most of a verdict's time. It is reported as a stage and kept in summary.json;
+    verdict.json holds the full verdict. A resumed run, whose simulations were begun, has had it.
     """
     if any((folder / "cache").glob("unit*")):
         return None
@@ -142,7 +141,7 @@ def _first_look(
 
 
 def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:
-    """The extended model, without nuisances that these data say nothing of."""
+    """The extended model, without nuisances that these data do not determine."""
     model = extended_model(verdict, {p.name: p.unit for p in simulator.nuisances})
     fit = verdict.selection.chosen if verdict.names else verdict.selection.base
     seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
@@ -150,7 +149,7 @@ def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:
 
 
 def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) -> ExtendedModel:
-    """The model with the pressure that the energy of a unit's Mullins softening is relative to."""
+    """The model with the reference pressure of the energy of a unit's Mullins softening."""
     effect, _, name = REFERENCE.partition(".")
     unit = simulators.get(unit_pressure.KIND)
     if effect not in model.effects or not isinstance(unit, unit_pressure.UnitPressure):
@@ -160,7 +159,7 @@ def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) ->
 
 
 def _known_before(job: Job, simulator: Composite) -> list[str]:
-    """What was in the model from the start, in words, and what of it these experiments do not show."""
+    """Effects in the model from the start, in words, and those that these experiments do not show."""
     if job.known is None:
         return []
     effects = {
@@ -173,7 +172,7 @@ def _known_before(job: Job, simulator: Composite) -> list[str]:
 
 
 def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
-    """What resin the fitted modulus of a computed block asks for, in words."""
+    """Resin's modulus that corresponds to the fitted modulus of a computed block, in words."""
     fitted = model.nuisances.get(lattice.MODULUS.name)
     if fitted is None or model.lattice is None or unit is None:
         return []
@@ -186,7 +185,7 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
 
 
 def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
-    """Which readings drove the model with less noise than they have, in words."""
+    """Readings that drove the model with less noise than they have, in words."""
     noise: dict[str, float] = {}
     stepped: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
@@ -210,7 +209,7 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
 
 
 def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
-    """Which fitted values of the base model ended at a bound, in words."""
+    """Fitted values of the base model at a bound, in words."""
     values = verdict.selection.base.values
     return [
         f"in the fit without effects, {readable(p.name)} is at its bound, {values[p.name]:.3g} ({p.source})"
@@ -221,9 +220,10 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
 
 @contextmanager
 def _stages(progress: Progress) -> Iterator[Callable[[str], None]]:
-    """What the engine says of its work, as stages.
+    """Stages of the run from the engine's messages.
 
-    All trials of effects are one: how many it needs is known to nobody, so that its share goes by the clock.
+    All trials of effects are one stage: their number is not known before, so that its share goes by the
+    clock.
     """
     with ExitStack() as stack:
         now = ""
@@ -241,7 +241,7 @@ def _stages(progress: Progress) -> Iterator[Callable[[str], None]]:
 
 
 def _place(where: str) -> str:
-    """A place in a file without the folders above it."""
+    """Name of a file without its folders."""
     path, comma, rest = where.partition(", ")
     return Path(path).name + comma + rest
 
@@ -278,7 +278,7 @@ def summary(found: Diagnosis) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a diagnosis found, in a few lines of text, of its `summary`."""
+    """Lines of text on a diagnosis's `summary`."""
     lines = [f"verdict: {summary['verdict']}: {summary['headline']}"]
     lines += [f"what to do: {summary['to_do']}"] if summary.get("to_do") else []
     lines.append(summary["sentence"])
@@ -291,7 +291,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a diagnosis with the seconds that each is expected to take on two cores."""
+    """Stages of a diagnosis with the expected seconds of each on two cores."""
     experiments = job.measured.experiments
     a_set = len(experiments) / SET
     judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 15.0, "gain": 0.5}

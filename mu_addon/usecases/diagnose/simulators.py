@@ -1,4 +1,4 @@
-"""Simulators of the experiments that measured data hold."""
+"""Simulators of the experiments in measured data."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
 LATTICE_S, UNIT_S = 10.0, 150.0
-"""Seconds that the simulations of blocks, and of a homogenised unit with all effects, take about."""
+"""Approximate seconds of the simulations of blocks, and of a homogenised unit with all effects."""
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
     unit_pressure.KIND: unit_pressure.UnitPressure,
@@ -33,7 +33,7 @@ FREE: dict[str, Callable[..., Simulator]] = {
 
 
 def simulations_plan(experiments: Sequence[Experiment], fidelity: str) -> Plan:
-    """Stages of `simulators_of` with the seconds that each is expected to take on two cores."""
+    """Stages of `simulators_of` with the expected seconds of each on two cores."""
     kinds = {e.kind for e in experiments}
     unit = UNIT_S * PACE["full" if fidelity == HOMOGENISED else "resolved"]
     lattice = [("lattice", LATTICE_S)] if any(e.cells for e in experiments) else []
@@ -48,10 +48,10 @@ def simulators_of(
     progress: Progress,
     settings: UnitSettings | None = None,
 ) -> tuple[dict[str, Simulator], list[str]]:
-    """Simulators of every kind among the experiments, by kind; and what could not be simulated, in words.
+    """Simulators by kind of experiment, and remarks on what was not simulated or was assumed.
 
-    The unit is followed by finite elements, and so are blocks of its lattice; the runs are kept in the
-    folder `cache`. What was taken for granted is among the words.
+    The unit and blocks of its lattice are simulated by finite elements; the runs are kept in the folder
+    `cache`.
     """
     remarks: list[str] = []
     scalings: Mapping[str, lattice.Scaling] = {}

@@ -32,7 +32,7 @@ MOST_SHOWN = 3
 
 
 def readable(name: str) -> str:
-    """An effect's or quantity's name as it is said."""
+    """An effect's or quantity's name for a reader."""
     return name.replace("_", " ")
 
 
@@ -42,13 +42,13 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 
 def bare(p: Parameter) -> str:
-    """A parameter's name as it is said, without the unit that stands behind its value."""
+    """A parameter's name for a reader, without the unit that follows its value."""
     unit = p.unit.replace("1/", "per_").replace("/", "_")
     return readable(p.name.removesuffix(f"_{unit}") if unit else p.name)
 
 
 def between(low: float, high: float) -> str:
-    """An interval in as few figures as tell its ends apart, three at least."""
+    """An interval in as few digits as distinguish its ends, three at least."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return "not known"
     for digits in range(3, 7):
@@ -80,7 +80,7 @@ def sized(verdict: Verdict, cause: Cause) -> str:
 
 
 def _slipped(verdict: Verdict, cause: Cause) -> str:
-    """How far a marker slipped, which way in the picture, and when: by the clock of the record it was in."""
+    """Size, direction in the picture, and time of a marker's slip, by its record's clock."""
     values = verdict.selection.chosen.values
     *sizes, moment = zip(cause.effect.keys, cause.effect.parameters, strict=True)
     words = []
@@ -103,7 +103,7 @@ def _slipped(verdict: Verdict, cause: Cause) -> str:
 
 
 def in_a_table(verdict: Verdict) -> bool:
-    """Whether the values of the causes, with their intervals, are too many for a sentence."""
+    """Return True if the values of the causes, with their intervals, are too many for a sentence."""
     return sum(1 if c.effect.among else len(c.effect.keys) for c in verdict.selection.causes) >= TABLE
 
 
@@ -162,7 +162,7 @@ def _error(verdict: Verdict) -> str:
 
 
 def _zeros(verdict: Verdict) -> str:
-    """What zeros of the load cell hide, in a sentence and a space; empty where they hide nothing."""
+    """Error that the load cell's fitted zeros hide, as a sentence and a space; empty without one."""
     z = verdict.zeros
     if z is None:
         return ""
@@ -173,7 +173,7 @@ def _zeros(verdict: Verdict) -> str:
 
 
 def _far(verdict: Verdict) -> str:
-    """The nuisance that is farthest from what was known of it, its value and what was known, in words."""
+    """The nuisance farthest from its prior value, with both values, in words."""
     if not verdict.far:
         return "a parameter far from its known value"
     p, value = verdict.far[0], verdict.selection.base.values[verdict.far[0].name]
@@ -184,7 +184,7 @@ def _far(verdict: Verdict) -> str:
 
 
 def _near(verdict: Verdict) -> str:
-    """What comes nearest to an explanation, and its share of the misfit, in words."""
+    """The nearest single effect and its share of the misfit, in words."""
     if verdict.nearest is None or verdict.nearest[1] < LEAST_SHARE:
         return "No single effect takes a tenth of the misfit."
     title, share = verdict.nearest
@@ -192,7 +192,7 @@ def _near(verdict: Verdict) -> str:
 
 
 def _what_remains(verdict: Verdict) -> str:
-    """What is left of the misfit where structure remains beside what takes nearly all of it."""
+    """Remaining structure of the misfit, beside an effect that takes nearly all of it."""
     rest = listed([readable(n) for n in verdict.selection.left])
     return (
         f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
@@ -202,7 +202,7 @@ def _what_remains(verdict: Verdict) -> str:
 
 
 def advice(verdict: Verdict) -> str:
-    """What to measure next, in words; no rigid chamber where one is among the experiments."""
+    """Next measurement, in words; without a rigid chamber if an experiment has one."""
     words = _asked(verdict)
     if any(_RIGID.search(f"{e.name} {e.specimen or ''}") for e in verdict.experiments):
         for asked, instead in _INSTEAD.items():
@@ -241,7 +241,7 @@ def _asked(verdict: Verdict) -> str:
 
 
 def to_do(verdict: Verdict) -> str:
-    """What to do about what was found, in words; empty where nothing was named."""
+    """Next action, in words; empty if nothing was named."""
     if verdict.kind == "none":
         trust = "Trust the simulation for experiments like these"
         return f"{trust}, and set the load cell to zero before each test." if verdict.zeros else f"{trust}."

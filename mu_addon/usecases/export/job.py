@@ -1,4 +1,4 @@
-"""What an export is asked to do: the unit, its sensor's path, formats, the printer's offsets, the resin."""
+"""Inputs of an export: the unit, its sensor's path, formats, the printer's offsets, the resin."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Job:
 
 @attrs.frozen
 class _Settings:
-    """What export.toml says beside the unit and its resin."""
+    """Content of export.toml beside the unit and its resin."""
 
     resin: str
     path: str = ""
@@ -118,19 +118,19 @@ def read_job(folder: Path) -> Job:
 
 
 def read_resin(folder: Path, name: str) -> Material:
-    """The resin that lies in a folder, or of an older one that of the library; raises InputError."""
+    """Resin in a folder, or of the library for an older folder; raises InputError."""
     kept = folder / RESIN
     return read_material(kept) if kept.is_file() else load_material(name)
 
 
 def resin_of(name: str | None) -> Material:
-    """A resin of the library by name, or of a TOML file; the usual one without either. Raises InputError."""
+    """A resin of the library by name, or of a TOML file; by default the usual one. Raises InputError."""
     chosen = name or USUAL_RESIN
     return read_material(Path(chosen)) if chosen.endswith(".toml") else load_material(chosen)
 
 
 def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Window | Array | None, str]:
-    """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first unless named."""
+    """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first by default."""
     if row is not None and not (name or "").endswith(".csv"):
         raise InputError(
             f"--path-row {row} names a row of a paths.csv, and --path gives none",

@@ -1,4 +1,4 @@
-"""The sheet of a printer's limits: written with the parts that show them, read back with what they showed."""
+"""Sheet of a printer's limits: written with test parts, read back with their results."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def measured_limits(path: Path) -> dict[str, Limit]:
 
 
 def _measured(row: dict[str, str], name: str, written: str, where: str) -> float:
-    """The number that a row says, within the sizes that its part had."""
+    """Number in a row, within the sizes of its part."""
     numbers = []
     for text in (written, *(row.get("sizes") or "").split(_BETWEEN)):
         try:

@@ -55,7 +55,7 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
 
 
 def compensation_offsets(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]:
-    """Offsets in mm, in the plane and along z, to take off a drawing, and where they are from.
+    """Offsets in mm, in the plane and along z, to subtract from a drawing, and their source.
 
     source: None for nothing, "unit" for the unit's [print], else the gauge's filled sheet. Raises InputError.
     """

@@ -32,10 +32,10 @@ Array = NDArray[np.float64]
 MESH_TOLERANCE = 1e-4
 SOLID_S = {"interactive": 3.0, "export": 20.0}
 FORMAT_S = {"stl": 2.0, "3mf": 12.0, "3mf-beams": 14.0, "step": 22.0, "txt": 0.5}
-"""Seconds that writing a format and reading it back takes about."""
+"""Approximate seconds to write a format and read it back."""
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
 STEP_TOLERANCE = 5e-3
-"""The same of a STEP file, through its mesh."""
+"""Relative difference of volume allowed of a STEP file, through its mesh."""
 
 # In which order CAD takes the bodies, and what each does to those before it.
 _ASSEMBLY = (
@@ -48,7 +48,7 @@ _ASSEMBLY = (
 
 @attrs.define
 class Export:
-    """An export under way: what was written so far is here, and in `folder` as soon as it is whole."""
+    """State of an export; files are in `folder` as soon as they are complete."""
 
     job: Job
     folder: Path
@@ -59,11 +59,11 @@ class Export:
 
     @property
     def progress(self) -> Progress:
-        """Where the run says how it goes."""
+        """Progress of the run."""
         return self.context.progress
 
     def run(self) -> None:
-        """Build the solid, write every format, read each back, and leave the manifest."""
+        """Build the solid, write every format, read each back, and write the manifest."""
         job = self.job
         with self.progress.stage("solid", SOLID_S[job.quality]):
             solid = build_solid(job.unit, job.path, job.quality, take_off=job.take_off)
@@ -85,7 +85,7 @@ class Export:
         self.context.summary |= manifest
 
     def _vent(self, solid: Solid, direction: tuple[float, float, float]) -> Solid:
-        """The solid with vents for what it traps along a build direction; writes their plugs."""
+        """The solid with vents for resin trapped along a build direction; writes their plugs."""
         found = self.vented = vented(solid.vertices, solid.triangles, direction, load_printer())
         for name in self.job.formats:
             if name in ("3mf-beams", "step"):
@@ -117,7 +117,7 @@ class Export:
         return attrs.evolve(solid, vertices=found.vertices, triangles=found.triangles, gates=gates)
 
     def _vents(self) -> dict[str, Any] | None:
-        """What the manifest says of vents, None where none were asked for."""
+        """Entry on vents in the manifest, None where none were asked for."""
         if self.vented is None:
             return None
         return {
@@ -297,7 +297,7 @@ def export(job: Job, folder: Path, context: RunContext) -> None:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was written, in a few lines of text, of a run's `summary`."""
+    """Lines of text on an export's `summary`."""
     solid, resin = summary["solid"], summary["resin"]
     lines = [
         f"{entry['file']}: {entry['bytes'] / 1e6:.2f} MB, read back and verified"
@@ -309,7 +309,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of an export with the seconds that each is expected to take on two cores."""
+    """Stages of an export with the expected seconds of each on two cores."""
     vents = [("vents", 10.0)] if job.vent_along is not None else []
     return [("solid", SOLID_S[job.quality]), *vents, *((name, FORMAT_S[name]) for name in job.formats)]
 

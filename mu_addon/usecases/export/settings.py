@@ -1,4 +1,4 @@
-"""Settings of an export, stated once: the job, the command line and the node take them from here."""
+"""Settings of an export, used by the job, the command line and the node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sheet to be filled in at the bench: CSV whose last column is left empty."""
+"""Sheets to be filled in at the bench: CSV whose last column is left empty."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def sheet_text(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def sheet_rows(path: Path, remedy: str) -> list[tuple[str, dict[str, str]]]:
-    """Rows of a filled sheet, each with its place in words; raises InputError with the remedy."""
+    """Rows of a filled sheet, each with its location in words; raises InputError with the remedy."""
     try:
         rows = own_rows(own_lines(own_text(path, _LONGEST)))
     except (OSError, UnicodeDecodeError) as error:

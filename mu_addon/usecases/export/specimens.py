@@ -48,9 +48,9 @@ Surface = tuple[Vertices, Triangles]
 
 @attrs.frozen(eq=False)
 class Specimen:
-    """One part: how it is made, what to measure, and the experiment of a measured-data folder it is for.
+    """One part: its design, the measurement, and its experiment in a folder of measured data.
 
-    kind: of `measured.kinds`, "" for the gauge; keys: what describes the experiment; columns: to be recorded.
+    kind: of `measured.kinds`, "" for the gauge; keys: of the experiment; columns: to be recorded.
     """
 
     name: str
@@ -151,7 +151,7 @@ def specimens(unit: Unit, scales: tuple[float, ...] = SCALES, cells: int = CELLS
 
 @attrs.frozen(eq=False)
 class Job:
-    """Whose specimens are made: a unit's, of a resin, and those of a printer's limits."""
+    """Inputs of the specimens: the unit, its resin, and parts for a printer's limits."""
 
     unit: Unit
     resin: Material
@@ -169,7 +169,7 @@ class Job:
 
     @property
     def limit_parts(self) -> list[LimitPart]:
-        """The parts that show what the printer's file says of it."""
+        """Parts that show the limits in the printer's file."""
         return limit_parts(self.printer, math.sqrt(0.75) * self.unit.dimensions.cell)
 
 
@@ -226,7 +226,7 @@ def _written(specimen: Specimen, folder: Path, resin: Material) -> dict[str, Any
 
 
 def _write_template(every: list[Specimen], folder: Path) -> None:
-    """experiments.toml and CSV files of headers alone, named so that only the rows are missing."""
+    """Write experiments.toml and CSV files of headers alone, so that only rows are missing."""
     lines = ["# Fill in what was measured, delete what was not; see docs/guide/measure.md for every key."]
     for specimen in (s for s in every if s.kind):
         for letter in "ABC"[: specimen.copies]:
@@ -317,14 +317,14 @@ def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[st
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was written, in a few lines of text, of a run's `summary`."""
+    """Lines of text on the specimens' `summary`."""
     return [f"{row['file']}: {row['mass_g']:.2f} g, {row['measure']}" for row in summary["specimens"]] + [
         "sheet.html lists the measurements; measured/ holds the templates that `diagnose` reads"
     ]
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of the specimens with the seconds that each is expected to take on two cores."""
+    """Stages of the specimens with the expected seconds of each on two cores."""
     return [("specimens", 10.0)]
 
 

@@ -27,7 +27,7 @@ MARKERS = ("o", "s", "^", "D", "v")
 def mode_chart(
     mode: str, fitted: Sequence[Coupon], held_out: Sequence[Coupon], fits: Sequence[Fit], chosen: str
 ) -> str:
-    """Nominal stress against stretch: what was measured, filled where it was fitted, and every law."""
+    """Nominal stress against stretch: measured values, filled where fitted, and every law."""
     coupons = [*fitted, *held_out]
     rows = (len(fits) + len(coupons) + 1) // 2
     high = 3.3 + 0.19 * rows

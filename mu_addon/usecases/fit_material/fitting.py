@@ -1,4 +1,4 @@
-"""What a fit of laws found, and which of its coupons belong together."""
+"""Result of a fit of laws, and how its coupons group."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...measured import Measured
 
 @attrs.frozen(eq=False)
 class Fitting:
-    """Coupons and what was found with them.
+    """Coupons and the laws fitted to them.
 
     unseen: share by which each law misses a mode when fitted without it; apart: how far laws differ in modes
     that were not tested, see `disagreement`; compressibility: share by which kappa moves the chosen law's

@@ -1,4 +1,4 @@
-"""What a fit of laws is asked to do: coupon tests, laws, modes to hold out, weights."""
+"""Inputs of a fit of laws: coupon tests, laws, modes to hold out, weights."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Job:
 
     @property
     def data(self) -> dict[str, list[str]]:
-        """What each coupon test is, and the SHA-256 of its file, by name."""
+        """Role, mode and SHA-256 of each coupon test, by name."""
         return {e.name: [e.role, str(e.mode), e.sha256] for e in self.measured.of("coupon")}
 
     def texts(self) -> dict[str, str]:
@@ -103,7 +103,7 @@ def _coupons(
 
 
 def read_job(folder: Path) -> Job:
-    """The job that a folder of `fit-material` describes, its data where they lay then; raises InputError."""
+    """The job that a folder of `fit-material` describes, its data at their original path; InputError."""
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     before = values.pop("data", None)

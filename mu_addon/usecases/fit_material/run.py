@@ -25,7 +25,7 @@ from .job import LAYOUT, Job, read_job
 from .report import write_report
 
 FIT_S = 2.0
-"""Seconds that fitting a law takes about."""
+"""Approximate seconds to fit a law."""
 
 
 def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
@@ -72,7 +72,7 @@ def _unseen(one: Any, fitted: Sequence[Coupon], weights: str) -> dict[str, float
 
 
 def _compressibility(chosen: Fit, coupons: Sequence[Coupon]) -> float:
-    """How far kappa moves the stress at the end of the coupons' range, as a share of it."""
+    """Share by which kappa moves the stress at the end of the coupons' range."""
     moved = []
     for mode, (_, high) in ranges(coupons).items():
         if high > 1:
@@ -173,7 +173,7 @@ def summary(found: Fitting) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a fit found, in a few lines of text, of its `summary`."""
+    """Lines of text on a fit's `summary`."""
     chosen = summary["chosen"]
     law = summary["laws"][chosen]
     values = ", ".join(f"{name} {p['value']:.4g}" for name, p in law["parameters"].items())
@@ -189,7 +189,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a fit with the seconds that each is expected to take on two cores."""
+    """Stages of a fit with the expected seconds of each on two cores."""
     return [("fit", FIT_S * len(job.forms)), ("report", 4.0)]
 
 

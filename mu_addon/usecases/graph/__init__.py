@@ -1,1 +1,1 @@
-"""Node trees of units and of the work on them: kinds of nodes, templates, and the evaluation as a run."""
+"""Node trees of units and of jobs on them: kinds of nodes, templates, and the evaluation as a run."""

@@ -1,4 +1,4 @@
-"""Runs that the nodes of the bench ask for, and what is read of them."""
+"""Runs of the bench's nodes, and their results."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ..sensor import calibrate, measured_motion, record
 
 
 def record_order(call: Call) -> Order:
-    """So many seconds of the sensor."""
+    """Run that records the sensor for some seconds."""
     names = ("port", "baud", "simulated", "seconds", "take")
     return Order(record.USE_CASE, record.Job(**{name: call.settings[name] for name in names}))
 
 
 def recording_of(call: Call, done: Finished) -> Outputs:
-    """The recording that a run of `record` made."""
+    """Recording made by a run of `record`."""
     s = done.summary
     words = f"{s['rows']} samples, {s['duration_s']:.3g} s"
     return {"recording": done.folder / str(s["recording"]), "words": words}
 
 
 def calibrate_order(call: Call) -> Order:
-    """The calibration of recordings and measured data."""
+    """Run that calibrates from recordings and measured data."""
     s = call.settings
     places = tuple(v.folder if isinstance(v, Measured) else Path(v) for _, v in call.inputs["bending"])
     if not places:
@@ -45,7 +45,7 @@ def calibration_of(call: Call, done: Finished) -> Outputs:
 
 
 def measure_order(call: Call) -> Order:
-    """Measured data from a recording and a calibration."""
+    """Run that makes measured data from a recording and a calibration."""
     s, given = call.settings, call.inputs
     names = ("pressure", "kPa_per_unit", "zero", "rate_hz", "name", "specimen")
     job = measured_motion.Job(given["recording"], given["calibration"], **{name: s[name] for name in names})
@@ -53,5 +53,5 @@ def measure_order(call: Call) -> Order:
 
 
 def measured_of(call: Call, done: Finished) -> Outputs:
-    """The folder of measured data that was written."""
+    """Folder of the measured data written by a run."""
     return {"data": read_folder(done.folder), "range": done.summary["angle_deg"]}

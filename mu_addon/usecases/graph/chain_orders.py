@@ -1,4 +1,4 @@
-"""The run that a node Chain asks for, and what is read of it. Loads the solver."""
+"""Run of a node Chain, and its results. Loads the solver."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .parts import refuse_body
 
 
 def chain_order(call: Call) -> Order:
-    """The chain of linked units; raises InputError."""
+    """Run of the chain of linked units; raises InputError."""
     s = call.settings
     designs = [design for _, design in call.inputs["units"]] * s["copies"]
     if len(designs) > MOST_UNITS:

@@ -1,4 +1,4 @@
-"""What differs between units, studies, grasps or diagnoses: a table, and charts of the differences."""
+"""Differences between units, studies, grasps or diagnoses: a table, and charts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Row = dict[str, Any]
 
 @attrs.frozen(eq=False)
 class Comparison:
-    """Named things side by side; the first is what the others are compared with.
+    """Named things side by side; the others are compared with the first.
 
     inputs, results: rows by name of a quantity, a value for each; angles: (pressure in kPa, angle in deg) of
     each study, ascending.
@@ -39,7 +39,7 @@ class Comparison:
     angles: tuple[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]], ...] = ()
 
     def remark(self) -> str:
-        """How many, and the largest angles of studies less that of the first, in a few words."""
+        """Number of studies, and their largest angles less that of the first, in a few words."""
         angles = self.results.get("angle_highest_deg", ())
         more = [
             f"{difference(angles[0], a):+.1f}" for a in angles[1:] if _is_number(a) and _is_number(angles[0])
@@ -76,7 +76,7 @@ def _kind(value: Any) -> str:
 
 
 def _inputs(value: Any) -> Row:
-    """What something is made from, by name."""
+    """Inputs of a thing, by name."""
     if isinstance(value, Finished):
         return {}
     design = value.job if isinstance(value, Study) else value
@@ -134,7 +134,7 @@ def _angles(summary: Mapping[str, Any]) -> tuple[np.ndarray[Any, Any], np.ndarra
 
 
 def difference(first: Any, value: Any) -> Any:
-    """How much a value is more than the first, "" where they are no numbers."""
+    """Difference of a value from the first, "" if they are not numbers."""
     if _is_number(first) and _is_number(value):
         return value - first
     return ""
@@ -180,7 +180,7 @@ def angle_chart(found: Comparison) -> str:
 
 
 def difference_chart(found: Comparison) -> str:
-    """SVG of how much every study's angle is more than the first's at the same pressure."""
+    """SVG of the difference of every study's angle from the first's at the same pressure."""
     pressure, angle = found.angles[0]
     return _lines(found, [a - np.interp(p, pressure, angle) for p, a in found.angles], "difference [deg]")
 

@@ -1,4 +1,4 @@
-"""Nodes of the design: one for each step of the core, made from its definition, and what makes units."""
+"""Nodes of the design: one for each step of the core, from its definition, and those that make units."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _ancestors(names: Iterable[str]) -> set[str]:
 
 
 def _sources(step: Step) -> tuple[str, ...]:
-    """Steps that a step's node is linked to: those before it, and those whose parameters it reads besides.
+    """Steps that a step's node is linked to: those before it, and those whose parameters it also reads.
 
     What comes through another of them is linked once.
     """
@@ -65,12 +65,12 @@ def _sources(step: Step) -> tuple[str, ...]:
 
 
 def _needs_path(name: str) -> bool:
-    """Whether a step makes nothing of a unit without a waveguide."""
+    """Return True if a step needs a waveguide."""
     return first_choosing("path") in _ancestors([name])
 
 
 def _may_lack(step: Step, name: str) -> bool:
-    """Whether a step does without this source: what is made of other parts, too, does without a waveguide."""
+    """Return True if a step can do without this source, because only the waveguide's parts need it."""
     return _needs_path(name) and not all(map(_needs_path, step.after))
 
 
@@ -83,7 +83,7 @@ def _settings(step: Step) -> tuple[Setting, ...]:
 
 
 def _of_step(step: Step) -> Definition:
-    """The node of a step of the core."""
+    """Node of a step of the core."""
     inputs = tuple(
         Input(
             name,
@@ -119,7 +119,7 @@ def _of_step(step: Step) -> Definition:
 
 
 def _value(part: Part) -> Any:
-    """Geometry of a part by the core's steps; None where only the whole unit keeps the rules."""
+    """Geometry of a part by the core's steps; None if only the whole unit satisfies the rules."""
     try:
         given = part.inputs(part.unit())
         if given.path:
@@ -168,7 +168,7 @@ def _assembled(call: Call) -> Outputs:
 
 
 def _chosen_origin(part: Part, origin: Mapping[str, str]) -> dict[str, str]:
-    """Which node has set what is chosen: the one with a parameter of the same step."""
+    """Node that has set each chosen input: the one with a parameter of the same step."""
     found = {}
     for name in part.chosen:
         own = STEPS[first_choosing(name)].own
@@ -207,7 +207,7 @@ def unit_remark(outputs: Outputs) -> str:
 
 
 def _renamed(path: str) -> Setting:
-    """A parameter under the name of its section, too: sections have parameters of the same name."""
+    """A parameter named with its section, since sections have parameters of the same name."""
     return Setting(described()[path]._replace(name=path.replace(".", "_")))
 
 

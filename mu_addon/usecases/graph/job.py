@@ -1,4 +1,4 @@
-"""What an evaluation of a node tree is asked to do: the tree, and which of its nodes."""
+"""Inputs of an evaluation of a node tree: the tree, and which of its nodes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .definitions import definitions
 
 NAME, STATES, REPORT = "graph.toml", "nodes.json", "report.html"
 LAYOUT = FolderLayout(NAME, HEADER, results=(STATES, REPORT, "compare-*.csv"))
-"""The folders of the nodes' own runs are no results: they are named by what they were made from."""
+"""Folders of the nodes' runs do not count as results, as their inputs' hashes name them."""
 NODES = FOLDER
 
 
 @attrs.frozen
 class Job:
-    """A tree to evaluate. wanted: names of nodes, all ends without one; node_reports: of every run."""
+    """A tree to evaluate. wanted: names of nodes, all ends if empty; node_reports: of every run."""
 
     tree: NodeTree
     wanted: tuple[str, ...] = ()
@@ -37,7 +37,7 @@ class Job:
                 raise InputError(f"there is no node {name!r}", self.tree.name, f"choose from {known}")
 
     def require_sound(self) -> None:
-        """Raise InputError for the first fault of a node that is to be evaluated."""
+        """Raise InputError for the first fault of a node to be evaluated."""
         needed = self.tree.upstream(self.wanted or self.tree.nodes)
         found = [fault for fault in faults(self.tree, definitions()) if fault.node in needed]
         if found:

@@ -1,4 +1,4 @@
-"""Functions of modules that load the solver: imported when one is called, not to list nodes."""
+"""Functions from modules that load the solver, imported on the first call and not to list nodes."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from typing import Any
 
 
 def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:
-    """A function of `orders`, or of another module beside it, which is loaded when it is called."""
+    """A function of `orders`, or of another module beside it, loaded when it is called."""
     return lambda *given: getattr(import_module(f".{module}", __package__), name)(*given)

@@ -1,4 +1,4 @@
-"""The run that a node Optimize asks for, and the unit that is read of it. Loads the solver."""
+"""Run of a node Optimize, and the unit from its result. Loads the solver."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..optimize.run import USE_CASE
 
 
 def optimize_order(call: Call) -> Order:
-    """The optimisation of a unit by a file's targets and freedoms; raises InputError."""
+    """Run of the optimisation of a unit by a file's targets and freedoms; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
     if not s["file"]:
         raise InputError("no targets are named", "file", "give a design.toml")

@@ -1,4 +1,4 @@
-"""Runs that nodes ask for, and what is read of them. Loads the solver: imported when one is wanted."""
+"""Runs of nodes, and their results. Loads the solver: imported when one is needed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from .study_nodes import BOTH
 
 @attrs.frozen(eq=False)
 class Study:
-    """A study that is done: its job, its folder and its summary."""
+    """A finished study: its job, its folder and its summary."""
 
     job: Job
     folder: Path
@@ -52,7 +52,7 @@ class Study:
 
 
 def study_of(call: Call, done: Finished) -> Outputs:
-    """A study by its run."""
+    """Study of a finished run."""
     return {"study": Study(_simulated(call) if "unit" in call.inputs else _placed(call), *_kept(done))}
 
 
@@ -61,7 +61,7 @@ def _kept(done: Finished) -> tuple[Path, Mapping[str, Any]]:
 
 
 def _simulated(call: Call) -> Job:
-    """The study that a node Simulate asks for; raises InputError."""
+    """Study of a node Simulate; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
     unit, effects = design.unit, NamedEffects(orientation_deg=s["orientation_deg"], where=call.node)
     lattice: Effective | None = call.inputs["law"]
@@ -90,7 +90,7 @@ def _simulated(call: Call) -> Job:
 
 
 def _placed(call: Call) -> Job:
-    """The study that a node Rank Paths asks for: the simulated one, and its paths. Raises InputError."""
+    """Study of a node Rank Paths: the simulated one with its paths. Raises InputError."""
     s, study = call.settings, call.inputs["study"]
     rules = RULES if s["rule"] == BOTH else (s["rule"],)
     return attrs.evolve(
@@ -118,13 +118,13 @@ def _study_of_place(call: Call, what: str) -> Study:
 
 
 def sensitivity_of(call: Call) -> Outputs:
-    """Where the sensitivity map of a study lies, and its largest value in mm."""
+    """File of a study's sensitivity map, and its largest value in mm."""
     found = _study_of_place(call, "sensitivity").summary["sensitivity"]
     return {"field": call.inputs["study"].folder / found["file"], "largest": float(found["largest_mm"])}
 
 
 def light_of(call: Call) -> Outputs:
-    """Where the signals of a study lie, and the largest per degree."""
+    """File of a study's signals, and the largest per degree."""
     found = _study_of_place(call, "light").summary["light"]["sensitivity_per_deg"]
     best = max(found, key=lambda name: abs(found[name]))
     return {"signals": call.inputs["study"].folder / "signals.csv", "largest": found[best], "path": best}
@@ -149,7 +149,7 @@ def figure_of(call: Call) -> Outputs:
 
 
 def homogenize_order(call: Call) -> Order:
-    """The lattice's law by homogenization."""
+    """Run that homogenizes the lattice."""
     s, unit = call.settings, call.inputs["unit"].unit
     job = HomogenizeJob(
         unit=unit,
@@ -167,7 +167,7 @@ def _window(design: Design) -> Any:
 
 
 def check_order(call: Call) -> Order:
-    """The print check of a unit."""
+    """Run of the print check of a unit."""
     s, design = call.settings, call.inputs["unit"]
     direction = (s["up_x"], s["up_y"], s["up_z"])
     if not 1e-6 < sum(x * x for x in direction) < 1e12:
@@ -184,7 +184,7 @@ def check_order(call: Call) -> Order:
 
 
 def export_order(call: Call) -> Order:
-    """The files of a unit."""
+    """Run that exports a unit's files."""
     s, design = call.settings, call.inputs["unit"]
     refuse_body(design, "the export")
     formats = tuple(s["formats"].split())
@@ -200,7 +200,7 @@ def export_order(call: Call) -> Order:
 
 
 def grip_order(call: Call) -> Order:
-    """The grasp of a gripper."""
+    """Run of a gripper's grasp."""
     s = call.settings
     detail = detailed(s["coarse"], s["fidelity"])
     try:
@@ -221,24 +221,24 @@ def grip_order(call: Call) -> Order:
 
 
 def simulate_order(call: Call) -> Order:
-    """The motion of a unit."""
+    """Run that simulates a unit."""
     return Order(STUDY, _simulated(call))
 
 
 def place_order(call: Call) -> Order:
-    """The ranking of paths of a study, which goes on from that."""
+    """Run that ranks a study's paths, continuing it."""
     return Order(STUDY, _placed(call), after=call.inputs["study"].folder)
 
 
 def solid_order(call: Call) -> Order:
-    """The printable solid of linked parts."""
+    """Run that builds the printable solid of linked parts."""
     unit, given, path = solid_of(call)
     job = Job(unit, grasp(), stages=("design",), quality=given.quality, body=given.body, path=path)
     return Order(STUDY, job)
 
 
 def diagnose_order(call: Call) -> Order:
-    """The diagnosis of measured data."""
+    """Run that diagnoses measured data."""
     design, measured = call.inputs["unit"], call.inputs["data"]
     assert isinstance(measured, Measured)
     unit = None if design is None else design.unit
@@ -249,7 +249,7 @@ def diagnose_order(call: Call) -> Order:
 
 
 def law_of(call: Call, done: Finished) -> Outputs:
-    """The lattice's law that a run of `homogenize` found."""
+    """Lattice law of a run of `homogenize`."""
     return {"law": read_effective(done.folder / "effective.toml"), "run": done}
 
 

@@ -1,4 +1,4 @@
-"""Designs as they pass through nodes: parts with their parameters, and whole units."""
+"""Designs passed between nodes: parts with their parameters, and whole units."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SCALE = next(d for d in describe(Unit) if d.name == "scale")
 
 @attrs.frozen
 class Part:
-    """What steps have made so far: their parameters, by `section.name`, and which node each is from.
+    """Result of the steps so far: parameters, by `section.name`, and the node each is from.
 
     chosen: of `StepInputs`, by name; muted: names of muted steps; step: the last of them.
     """
@@ -39,7 +39,7 @@ class Part:
         return Unit(name=name, scale=values.get("scale", 1.0), **_sections(values))
 
     def inputs(self, unit: Unit) -> StepInputs:
-        """What the steps make a unit from. Raises InputError for a body that does not fit."""
+        """Inputs of the steps for a unit. Raises InputError for a body that does not fit."""
         body = body_in(self.chosen.get("body", ""), unit)
         quality = self.chosen.get("quality", "interactive")
         return StepInputs(unit, self.chosen.get("path", ""), self.muted, quality, body)  # type: ignore[arg-type]
@@ -49,7 +49,7 @@ class Part:
 class Design:
     """A whole unit: its parameters, the path of its waveguide or "", its body in place of the lattice's box.
 
-    origin: which node a parameter is from, by `section.name`.
+    origin: node of each parameter, by `section.name`.
     """
 
     unit: Unit
@@ -65,7 +65,7 @@ def body_in(path: str, unit: Unit) -> Body | None:
 
 
 def _sections(values: Mapping[str, Any]) -> dict[str, Any]:
-    """A unit's sections with the values that are given by `section.name`."""
+    """A unit's sections with the values given by `section.name`."""
     found: dict[str, Any] = {}
     for section in SECTIONS:
         own = _name_of(section)
@@ -86,12 +86,12 @@ def described() -> dict[str, Description]:
 
 
 def first_choosing(name: str) -> str:
-    """Name of the first step that depends on a field of `StepInputs`: it is set there."""
+    """Name of the first step that depends on a field of `StepInputs`, where that is set."""
     return next(step.name for step in STEPS.values() if name in step.chosen)
 
 
 def part_of(step: Step, call: Call) -> Part:
-    """What the linked parts and the node's own settings come to; InputError where two parts differ."""
+    """Part joined from the linked parts and the node's own settings; InputError where two differ."""
     parameters: dict[str, Any] = {}
     chosen: dict[str, str] = {}
     origin: dict[str, str] = {}
@@ -121,7 +121,7 @@ def part_of(step: Step, call: Call) -> Part:
 
 
 def whole_unit(part: Part, node: str, more: Mapping[str, Any], name: str = "custom") -> Unit:
-    """The part's unit; an error by a rule is that of the node whose parameter breaks it."""
+    """Unit of the part; an error by a rule is reported at the node whose parameter breaks it."""
     try:
         return part.unit(name, more)
     except InputError as error:
@@ -129,7 +129,7 @@ def whole_unit(part: Part, node: str, more: Mapping[str, Any], name: str = "cust
 
 
 def blamed(error: InputError, origin: Mapping[str, str], node: str) -> NodeError:
-    """The error with the node that set the first parameter which it names."""
+    """The error, assigned to the node that set the first parameter it names."""
     words = error.where.replace("[", "").replace("]", "").replace(",", " ").split()
     section = words[0] if len(words) > 1 else ""
     for word in words:
@@ -140,7 +140,7 @@ def blamed(error: InputError, origin: Mapping[str, str], node: str) -> NodeError
 
 
 def solid_of(call: Call) -> tuple[Unit, StepInputs, str]:
-    """Unit, steps' inputs and path of the node Solid; InputError where a step that it needs is muted."""
+    """Unit, steps' inputs and path of the node Solid; InputError if a step that it needs is muted."""
     part = part_of(STEPS["solid"], call)
     unit = whole_unit(part, call.node, {})
     given = part.inputs(unit)
@@ -156,7 +156,7 @@ def refuse_body(design: Design, what: str) -> None:
 
 
 def known_path(unit: Unit, path: str) -> str:
-    """The path's name; raises InputError for one that the unit has not."""
+    """The path's name; raises InputError for one that the unit does not have."""
     return window(unit, path).name if path else ""
 
 

@@ -1,4 +1,4 @@
-"""The report of a node tree: its nodes, what each took, and the comparisons."""
+"""The report of a node tree: its nodes, their seconds, and the comparisons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`graph`: every node that is asked for, and of those only what is not there yet."""
+"""`graph`: evaluates the nodes asked for, computing only those not yet cached."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .report import write_report
 
 
 def run_graph(job: Job, folder: Path, context: RunContext) -> Evaluation:
-    """Evaluate a tree; leaves nodes.json, compare-NODE.csv and report.html.
+    """Evaluate a tree; writes nodes.json, compare-NODE.csv and report.html.
 
-    A node that fails does not keep others from being made. Raises InputError for a tree with a fault, and at
-    the end the first error of a node.
+    A node that fails does not keep others from being evaluated. Raises InputError for a tree with a fault,
+    and at the end the first error of a node.
     """
     job.require_sound()
     runs = FolderRuns(folder, context.progress, job.node_reports)
@@ -97,7 +97,7 @@ def summary(found: Evaluation) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """A line a node: its state, its seconds, what it found."""
+    """A line for each node: its state, its seconds, its result."""
     nodes = summary.get("nodes", {})
     width = max(map(len, nodes), default=0)
     return [

@@ -1,4 +1,4 @@
-"""Nodes of the work on a unit: simulation, ranking of paths, the lattice's law, print, gripper."""
+"""Nodes of jobs on a unit: simulation, ranking of paths, the lattice's law, print, gripper."""
 
 from __future__ import annotations
 

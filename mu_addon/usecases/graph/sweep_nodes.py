@@ -25,7 +25,7 @@ _ORDERS = "sweep_orders"
 
 
 def _varied() -> dict[str, bool]:
-    """Every parameter that a range may be of, and whether it takes whole numbers alone."""
+    """Every parameter that can be varied, and True if it takes whole numbers only."""
     numbers = {name: d.type is int for name, d in described().items() if d.type in (int, float)}
     return numbers | {FACTOR: False, REFINE: False}
 

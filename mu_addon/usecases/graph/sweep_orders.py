@@ -1,4 +1,4 @@
-"""The run that a node Parameter Study asks for, and what is read of it. Loads the solver."""
+"""Run of a node Parameter Study, and its results. Loads the solver."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NOWHERE = Path("/")
 
 @attrs.frozen(eq=False)
 class StudyTable:
-    """A parameter study that is done: its plan, folder, and a row a point as points.csv has it."""
+    """A finished parameter study: its plan, folder, and a row for each point as in points.csv."""
 
     plan: Plan
     folder: Path
@@ -40,13 +40,13 @@ class StudyTable:
         return tuple(row for row in self.rows if row["status"] == "done")
 
     def remark(self) -> str:
-        """How many studies there are, and how many failed."""
+        """Number of studies, and of failed ones."""
         failed = len(self.rows) - len(self.done)
         return f"{len(self.rows)} studies" + (f", {failed} failed" if failed else "")
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns of figures that some study has a number in."""
+        """Names of the figures' columns in which some study has a number."""
         inputs = ("point", "status", *(v.name for v in self.plan.variables), *LAST)
         names = dict.fromkeys(name for row in self.done for name in row if name not in inputs)
         return tuple(name for name in names if any(_number(row, name) is not None for row in self.done))
@@ -93,12 +93,12 @@ def _plan_of(call: Call) -> Plan:
 
 
 def sweep_order(call: Call) -> Order:
-    """The parameter study of a unit."""
+    """Run of a unit's parameter study."""
     return Order(USE_CASE, Job(_plan_of(call), workers=call.settings["workers"]))
 
 
 def table_of(call: Call, done: Finished) -> Outputs:
-    """What a parameter study found; raises InputError where it has none to be used."""
+    """Table of a parameter study; raises InputError where it has no usable row."""
     path = done.folder / TABLE
     try:
         rows = tuple(csv.DictReader(file_text(path).splitlines()))

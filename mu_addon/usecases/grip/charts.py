@@ -99,7 +99,7 @@ def _first_touch(found: Grasp) -> int:
 
 
 def _opened(found: Grasp) -> int:
-    """The instant of least pressure in the last phase."""
+    """Instant of least pressure in the last phase."""
     own = [i for i, name in enumerate(found.phase) if name == "v"]
     return min(own, key=lambda i: found.pressure_kPa[i])
 
@@ -128,7 +128,7 @@ def over_time(
 
 
 def pulling(grasps: Mapping[float, Grasp]) -> str:
-    """What friction carries against how far the gripper has risen, with each cube's weight, as SVG text."""
+    """Force by friction against the gripper's rise, with each cube's weight, as SVG text."""
     with plots.canvas(plots.WIDTH, 2.7) as (figure, svg):
         axes = figure.add_axes((0.15, 0.17, 0.81, 0.78))
         axes.axhline(0, color=plots.QUIET, linewidth=0.8)

@@ -80,11 +80,11 @@ class Cube:
 
 @attrs.frozen
 class Grip:
-    """How fingers and cube meet.
+    """Contact of fingers and cube.
 
-    friction: the cautious end of what is known is taken. beyond_mm: assumed, the tips' edges then meet both
-    cubes near the middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see
-    `Obstacle`. step_s: longest time between instants.
+    friction: the lower end of known values. beyond_mm: assumed, the tips' edges then meet both cubes near the
+    middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see `Obstacle`.
+    step_s: longest time between instants.
     """
 
     friction: float = FRICTION.field()
@@ -102,16 +102,16 @@ class Grip:
 
 _OF_STRUTS = {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1}
 OF_FIDELITY: dict[str, dict[str, Any]] = {HOMOGENISED: {}, RESOLVED: _OF_STRUTS, SOLID: _OF_STRUTS}
-"""Values of `Grip` that go with a fidelity: struts bear on few small places, and their faces are small."""
+"""Values of `Grip` for each fidelity: struts bear on few small areas, and their faces are small."""
 
 
 @attrs.frozen(eq=False)
 class Lift:
     """A cube without support in the closed grasp.
 
-    held: whether friction carries the weight; sag_mm: how far it has sunk where it does, nan where it does
-    not. normal_N: of one finger on the cube, at the plateau. pull_mm (p,) and pull_N (p,): the force it takes
-    to pull the cube down so far, of both fingers together.
+    held: True if friction carries the weight; sag_mm: how far it has then sunk, else nan. normal_N: of one
+    finger on the cube, at the plateau. pull_mm (p,) and pull_N (p,): way and force when the cube is pulled
+    down, of both fingers together.
     """
 
     held: bool
@@ -124,12 +124,12 @@ class Lift:
 
     @property
     def capacity_N(self) -> float:
-        """The most that friction carries, found by pulling."""
+        """Largest weight that friction carries, found by pulling."""
         return float(self.pull_N.max(initial=0.0))
 
     @property
     def margin(self) -> float:
-        """What friction can carry over the weight, by pulling."""
+        """Ratio of the largest friction, found by pulling, to the weight."""
         return self.capacity_N / self.weight_N
 
     @property
@@ -144,9 +144,9 @@ class Grasp:
 
     u (k, n, 3): displacement of the half mesh in mm; backbone (k, p, 3): the anchors, in the finger's frame;
     cube_mm (k, 3): the cube's middle in that frame. normal_N (k,): toward the other finger; down_N (k,):
-    along +z, friction but for what edges press. sticking (k,): share of the touching area that does not
-    slide; slid_mm (k,): the farthest that a point has slid so far; deepest_mm (k,): the error of the gap;
-    lost_mJ (k,): what friction has taken, of one finger; volume_mm3 (k,): of its cavity; snapped_mm (k,): how
+    along +z, friction except for the pressure of edges. sticking (k,): share of the touching area that does
+    not slide; slid_mm (k,): the farthest that a point has slid so far; deepest_mm (k,): the error of the gap;
+    lost_mJ (k,): dissipated by friction, of one finger; volume_mm3 (k,): of its cavity; snapped_mm (k,): how
     far a node moved where parts of the finger snapped on the way to an instant, else 0.
     """
 
@@ -177,7 +177,7 @@ class Grasp:
 
     @property
     def cube_work_mJ(self) -> float:
-        """Work of the cube's way on one finger over the whole cycle, by the trapezoidal rule."""
+        """Work of the cube's motion on one finger over the whole cycle, by the trapezoidal rule."""
         way = np.diff(self.cube_mm[:, 2])
         return -float(((self.down_N[1:] + self.down_N[:-1]) / 2.0 * way).sum())
 
@@ -193,7 +193,7 @@ def place_of(gripper: Gripper, grip: Grip) -> Array:
 
 
 def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacle:
-    """The cube between the tips as an obstacle of a finger; raises InputError where it does not fit there."""
+    """The cube between the tips as an obstacle of a finger; raises InputError where it does not fit."""
     if cube.side_mm >= gripper.fingers.gap_mm:
         raise InputError(
             f"a cube of {cube.side_mm:g} mm does not fit between fingers {gripper.fingers.gap_mm:g} mm apart",
@@ -214,7 +214,7 @@ def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacl
 
 
 def _facing(gripper: Gripper, mesh: Mesh) -> OuterFaces:
-    """Faces of a finger that can meet the cube: of its inner side and its tip, as deep as struts are open."""
+    """Faces of a finger that can meet the cube: on its inner side and tip, to the depth of open struts."""
     faces = outer_faces(mesh)
     (_, inner), (_, tip) = gripper.unit.printed.bounds[1:]
     y, z = mesh.nodes[faces.nodes[:, :3]][:, :, 1], mesh.nodes[faces.nodes[:, :3]][:, :, 2]
@@ -237,8 +237,8 @@ def grasp(
     """Close a finger on a cube phase by phase, in time order, and lift the cube.
 
     mesh and materials: of the gripper's unit, the half mesh, homogenised or resolved. on_instant is told the
-    share done. newton: settings that suit the mesh; self_contact: what keeps the finger's parts apart. Raises
-    InputError for a cube that does not fit, ConvergenceError where an instant has no equilibrium.
+    share done. newton: settings that suit the mesh; self_contact: of the finger's parts. Raises InputError
+    for a cube that does not fit, ConvergenceError where an instant has no equilibrium.
     """
     grip = grip or Grip()
     model = Model(mesh, threads=threads)
@@ -248,7 +248,7 @@ def grasp(
 
 
 class _Hand:
-    """A grasp under way: the finger, the cube, and where the cube is."""
+    """State of a grasp: the finger, the cube, and the cube's pose."""
 
     def __init__(
         self,
@@ -276,9 +276,9 @@ class _Hand:
         self.at: list[Array] = []
 
     def pose(self, time_s: float) -> Pose:
-        """Where the cube is: it comes from below while the fingers open, and sinks as it is lifted.
+        """Pose of the cube: it comes from below while the fingers open, and sinks as it is lifted.
 
-        One that friction cannot carry is not followed as it falls: it stays on its support.
+        A cube that friction cannot carry stays on its support: its fall is not followed.
         """
         begun, there = self.phases.span("i")
         way = COMES_FROM * self.cube.side_mm
@@ -316,7 +316,7 @@ class _Hand:
         )
 
     def _reached(self, state: State) -> None:
-        """Keep what an instant shows; at the end of holding, find out how the cube hangs."""
+        """Keep an instant's results; at the end of holding, find how the cube hangs."""
         number = len(self.rows)
         contact = self.obstacle.contact(state.u)
         self.rows.append(
@@ -343,11 +343,11 @@ class _Hand:
 
 
 def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cube, friction: float) -> Lift:
-    """How a cube hangs in a closed grasp once its support is gone: where friction balances its weight.
+    """Position of a cube in a closed grasp without support: where friction balances its weight.
 
-    state: converged and committed. The cube is pulled down step by step, from one committed state to the
-    next, so that what slides stays slid, until what carries it grows no more or lets go; where that meets
-    the weight is then found within `BALANCE` of it. Leaves the obstacle as it was.
+    state: converged and committed. The cube is pulled down step by step, each state committed, so that slip
+    accumulates, until the friction stops growing or drops; the balance with the weight is then found within
+    `BALANCE` of it. The obstacle is restored.
     """
     normal = 2.0 * float(obstacle.contact(state.u).normal_N[1])
     if not obstacle.friction:
@@ -356,7 +356,7 @@ def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cub
     pose, memories, states = obstacle.pose, [obstacle.memory], [state]
 
     def carried(start: State, way: float) -> tuple[State, float]:
-        """The state with the cube so far down in mm, and the upward force on it in N."""
+        """State with the cube lowered by so many mm, and the upward force on it in N."""
         obstacle.pose = Pose(pose.rotation, pose.shift + np.array([0.0, 0.0, way]))
         found = equilibrium.newton(start.u, state.pressure_MPa)
         return found, -HALVES * float(obstacle.force_N(found.u)[2])
@@ -395,5 +395,5 @@ def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cub
 
 
 def _fallen(force: list[float]) -> bool:
-    """Whether a force has passed its peak by more than what it wavers."""
+    """Return True if a force has passed its peak by more than its fluctuation."""
     return len(force) > 2 and force[-1] > 0 and force[-1] < 0.98 * max(force)

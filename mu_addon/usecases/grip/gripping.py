@@ -1,4 +1,4 @@
-"""A gripper stage after stage: its printable part, its grasp of cubes, its light and its sensor paths."""
+"""Stages of a gripper: its printable part, its grasp of cubes, its light and its sensor paths."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ RAYS = 40_000
 
 @attrs.define
 class Gripping:
-    """A gripper's run under way: what was found so far is here, and in `folder` as soon as it is whole."""
+    """State of a gripper's run; results are also in `folder` as soon as they are complete."""
 
     job: Job
     folder: Path
@@ -56,7 +56,7 @@ class Gripping:
 
     @property
     def progress(self) -> Progress:
-        """Where the run says how it goes."""
+        """Progress of the run."""
         return self.context.progress
 
     @property
@@ -67,7 +67,7 @@ class Gripping:
     # Stages, in the order they need each other.
 
     def run(self) -> None:
-        """Every stage."""
+        """Run every stage."""
         gripper = self.job.gripper
         self.context.summary["inputs"] = {
             "gripper": attrs.asdict(gripper.fingers) | attrs.asdict(gripper.plate),
@@ -90,7 +90,7 @@ class Gripping:
             self._write_columns()
 
     def design(self) -> None:
-        """The printable part as STL and 3MF, the latter read back."""
+        """Write the printable part as STL and 3MF, the latter read back."""
         with self.progress.stage("solid", 6.0):
             found = self.solid = build_gripper(self.job.gripper, self.job.quality)
             write_bytes(self.folder / "gripper.stl", stl_bytes(found.vertices, found.triangles))
@@ -173,7 +173,7 @@ class Gripping:
             )
 
     def _look_for_self_intersection(self, found: Grasp) -> None:
-        """Name the first pressure at which walls of the free finger pass through each other as it opens."""
+        """Report the first pressure at which walls of the free finger intersect as it opens."""
         assert self.mesh is not None
         # With self-contact no step passes a touch.
         if self.job.self_contact:
@@ -189,7 +189,7 @@ class Gripping:
             )
 
     def follow_light(self) -> None:
-        """The waveguide's light through every grasp, by rays through the bent bar."""
+        """Trace the waveguide's light through every grasp, by rays through the bent bar."""
         assert self.mesh is not None
         unit, optics = self.job.gripper.unit, self.job.optics
         with self.progress.stage("light", 20.0):
@@ -212,7 +212,7 @@ class Gripping:
         self.context.summary["light"] = light
 
     def rank(self, rule: str, cube: Cube | None) -> None:
-        """J_hat of every path's finger, closing on a cube or on nothing."""
+        """Compute J_hat of every path's finger, closing on a cube or on nothing."""
         assert self.mesh is not None
         on = "nothing" if cube is None else f"{cube.side_mm:g} mm"
 
@@ -266,7 +266,7 @@ class Gripping:
         write_csv(self.folder / "deviation.csv", columns, rows)
 
     def warn(self, text: str) -> None:
-        """Tell something that the user should know, now and in the report."""
+        """Warn the user, now and in the report."""
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)

@@ -1,4 +1,4 @@
-"""What a grasp is asked to do: the gripper, the cubes, the phases, and how finely it is computed."""
+"""Inputs of a grasp: the gripper, the cubes, the phases, and the detail."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ LAYOUT = FolderLayout(
 
 @attrs.frozen
 class Detail:
-    """How finely a grasp is computed: mesh, inclusion rules and the longest time between instants."""
+    """Detail of a grasp: mesh, inclusion rules and the longest time between instants."""
 
     mesh: MeshSettings
     rules: tuple[str, ...]
     step_s: float
 
     def grip(self, **values: Any) -> Grip:
-        """How fingers and cube meet, with values of `Grip`."""
+        """Contact of fingers and cube, with values of `Grip`."""
         return Grip(step_s=self.step_s, **OF_FIDELITY[self.mesh.fidelity], **values)
 
 
 def detailed(coarse: bool, fidelity: str, refine: float | None = None) -> Detail:
-    """The detail of a quick look, or of a whole run; refine: in place of what belongs to it."""
+    """Detail of a quick look, or of a whole run; refine: replaces its refinement."""
     own = COARSE_REFINE if coarse else REFINE.default
     mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity)
     rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if coarse else RULES
@@ -62,9 +62,9 @@ def detailed(coarse: bool, fidelity: str, refine: float | None = None) -> Detail
 
 @attrs.frozen
 class Job:
-    """Inputs of a run. cubes: none leaves the grasp out; rules: none leaves the table of paths out.
+    """Inputs of a run. cubes: without any, no grasp; rules: without any, no table of paths.
 
-    self_contact: whether walls and struts of a resolved finger keep apart. Raises InputError.
+    self_contact: of a resolved finger's walls and struts. Raises InputError.
     """
 
     gripper: Gripper

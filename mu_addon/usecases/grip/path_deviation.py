@@ -44,7 +44,7 @@ TIMES, STATIONS = 13, 51
 
 @attrs.frozen(eq=False)
 class PathDeviations:
-    """J_hat in mm by path, under one inclusion rule; cube: what the finger closed on, None for nothing."""
+    """J_hat in mm by path, under one inclusion rule; cube: the one that the finger closed on, or None."""
 
     rule: str
     cube: Cube | None
@@ -52,11 +52,11 @@ class PathDeviations:
 
     @property
     def chosen(self) -> str:
-        """The path that disturbs least."""
+        """Path that disturbs least."""
         return min(self.J_hat_mm, key=lambda name: self.J_hat_mm[name])
 
     def rank_correlation(self, other: dict[str, float]) -> float:
-        """Spearman's with another J by path, over the paths that both have; nan for fewer than three."""
+        """Spearman's correlation with another J by path, over the paths in both; nan for fewer than three."""
         from scipy.stats import spearmanr
 
         both = [name for name in self.J_hat_mm if name in other]
@@ -169,7 +169,7 @@ def _printed(
     model_of: Callable[[Mesh], Model],
     self_contact: bool,
 ) -> Callable[[str], Array]:
-    """As `_stiffened`, of units with printed waveguides: instant by instant, since struts may snap."""
+    """Monitored points of units with printed waveguides, instant by instant, since struts may snap."""
     unit = gripper.unit
     newton = in_time_newton(True, self_contact)
     every = windows(len(points))

@@ -34,7 +34,7 @@ class Phases:
     phase: tuple[str, ...]
 
     def span(self, name: str) -> tuple[float, float]:
-        """When a phase begins and ends, in s."""
+        """Start and end of a phase in s."""
         own = [i for i, phase in enumerate(self.phase) if i and phase == name]
         time = self.protocol.time_s
         return float(time[own[0] - 1]), float(time[own[-1]])

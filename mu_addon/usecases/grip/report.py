@@ -35,7 +35,7 @@ FILES = {
 
 
 def write_report(run: Gripping, stopped: str = "") -> None:
-    """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
+    """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
     if run.solid is None:
         return
     with run.progress.stage("report", expected_s=20.0):
@@ -65,7 +65,7 @@ def report(
     versions: dict[str, str],
     stopped: str = "",
 ) -> str:
-    """The whole report as HTML text, as far as the run came."""
+    """The whole report as HTML text, of all finished stages."""
     warnings = list(run.warnings)
     if stopped:
         warnings.insert(0, f"This run is partial: {stopped}. Later stages were not computed.")

@@ -22,7 +22,7 @@ from .settings import REFINE, SIDES
 
 
 def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
-    """Design a gripper, close it on cubes, follow its light, rank its paths, and report as far as it came."""
+    """Design a gripper, close it on cubes, trace its light, rank its paths, and report finished stages."""
     run = Gripping(job, folder, context)
     context.report = lambda stopped: write_report(run, stopped)
     run.run()
@@ -45,7 +45,7 @@ def gripper_path_deviations(
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a run found, in a few lines of text, of its `summary`."""
+    """Lines of text on a grasp's `summary`."""
     x, y, z = summary["size_mm"]
     lines = [f"one part of {x:g} x {y:g} x {z:.4g} mm, {summary['gates']['inner_shells']} chambers"]
     for side, g in summary.get("grasps", {}).items():
@@ -64,7 +64,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a grasp with the seconds that each is expected to take on two cores."""
+    """Stages of a grasp with the expected seconds of each on two cores."""
     seconds = 280.0 * (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
     grasps = [(f"grasp of {cube.side_mm:g} mm", seconds) for cube in job.cubes]
     return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]

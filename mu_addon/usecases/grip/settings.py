@@ -1,4 +1,4 @@
-"""Settings of a grasp, stated once: the job, the command line, the node and Blender take them from here."""
+"""Settings of a grasp, used by the job, the command line, the node and Blender."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def unfolded(nodes: Floats, faces: Any, planes: Floats) -> tuple[Floats, Any]:
 
 
 def cell_picture(nodes: Floats, faces: Any, size: float, density: float, width: int = 620) -> Picture:
-    """One cell of the lattice as it is printed, from its octant's skin (without the cut faces' names)."""
+    """Picture of one printed cell of the lattice, from its octant's skin (without the cut faces' names)."""
     vertices, triangles = unfolded(nodes, faces, np.full(3, size / 2))
     parts = [Part(vertices, triangles, STRUT_COLOR), *_frame(size)]
     camera = fit(parts, TOWARDS, margin=0.03)
@@ -112,7 +112,7 @@ def _sphere(around: int, up: int) -> tuple[Floats, Any]:
 
 
 def _labelled(image: Image, camera: Camera, words: Sequence[tuple[Floats, str]]) -> Image:
-    """A picture with words at points in space."""
+    """A picture with labels at points in space."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""From a unit's struts and resin to its lattice's moduli, virtual tests and law, stage after stage."""
+"""Stages from a unit's struts and resin to its lattice's moduli, virtual tests and law."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STRETCHES = tuple(float(s) for s in np.linspace(-0.4, 0.4, 21).round(12))
 
 @attrs.define
 class Homogenisation:
-    """A homogenisation under way: what was found so far is here, and in `folder` as soon as it is whole."""
+    """State of a homogenisation; results are also in `folder` as soon as they are complete."""
 
     job: Job
     folder: Path
@@ -53,7 +53,7 @@ class Homogenisation:
 
     @property
     def progress(self) -> Progress:
-        """Where the run says how it goes."""
+        """Progress of the run."""
         return self.context.progress
 
     @property
@@ -64,7 +64,7 @@ class Homogenisation:
     # Stages, in the order they need each other.
 
     def run(self) -> None:
-        """Every stage; what fails after the moduli are there leaves them, with a warning."""
+        """Run every stage; a failure after the moduli are found leaves them, with a warning."""
         job = self.job
         self.context.summary["inputs"] = {"cell": cell_table(job.cell), "resin": attrs.asdict(job.resin)}
         self.make_cell()
@@ -89,7 +89,7 @@ class Homogenisation:
         self.context.summary["mesh"] = {"nodes": len(self.mesh.nodes), "tetrahedra": len(self.mesh.tets)}
 
     def find_moduli(self) -> None:
-        """Effective elasticity of the endless lattice."""
+        """Effective elasticity of the infinite lattice."""
         assert self.mesh is not None
         assert self.materials is not None
         with self.progress.stage("moduli", 5.0):
@@ -113,7 +113,7 @@ class Homogenisation:
         }
 
     def stretch_cell(self) -> None:
-        """The endless lattice pulled and pressed along an axis."""
+        """Tension and compression of the infinite lattice along an axis."""
         assert self.mesh is not None
         assert self.materials is not None
         settings = StretchSettings(strains=STRETCHES)
@@ -149,7 +149,7 @@ class Homogenisation:
             self.warn(f"The curve of the periodic lattice ends early: {found.stopped}.")
 
     def fit_law(self) -> None:
-        """The law that the analysis mesh takes, in effective.toml."""
+        """The analysis mesh's law, written to effective.toml."""
         assert self.elasticity is not None
         assert self.stretched is not None
         e, job = self.elasticity, self.job
@@ -174,7 +174,7 @@ class Homogenisation:
         self.context.summary["law"] = {"misfit": misfit, "small_strain": law, "stretch": self.fit.stretch}
 
     def export_specimen(self) -> None:
-        """The printable block, nominal: the printer adds its offset itself."""
+        """Write the printable block at nominal size: the printer adds its offset itself."""
         with self.progress.stage("printable specimen", 3.0):
             nominal = attrs.evolve(self.job.cell, offset_xy_mm=0.0, offset_z_mm=0.0)
             try:
@@ -184,14 +184,14 @@ class Homogenisation:
                 self.warn(f"No printable specimen: {error.what}.")
 
     def specimen(self) -> Specimen:
-        """An eighth of the block that is compressed."""
+        """An eighth of the block to be compressed."""
         cell, resin = self.job.cell, self.job.resin
         mesh = mesh_cell(cell, self.job.block_mesh, self.cache.folder)
         materials = cell_materials(cell, mesh, resin.modulus_MPa, resin.poisson)
         return block_specimen(mesh, self.job.cells, materials)
 
     def compress(self, friction: Friction) -> None:
-        """The block between two plates, to the strain that was asked for."""
+        """Compress the block between two plates, to the strain asked for."""
         body = self.specimen()
         name = key(body.mesh.hash(), body.materials.hash(), friction, self.job.strains)
         fields = ("u", "force_N", "energy_mJ", "residual", "factorisations")
@@ -241,7 +241,7 @@ class Homogenisation:
         }
 
     def warn(self, text: str) -> None:
-        """Tell something that the user should know, now and in the report."""
+        """Warn the user, now and in the report."""
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)

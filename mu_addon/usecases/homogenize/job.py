@@ -1,4 +1,4 @@
-"""What a homogenisation is asked to do: the unit, its resin, the block between plates."""
+"""Inputs of a homogenisation: the unit, its resin, the block between plates."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ SPECIMEN_REFINE = 0.5
 
 @attrs.frozen
 class Resin:
-    """What struts are made of: neo-Hookean, Young's modulus in MPa and Poisson's ratio; density in g/ml."""
+    """Resin of the struts: neo-Hookean, Young's modulus in MPa, Poisson's ratio; density in g/ml."""
 
     name: str
     modulus_MPa: float
@@ -53,20 +53,20 @@ class Resin:
 
     @classmethod
     def of_unit(cls, unit: Unit, known: Material) -> Resin:
-        """The unit's own: its struts are printed with its membrane, of a known resin's density."""
+        """Resin of the unit: its struts are printed with its membrane, with a known resin's density."""
         m = unit.material
         modulus = m.membrane_modulus_MPa
         return cls("that of the unit's membrane", modulus, m.membrane_poisson, known.density_g_per_ml)
 
     @classmethod
     def of(cls, known: Material) -> Resin:
-        """One of the library, or of a file."""
+        """Resin of the library, or of a file."""
         return cls(known.name, known.modulus_MPa, known.poisson, known.density_g_per_ml)
 
 
 @attrs.frozen
 class Job:
-    """Inputs of a homogenisation. cells: of the specimen, a side; frictions: none leaves it out."""
+    """Inputs of a homogenisation. cells: of the specimen, per side; frictions: without any, no specimen."""
 
     unit: Unit
     resin: Resin
@@ -85,18 +85,18 @@ class Job:
 
     @property
     def cell(self) -> StrutCell:
-        """The unit's cell, as it is printed."""
+        """Cell of the unit, as printed."""
         return strut_cell(self.unit)
 
     @property
     def mesh(self) -> CellMeshSettings:
-        """How fine the cell's mesh is."""
+        """Settings of the cell's mesh."""
         standard = CellMeshSettings()
         return attrs.evolve(standard, per_diameter=standard.per_diameter * self.refine)
 
     @property
     def block_mesh(self) -> CellMeshSettings:
-        """How fine each cell of the block is: coarse, for there are many."""
+        """Settings of each cell's mesh in the block: coarse, as there are many."""
         return attrs.evolve(self.mesh, per_diameter=BLOCK_PER_DIAMETER * self.refine)
 
     @property

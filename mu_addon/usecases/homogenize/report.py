@@ -35,7 +35,7 @@ FRICTION = {"slide": "frictionless plates", "stick": "bonded plates"}
 
 
 def write_report(study: Homogenisation, stopped: str = "") -> None:
-    """Write the pictures and report.html; `stopped` says why a run that is not complete stopped."""
+    """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
     with study.progress.stage("report", expected_s=15.0):
         versions = package_versions()
         study.context.summary["versions"] = versions
@@ -43,7 +43,7 @@ def write_report(study: Homogenisation, stopped: str = "") -> None:
 
 
 def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -> str:
-    """The whole report as HTML text, as far as the run came."""
+    """The whole report as HTML text, of all finished stages."""
     cell = study.job.cell
     warnings = list(study.warnings)
     if stopped:

@@ -14,7 +14,7 @@ from .report import write_report
 
 
 def homogenize(job: Job, folder: Path, context: RunContext) -> Homogenisation:
-    """Run every stage of a homogenisation, and report as far as it came."""
+    """Run every stage of a homogenisation, and report the finished ones."""
     study = Homogenisation(job, folder, context)
     context.report = lambda stopped: write_report(study, stopped)
     study.run()
@@ -22,7 +22,7 @@ def homogenize(job: Job, folder: Path, context: RunContext) -> Homogenisation:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a homogenisation found, in a few lines of text, of its `summary`."""
+    """Lines of text on a homogenisation's `summary`."""
     moduli = summary["moduli_kPa"]
     lines = [
         f"Young's modulus {moduli['E100']:.4g} kPa along an axis of the cell, {moduli['E111']:.4g} kPa "
@@ -35,7 +35,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of a homogenisation with the seconds that each is expected to take on two cores."""
+    """Stages of a homogenisation with the expected seconds of each on two cores."""
     # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
     factor = job.refine**3.5
     block = 110.0 * (job.cells / 3.0) ** 3

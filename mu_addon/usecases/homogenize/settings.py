@@ -1,4 +1,4 @@
-"""Settings of a homogenisation, stated once: the job, the command line and the node take them from here."""
+"""Settings of a homogenisation, used by the job, the command line and the node."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""From files of a laboratory to a folder of measured data."""
+"""Import of laboratory files into a folder of measured data."""

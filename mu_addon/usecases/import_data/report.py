@@ -1,4 +1,4 @@
-"""The page that shows what was understood of laboratory files: a picture and a table for each experiment."""
+"""Page on how laboratory files were read: a picture and a table for each experiment."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def page_of(found: Understood, name: str) -> str:
 
 
 def _section(p: Proposal) -> str:
-    """Picture, keys, columns and what was concluded, of one experiment."""
+    """Picture, keys, columns and conclusions of one experiment."""
     ranges = [([name, p.origin[name], *_extent(v), str(len(v))], False) for name, v in p.columns.items()]
     head = [("column", ""), ("from", ""), ("least", "n"), ("most", "n"), ("rows", "n")]
     concluded = "".join(f"<li>{escape(words)}</li>" for words in p.concluded)
@@ -71,7 +71,7 @@ def _extent(values: Array) -> tuple[str, str]:
 
 
 def terminal_lines(found: Understood) -> list[str]:
-    """What was understood, for a terminal: each column with its extent and a picture of its course."""
+    """Lines on a terminal: each column with its extent and a sparkline of its course."""
     lines: list[str] = []
     for p in found.proposals:
         kind = p.keys.get("kind", "kind not known yet")
@@ -88,7 +88,7 @@ def terminal_lines(found: Understood) -> list[str]:
 
 
 def _trace(values: Array) -> str:
-    """The course of a column as a row of bars, the mean of each of equal parts."""
+    """Course of a column as a row of bars, each the mean of an equal part."""
     values = values[np.isfinite(values)]
     if not len(values):
         return ""
@@ -122,6 +122,6 @@ def _picture(p: Proposal) -> str:
 
 
 def _titled(column: str) -> str:
-    """A column's name as the title of an axis."""
+    """Title of an axis from a column's name."""
     head, _, unit = column.rpartition("_")
     return f"{head.replace('_', ' ')}, {unit}" if head else column

@@ -1,6 +1,6 @@
-"""From files of test machines and data loggers to experiments in a folder of measured data.
+"""Import of files of test machines and data loggers into a folder of measured data.
 
-What a file cannot say is asked; until it is answered only the page with what was understood is written.
+Missing information is asked for; until it is given only the page on what was read is written.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ def import_files(
     show: Callable[[list[str]], None] = lambda lines: None,
     dry: bool = False,
 ) -> tuple[Proposal, ...]:
-    """Put the experiments of files into a folder of measured data; fills `context.summary`.
+    """Import the experiments of files into a folder of measured data; fills `context.summary`.
 
-    ask: gives the answer to a question; without it open questions raise InputError, after the page with what
-    was understood was written. show: is given the same as lines of a terminal before questions. dry: the page
-    is all that is written, and open questions are told.
+    ask: answers a question; without it open questions raise InputError, after the page on what was read was
+    written. show: gets the page as lines of a terminal before questions. dry: write the page only, and report
+    open questions.
     """
     given = dict(answers)
     remarks: list[Remark] = []
@@ -74,14 +74,14 @@ def import_files(
 
 
 def write_page(found: Understood, folder: Path) -> None:
-    """Write the page with what was understood; raises OutputError."""
+    """Write the page on what was read; raises OutputError."""
     write_text(folder / PAGE, page_of(found, folder.name))
 
 
 def write(found: Understood, folder: Path) -> list[Remark]:
-    """Write the page, and where no question is open all experiments, each read as `diagnose` will read it.
+    """Write the page and, without open questions, all experiments, each read back as `diagnose` reads it.
 
-    Returns what that reader remarks. Raises InputError where a question is open, OutputError.
+    Returns the remarks of that reader. Raises InputError where a question is open, OutputError.
     """
     write_page(found, folder)
     if found.open:
@@ -104,7 +104,7 @@ def write(found: Understood, folder: Path) -> list[Remark]:
 
 
 def _table(p: Proposal) -> str:
-    """The CSV file of an experiment: comments on where it comes from, then its rows."""
+    """CSV file of an experiment: comments on its origin, then its rows."""
     lines = [f"from {p.place}"]
     lines += [f"{column} is {source}" for column, source in p.origin.items()]
     lines += [*p.concluded, *(f"not read: {one.words}" for one in p.unread)]
@@ -113,7 +113,7 @@ def _table(p: Proposal) -> str:
 
 
 def _figures(p: Proposal) -> dict[str, Any]:
-    """What an experiment comes to, in plain data."""
+    """Summary of an experiment in plain data."""
     return {
         "kind": p.keys.get("kind", ""),
         "rows": len(p.lines),
@@ -125,7 +125,7 @@ def _figures(p: Proposal) -> dict[str, Any]:
 
 
 def _open_questions(found: Understood, folder: Path) -> tuple[str, str, str]:
-    """What, where and what to do of the questions that are open."""
+    """Message on the open questions: what, where and what to do."""
     lines = [_asked(p, question) for p, question in found.asked]
     options = " ".join(f"--set {_quoted(f'{q.key}={_example(q)}')}" for _, q in found.asked)
     what = "the files leave open\n    " + "\n    ".join(lines)
@@ -151,7 +151,7 @@ def _quoted(text: str) -> str:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was understood, and what is open in a dry run."""
+    """Lines on what was read, and on what is open in a dry run."""
     lines = [*summary["understood"], f"what was understood, with pictures: {summary['report']}"]
     if summary.get("dry_run"):
         lines += [f"open: {question}" for question in summary["questions"]] + [

@@ -1,4 +1,4 @@
-"""What experiments files hold, with the answers that were given."""
+"""Experiments in files, with the given answers."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ KEYS = (
 
 @attrs.frozen
 class Understood:
-    """What files come to: an experiment each, and in words the tables and lines that are in none."""
+    """Experiments in files, and in words the tables and lines that belong to none."""
 
     proposals: tuple[Proposal, ...]
     left_out: tuple[str, ...]
 
     @property
     def open(self) -> tuple[tuple[Proposal, Question], ...]:
-        """The questions that are not answered."""
+        """Questions that are not answered."""
         return tuple((p, question) for p in self.proposals for question in p.questions)
 
     @property
     def asked(self) -> tuple[tuple[Proposal, Question], ...]:
-        """Each of them once, of the first experiment that has it: one answer serves all."""
+        """Each question once, with the first experiment that has it: one answer serves all."""
         first: dict[str, tuple[Proposal, Question]] = {}
         for p, question in self.open:
             first.setdefault(question.key, (p, question))
@@ -62,7 +62,7 @@ class Understood:
 
 
 def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
-    """What experiments files hold; raises InputError for what cannot be read, and for answers without use.
+    """Read the experiments in files; raises InputError for unreadable files and unused answers.
 
     answers: by key, or by name of an experiment, a point and key, as text.
     """
@@ -106,7 +106,7 @@ def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
 
 
 def _no_table(path: Path, decimal: str | None) -> InputError:
-    """What a file without a table holds instead."""
+    """Error for a file without a table, with its content."""
     rows = [row for sheet in read_sheets(path, decimal) for row in sheet.rows if row.filled]
     pairs = sum(len(row.numeric) > 1 for row in rows)
     shown = " ".join(rows[0].filled)[:60] if rows else ""
@@ -122,7 +122,7 @@ _Table = tuple[Sheet, int, int, Block]
 
 
 def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[_Table], list[_Table]]:
-    """The tables of a file with two known quantities, and the others; lines in none go to left_out."""
+    """Tables of a file with two known quantities, and the others; lines in none go to left_out."""
     known_tables: list[_Table] = []
     unknown: list[_Table] = []
     for sheet in read_sheets(path, decimal):
@@ -141,7 +141,7 @@ def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[
 
 
 def _unlike(name: str, others: Sequence[str]) -> str:
-    """The name, numbered where others have it."""
+    """The name, numbered if others have it."""
     new, again = name, 2
     while new in others:
         new, again = f"{name} {again}", again + 1

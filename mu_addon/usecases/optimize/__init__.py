@@ -1,1 +1,1 @@
-"""Design by intent: targets and freedoms in, units that meet them out."""
+"""Design by intent: units that meet targets within given freedoms."""

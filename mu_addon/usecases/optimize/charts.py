@@ -1,4 +1,4 @@
-"""Charts of an optimisation: the front, the way there, and each unit's half section."""
+"""Charts of an optimisation: the front, its course, and each unit's half section."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = np.ndarray[Any, Any]
 
 ALONG = 6
 STATIONS = np.linspace(0.0, 1.0, 7)
-"""Places along a strut at which its outline is drawn."""
+"""Number of positions along a strut at which its outline is drawn."""
 
 
 def front(found: Optimised, first: int, second: int) -> str:
@@ -39,7 +39,7 @@ def front_picture(found: Optimised, first: int, second: int, path: Path) -> None
 
 
 def compared(found: Optimised) -> tuple[int, int] | None:
-    """Numbers of the two judged targets that a front is drawn of, objectives first; None without two."""
+    """Numbers of the two targets that a front is drawn for, objectives first; None without two."""
     if not any(o.sound for o in found.search.observed):
         return None
     targets = [t for t in found.design.targets if t.quantity is not None]

@@ -35,10 +35,10 @@ _LONGEST = 1_000_000
 
 @attrs.frozen(eq=False)
 class Job:
-    """A design to be found, and how. model: the extended model that is optimised, or None.
+    """An optimisation: the design, and how it is run. model: the extended model optimised, or None.
 
     workers: units at a time on this machine; scheduler: address of a Dask scheduler whose workers evaluate
-    them, in place of that.
+    them instead.
     """
 
     design: Design
@@ -83,7 +83,7 @@ def read_job(folder: Path) -> Job:
 def mechanics_of(
     design: Design, model: ExtendedModel | None, refine: float | None = None, with_struts: bool = False
 ) -> tuple[Mechanics, list[str]]:
-    """How the design's units are simulated, and what of the model is left out, in words.
+    """Mechanics of the design's units, and the effects of the model left out, in words.
 
     refine: of the mesh, by default the search's; with_struts: as printed, strut by strut. Raises InputError
     where the unit cannot have the model.
@@ -119,12 +119,12 @@ def mechanics_of(
 
 
 def _kept_apart(design: Design, settings: MeshSettings) -> dict[str, Any]:
-    """Of `Mechanics` the design's body, and whether a resolved unit's walls and struts keep apart."""
+    """Body and self-contact of the design, as arguments of `Mechanics`."""
     return {"body": design.body, "self_contact": design.self_contact and settings.resolved}
 
 
 def _with_weight(effects: NamedEffects, design: Design) -> NamedEffects:
-    """The effects and the unit's weight as the design turns it, by default of the resin's density."""
+    """The effects with the unit's weight in the design's orientation, by default of the resin's density."""
     if design.orientation_deg is None:
         return effects
     values = {name: dict(given) for name, given in effects.values.items()}

@@ -1,4 +1,4 @@
-"""The report of an optimisation: the outcome, the front, the units, what changed and why."""
+"""The report of an optimisation: the outcome, the front, the units, the changes and their reasons."""
 
 from __future__ import annotations
 

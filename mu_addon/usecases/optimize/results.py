@@ -1,4 +1,4 @@
-"""What an optimisation found, for its report and summary."""
+"""Result of an optimisation, for its report and summary."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Proposal:
-    """A proposed unit: its place among them from 1, its design's number, and what was found of it.
+    """A proposed unit: its rank from 1, its design's number, and its results.
 
     values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words. choice: path and
     resin, as far as they were free, by the freedom's name.
@@ -37,7 +37,7 @@ class Proposal:
 
 @attrs.frozen(eq=False)
 class Optimised:
-    """An optimisation's result: the search, its proposals, the outcome in words, and what it cost.
+    """Result of an optimisation: the search, its proposals, the outcome in words, and its cost.
 
     computed: units simulated by this run; model_a: Model A's, those of earlier runs in the folder included.
     """

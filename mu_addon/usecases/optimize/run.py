@@ -1,4 +1,4 @@
-"""An optimisation in its folder: units computed once, a table kept up to date, what is proposed checked."""
+"""An optimisation in its folder: each unit computed once, a table kept up to date, proposals checked."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from .worker import asked_of, several
 Array = np.ndarray[Any, Any]
 
 FIRST_PART = 0.6
-"""Share of a robust search's units that are judged by the change of the start by the finer mesh."""
+"""Share of a robust search's evaluations before the finer mesh's change at its best unit is computed."""
 LARGEST_CHANGE = 0.5
-"""Share of a value that a finer mesh is taken to change it by at most."""
+"""Largest share by which a finer mesh is assumed to change a value."""
 
 
 def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
-    """Search for a job's units, check what is proposed, and write table, units and report.
+    """Search for a job's units, check the proposals, and write table, units and report.
 
     Units computed by an earlier run in the folder are not computed again. Raises InputError, OutputError and
     MuError where a worker or the scheduler is lost.
@@ -94,7 +94,7 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
 
 @attrs.define
 class _Run:
-    """An optimisation under way."""
+    """State of an optimisation."""
 
     job: Job
     folder: Path
@@ -106,14 +106,14 @@ class _Run:
 
     @property
     def settings(self) -> Any:
-        """The search's, with as many designs at a time as there are workers."""
+        """Settings of the search, with as many designs at a time as there are workers."""
         search = self.job.design.search
         batch = max(search.batch, self.job.workers if self.job.scheduler is None else search.batch)
         return attrs.evolve(search, batch=batch)
 
     @property
     def asked(self) -> str:
-        """All that decides a unit's values and slopes besides the unit, as text."""
+        """All inputs besides the unit that decide its values and slopes, as text."""
         design = self.job.design
         return repr(
             (
@@ -128,7 +128,7 @@ class _Run:
         )
 
     def search(self, share: float = 1.0, known: Sequence[Observed] = ()) -> Found:
-        """The search with a share of the evaluations, from designs known before where there are any."""
+        """Search with a share of the evaluations, from known designs where there are any."""
         design, settings = self.job.design, self.settings
         settings = attrs.evolve(settings, evaluations=max(1, round(share * settings.evaluations)))
         return search_units(
@@ -136,7 +136,7 @@ class _Run:
         )
 
     def robust_search(self) -> Found:
-        """A search that judges by the finer mesh: by what the start changes there, then by its best unit."""
+        """Search by values expected on the finer mesh: by the start's change, then by the best unit's."""
         design = self.job.design
         self.mesh_change = self.change_by_mesh(self.candidate(design.start, design.unit))
         found = self.search(FIRST_PART)
@@ -181,7 +181,7 @@ class _Run:
         return "" if self.job.model is None else self.job.model.text()
 
     def _observed(self, values: Values, found: Evaluated | None) -> Observed:
-        """A computed unit as the search takes it; where it shall be robust, as expected on the finer mesh.
+        """A computed unit as input of the search; if it shall be robust, as expected on the finer mesh.
 
         None: one that breaks a rule of units.
         """
@@ -197,7 +197,7 @@ class _Run:
         return Observed(values, factor * found.values, slopes, found.sound, SURE * np.nan_to_num(error))
 
     def observe(self, designs: Sequence[Values]) -> list[Observed]:
-        """Designs as the search takes them; one that breaks a rule of units is not computed."""
+        """Designs as input of the search; one that breaks a rule of units is not computed."""
         units: list[Candidate | None] = []
         for values in designs:
             try:
@@ -214,12 +214,11 @@ class _Run:
         return observed
 
     def step(self, done: int, words: str) -> None:
-        """Say how the search goes."""
+        """Report progress of the search."""
         self.context.progress.update(min(done / self.settings.evaluations, 1.0), f"{done} units, {words}")
 
     def proposals(self, found: Found, start: Observed) -> list[Proposal]:
-        """What is proposed, simulated on a finer mesh and checked for print, each written as a unit's
-        file."""
+        """Proposals simulated on a finer mesh and checked for print, each written as a unit's file."""
         design, progress = self.job.design, self.context.progress
         chosen = _spread(found.proposed, MOST_CHECKED)
         sound = [n for n in chosen if found.observed[n].sound]
@@ -282,7 +281,7 @@ class _Run:
         return Verified(**found, why=why, print_worst=worst, print_findings=findings, struts_why=struts_why)
 
     def write(self, proposed: Sequence[int]) -> None:
-        """designs.csv: a row for every design, whatever became of it."""
+        """Write designs.csv: a row for every design, failed ones included."""
         design = self.job.design
         judged = [(i, t) for i, t in enumerate(design.targets) if t.quantity is not None]
         head = ["design", *(f.name for f in design.freedoms)]
@@ -336,7 +335,7 @@ def summary(found: Optimised) -> dict[str, Any]:
 
 
 def _judged(found: Optimised, proposal: Proposal) -> list[dict[str, Any]]:
-    """Every target with what a proposed unit has of it on the finer mesh, and whether that meets it."""
+    """Every target with a proposed unit's value on the finer mesh, and True if it is met."""
     checked = proposal.checked
     return [
         {
@@ -355,7 +354,7 @@ def _judged(found: Optimised, proposal: Proposal) -> list[dict[str, Any]]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What an optimisation came to, in a few lines of text."""
+    """Lines of text on an optimisation's `summary`."""
     if "outcome" not in summary:
         return []
     lines = [summary["outcome"], f"{summary['designs']} units computed, {summary['model_a']} Model A's"]
@@ -367,7 +366,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 
 def plan_of(job: Job) -> Plan:
-    """Stages of an optimisation with the seconds that each is expected to take on two cores."""
+    """Stages of an optimisation with the expected seconds of each on two cores."""
     design = job.design
     return search_plan(design.search.evaluations, design.settings.refine, design.check_refine)
 

@@ -1,4 +1,4 @@
-"""What an optimisation found, in sentences: what was met, what stands in the way, what changed and why."""
+"""Result of an optimisation in sentences: targets met, obstacles, changes and reasons."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def outcome(found: Found, targets: Sequence[Target]) -> str:
 
 
 def verdict(checked: Sequence[Verified]) -> str:
-    """How proposed units stand on a finer mesh and in the print check, in a sentence; "" without any."""
+    """Result of the proposed units on a finer mesh and in the print check, in a sentence; "" without any."""
     if not checked:
         return ""
     met = sum(bool(c.met.all()) and not c.why for c in checked)
@@ -69,7 +69,7 @@ def changes(freedoms: Sequence[Freedom], start: Sequence[Any], design: Sequence[
 def reasons(
     freedoms: Sequence[Freedom], targets: Sequence[Target], observed: Observed, start: Sequence[Any]
 ) -> list[str]:
-    """For each target the freedoms that moved it most on the way from the start, by the slopes at the end."""
+    """For each target the freedoms that moved it most from the start, by the slopes at the end."""
     continuous = [i for i, f in enumerate(freedoms) if not f.discrete]
     judged = [t for t in targets if t.quantity is not None]
     found = []
@@ -89,7 +89,7 @@ def reasons(
 
 
 def sensitivities(freedoms: Sequence[Freedom], observed: Observed) -> Array:
-    """Slopes (q, c) times a tenth of each continuous freedom's range: what a tenth of it moves."""
+    """Slopes (q, c) times a tenth of each continuous freedom's range."""
     widths = np.array([f.high - f.low for f in freedoms if not f.discrete])
     return np.asarray(0.1 * widths * observed.slopes)
 

@@ -31,7 +31,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Hash of all that decides what is found."""
+        """Hash of all inputs that decide the result."""
         return key("unit", self.unit, self.files, self.choice)
 
 
@@ -46,7 +46,7 @@ def _prepared(files: tuple[tuple[str, str], ...]) -> Job:
 
 
 def run_task(task: Task) -> dict[str, Any]:
-    """What `Evaluated.plain` gives of a task's unit, with status "done"; raises InputError."""
+    """Return `Evaluated.plain` of a task's unit, with status "done"; raises InputError."""
     job = _prepared(task.files)
     targets, mechanics = asked_of(job, dict(task.choice))
     uncertainty = job.design.uncertainty if job.design.robust else None
@@ -57,7 +57,7 @@ def run_task(task: Task) -> dict[str, Any]:
 def asked_of(
     job: Job, choice: Mapping[str, str], refine: float | None = None, with_struts: bool = False
 ) -> tuple[Sequence[Target], Mechanics]:
-    """The targets of a chosen path and resin, and how such units are simulated; see `mechanics_of`."""
+    """Targets of a chosen path and resin, and the mechanics of such units; see `mechanics_of`."""
     design = job.design.chosen(choice)
     return design.targets, mechanics_of(design, job.model, refine, with_struts)[0]
 
@@ -65,9 +65,9 @@ def asked_of(
 def several(
     job: Job, warn: Callable[[str], None]
 ) -> Callable[[Sequence[Candidate]], Iterator[tuple[int, Evaluated]]] | None:
-    """What evaluates several units at a time, on the job's scheduler or in processes here; None for one.
+    """Function that evaluates several units at a time, on a scheduler or in processes; None for one.
 
-    What it gives raises MuError where a process or the scheduler is lost.
+    Its results raise MuError if a process or the scheduler is lost.
     """
     files = tuple(sorted(job.texts().items()))
 

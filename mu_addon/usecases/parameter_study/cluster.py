@@ -36,18 +36,18 @@ Work = Callable[["Task"], dict[str, Any]]
 
 @attrs.frozen
 class Processes:
-    """So many processes of this machine, without Dask."""
+    """A number of processes on this machine, without Dask."""
 
     workers: int
 
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
     ) -> Generator[tuple[int, dict[str, Any]]]:
-        """As `Cluster.results`; raises what `work` raises, and MuError where a process dies."""
+        """Return as `Cluster.results`; raises what `work` raises, and MuError where a process dies."""
         yield from each(work, tasks, self.workers, "parameter study")
 
     def close(self) -> None:
-        """Nothing is left: whoever stops listening ends the processes."""
+        """Do nothing: processes end with the iteration over `results`."""
 
 
 def cluster_at(scheduler: str | None, workers: int) -> Cluster | Processes:
@@ -58,7 +58,7 @@ def cluster_at(scheduler: str | None, workers: int) -> Cluster | Processes:
 
 
 class Cluster:
-    """A connection to a scheduler, made again when it is lost."""
+    """A connection to a scheduler, renewed when it is lost."""
 
     def __init__(self, scheduler: str | None, workers: int) -> None:
         """Connect to the scheduler at an address, or start `workers` here. Raises InputError and MuError."""
@@ -95,7 +95,7 @@ class Cluster:
             ) from error
 
     def reconnect(self) -> None:
-        """Connect again to a scheduler that was restarted. Raises MuError when its patience is at its end."""
+        """Connect again to a restarted scheduler. Raises MuError after a timeout."""
         with suppress(Exception):
             self.client.close(timeout=1)
         end = time.monotonic() + PATIENCE_S
@@ -110,11 +110,11 @@ class Cluster:
 
     @property
     def threads(self) -> int:
-        """Threads of all workers that are there now."""
+        """Number of threads of all present workers."""
         return sum(self.client.nthreads().values())
 
     def close(self) -> None:
-        """Leave the scheduler, and end the workers that were started here, with what they are at."""
+        """Leave the scheduler, and end the workers started here with their tasks."""
         _quieten()
         if self._local is not None:
             stop_points()
@@ -129,10 +129,10 @@ class Cluster:
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
     ) -> Generator[tuple[int, dict[str, Any]]]:
-        """Number of each task as it is done, and what `work` made of it or why it failed, in any order.
+        """Number of each finished task, with the result of `work` or its failure, in any order.
 
-        A task whose worker is lost is given to another; a scheduler that is restarted is given all that is
-        not done again. Raises MuError where it stays away.
+        A task whose worker is lost goes to another; a restarted scheduler gets all unfinished ones again.
+        Raises MuError if it stays away.
         """
         waiting = list(range(len(tasks)))[::-1]
         attempts = dict.fromkeys(waiting, 0)
@@ -175,7 +175,7 @@ class Cluster:
                 self.reconnect()
 
     def _ended(self, running: dict[Any, int]) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Number and row of each task that has ended; it is no longer among those that run."""
+        """Number and row of each ended task, which is removed from those that run."""
         for future, number in list(running.items()):
             if future.status == "finished":
                 try:
@@ -191,7 +191,7 @@ class Cluster:
             yield number, found
 
     def _wait(self, futures: list[Any]) -> None:
-        """Until one of them is done, or a second has gone."""
+        """Wait until one of them is done, or for a second."""
         with suppress(TimeoutError, self._distributed.CancelledError):
             self._distributed.wait(futures, timeout=1.0, return_when="FIRST_COMPLETED")
 
@@ -205,7 +205,7 @@ class Cluster:
 
 
 def _quieten() -> None:
-    """Have Dask say nothing of what it meets while it ends: stacks of tasks that nobody waits for."""
+    """Silence Dask's tracebacks at shutdown, of tasks that nobody waits for."""
     for name in list(logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -9,7 +9,7 @@ Row = dict[str, Any]
 
 
 def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
-    """Figures of a study as far as its stages went; angle_deg at every pressure has a column of its own."""
+    """Figures of a study's finished stages; angle_deg has a column for every pressure."""
     found: Row = {}
     solid = (summary.get("gates") or {}).get("unit.stl") or {}
     if "volume_mm3" in solid:
@@ -42,7 +42,7 @@ def column_names(rows: Sequence[Row]) -> list[str]:
 
 
 def cell(value: Any) -> Any:
-    """A value as it stands in the table: lists as words, nothing as nothing."""
+    """A value as a cell of the table: lists as words, None as an empty cell."""
     if value is None:
         return ""
     if isinstance(value, list | tuple):

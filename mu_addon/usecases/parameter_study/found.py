@@ -1,4 +1,4 @@
-"""What a sweep found: a row a point."""
+"""Result of a sweep: a row for each point."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from .plan import Plan
 
 @attrs.frozen(eq=False)
 class Found:
-    """A sweep's rows, one a point: `number`, `status`, its inputs and figures, or why it failed.
+    """Rows of a sweep, one a point: `number`, `status`, its inputs and figures, or why it failed.
 
-    inputs, outputs: names of the columns that are varied and found.
+    inputs, outputs: names of the columns varied and computed.
     """
 
     plan: Plan

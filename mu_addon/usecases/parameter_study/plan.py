@@ -43,7 +43,7 @@ _KEYS = (
 
 @attrs.frozen
 class Point:
-    """One study of a sweep: its number from 1, what was varied, and its job, or why there is none."""
+    """One study of a sweep: its number from 1, its varied values, and its job, or why there is none."""
 
     number: int
     values: Mapping[str, Any]
@@ -55,8 +55,8 @@ class Point:
 class Plan:
     """A sweep: the study that is varied, its variables, and how its points are chosen.
 
-    folder: where sweep.toml lies, and the files that it names. memory_MB, minutes: what one study may take.
-    minimize, maximize: columns of the table that Pareto fronts are drawn of.
+    folder: of sweep.toml and the files that it names. memory_MB, minutes: limits of one study. minimize,
+    maximize: columns of the table that Pareto fronts are drawn of.
     """
 
     inputs: Inputs
@@ -79,7 +79,7 @@ class Plan:
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """What is run of every study."""
+        """Stages run for every study."""
         return tuple(self.inputs.tables)
 
     @property
@@ -92,7 +92,7 @@ class Plan:
     def values(
         self, before: Array | None = None, count: int | None = None
     ) -> tuple[list[dict[str, Any]], Array]:
-        """What each point varies, and places (n, d) in the unit cube; `before` are an earlier plan's."""
+        """Varied values of each point, and positions (n, d) in the unit cube; `before`: an earlier plan's."""
         if self.method == GRID:
             grid = itertools.product(*(v.levels for v in self.variables))
             names = [v.name for v in self.variables]
@@ -104,7 +104,7 @@ class Plan:
         return rows, places
 
     def points(self, rows: list[dict[str, Any]]) -> list[Point]:
-        """The study of every row; one that breaks a rule is a point that has failed already."""
+        """The study of every row; one that breaks a rule is a failed point."""
         found = []
         for number, values in enumerate(rows, 1):
             try:
@@ -118,7 +118,7 @@ class Plan:
         return found
 
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; not how many points, since more may be added."""
+        """Text of every file of inputs, by name, without the number of points, since more may be added."""
         values = {
             "format": FORMAT,
             "method": self.method,

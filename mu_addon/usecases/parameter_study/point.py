@@ -1,6 +1,6 @@
 """One point of a parameter study: its study in a child process, within limits of memory and time.
 
-A worker on any machine runs this: what it needs comes with the task, and what it found goes back as a row.
+A worker on any machine runs this: its inputs come with the task, and its result returns as a row.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ LOOK_S = 0.05
 _STOPPED = {"what": "the sweep was stopped", "what_to_do": "run it again"}
 
 _under_way: set[threading.Event] = set()
-"""Of each point that a thread of this process is at: set, its study ends at once."""
+"""Event of each point that a thread of this process works on; setting it ends the study at once."""
 
 
 def stop_points() -> None:
-    """End the studies of the points that threads of this process are at."""
+    """End the studies of the points that threads of this process work on."""
     for stop in list(_under_way):
         stop.set()
 
 
 @attrs.frozen
 class Task:
-    """One study to run: files of inputs by name, and what it may take; plain data, so that it travels.
+    """One study to run: files of inputs by name, and its limits; plain data, so that it can be sent.
 
-    version: of the program that asks, which has to be the worker's; module: what the process runs in place
-    of the core's command line.
+    version: of the program that asks, which must be the worker's; module: run by the process in place of the
+    core's command line.
     """
 
     files: Mapping[str, str]
@@ -55,21 +55,21 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Hash of all that decides what is found."""
+        """Hash of all inputs that decide the result."""
         return key(*(part for item in sorted(self.files.items()) for part in item))
 
 
 def version() -> str:
-    """What has to be the same on every worker."""
+    """Version that must be the same on every worker."""
     return f"{package_versions()['mu_addon']} revision {REVISION}"
 
 
 def run_point(task: Task) -> dict[str, Any]:
-    """What a study found or why it failed, as plain data; never raises for a study's own failure.
+    """Result of a study or its failure, as plain data; never raises for a study's own failure.
 
-    status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; and what it took,
-    seconds and memory_MB, and where. Raises MuError where this worker is of another version,
-    and OutputError where it has no room for the study.
+    status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; also its seconds,
+    memory_MB and worker. Raises MuError where this worker is of another version, and OutputError where it has
+    no room for the study.
     """
     if task.version != version():
         raise MuError(
@@ -110,7 +110,7 @@ def run_point(task: Task) -> dict[str, Any]:
 
 
 def _worker() -> str:
-    """Name of the Dask worker that this runs in, or nothing."""
+    """Name of the Dask worker that runs this, or ""."""
     try:
         from distributed import get_worker
 
@@ -126,7 +126,7 @@ def _environment(task: Task) -> dict[str, str]:
 
 
 def _watch(child: Child, task: Task, stop: threading.Event) -> tuple[float, dict[str, str] | None]:
-    """The most memory that a study took, in MB, and why it was stopped if it was."""
+    """Peak memory of a study in MB, and why it was stopped if it was."""
     peak = 0.0
     while child.state == RUNNING:
         child.poll()
@@ -177,7 +177,7 @@ def _memory_MB(pid: int) -> float:
 
 
 def _of_proc(pid: int) -> float:
-    """The same by the files that Linux gives of each process; 0 on other systems, which are not looked at."""
+    """Memory in MB from Linux's files on each process; 0 on other systems."""
     found, family = 0, [pid]
     while family:
         place = Path("/proc") / str(family.pop())

@@ -78,7 +78,7 @@ def outputs_of(found: Found) -> list[str]:
 
 
 def _numbers(found: Found, output: str) -> tuple[list[dict[str, Any]], Array]:
-    """Rows of points that were solved and have a figure that is a number, and that figure (n,)."""
+    """Rows of solved points with a number for a figure, and that figure (n,)."""
     rows = [r for r in found.done if isinstance(r.get(output), int | float)]
     return rows, np.array([float(r[output]) for r in rows])
 

@@ -1,4 +1,4 @@
-"""A parameter study in its folder: finished points are kept, the others run; the table is kept up to date."""
+"""A parameter study in its folder: finished points are kept, others run; the table is kept up to date."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ BEGIN_S = 3.0
 class Job:
     """A plan to be run, and how.
 
-    scheduler: address of a Dask scheduler, or None for a cluster of `workers` on this machine; add: so many
-    points more than there are; retry: whether those that failed are run again; work: runs a task.
+    scheduler: address of a Dask scheduler, or None for a cluster of `workers` on this machine; add: number of
+    additional points; retry: run failed ones again; work: runs a task.
     """
 
     plan: Plan
@@ -70,9 +70,9 @@ def read_job(folder: Path) -> Job:
 
 
 def sweep(job: Job, folder: Path, context: RunContext) -> Found:
-    """Run a plan's points, as far as they are not there, and write points.csv and report.html.
+    """Run a plan's unfinished points, and write points.csv and report.html.
 
-    Raises InputError, OutputError, and MuError where the scheduler stays away.
+    Raises InputError, OutputError, and MuError if the scheduler stays away.
     """
     plan, progress = job.plan, context.progress
     values, places = _extended(plan, folder, job.add)
@@ -95,7 +95,7 @@ def sweep(job: Job, folder: Path, context: RunContext) -> Found:
 
 @attrs.define
 class Run:
-    """A sweep under way in its folder: its points, their places (n, d), and what is known of them by number.
+    """State of a sweep in its folder: its points, their positions (n, d), and known results by number.
 
     density: of the resin, in g/ml.
     """
@@ -109,16 +109,16 @@ class Run:
 
     @property
     def cache(self) -> Cache:
-        """What points have found."""
+        """Results of the points."""
         return Cache(self.folder / "cache")
 
     def task(self, point: Point) -> Task:
-        """The task of a point that breaks no rule."""
+        """Task of a point that breaks no rule."""
         assert point.job is not None
         return Task(point.job.texts(), self.plan.memory_MB, self.plan.minutes, version())
 
     def look(self, retry: bool) -> None:
-        """Take what earlier runs found; with `retry`, not what failed."""
+        """Take results of earlier runs; with `retry`, no failed ones."""
         for point in self.points:
             stored = None if point.job is None else self.cache.get("point", self.task(point).name)
             if stored is not None:
@@ -128,16 +128,16 @@ class Run:
 
     @property
     def todo(self) -> list[Point]:
-        """The points that break no rule, and of which nothing is known."""
+        """Points that break no rule and have no result yet."""
         return [p for p in self.points if p.job is not None and p.number not in self.known]
 
     def expected_s(self, workers: int) -> float:
-        """Seconds that the points still take about, on two cores at most."""
+        """Expected seconds of the remaining points, on two cores at most."""
         stages = [plan_of(point.job)[:-1] for point in self.todo if point.job is not None]
         return sum(BEGIN_S + sum(seconds for _, seconds in one) for one in stages) / min(max(workers, 1), 2)
 
     def solve(self, progress: Progress, scheduler: str | None, workers: int, work: Work) -> None:
-        """Run the points of which nothing is known; what each finds is kept at once."""
+        """Run the points without a result; each result is kept at once."""
         todo = self.todo
         if not todo:
             return
@@ -158,7 +158,7 @@ class Run:
         self.write()
 
     def found(self) -> Found:
-        """The table as far as it is known."""
+        """The table, as far as it is known."""
         rows = [self._row(point) for point in self.points]
         inputs = tuple(v.name for v in self.plan.variables)
         known = ("point", "status", *inputs, *LAST)
@@ -177,7 +177,7 @@ class Run:
         return row | figured | {name: found[name] for name in ("status", *LAST) if name in found}
 
     def write(self) -> None:
-        """points.csv, a row a point whatever became of it, and plan.csv, by which more can be added."""
+        """Write points.csv, a row for each point, failed ones included, and plan.csv, for later additions."""
         found = self.found()
         names = ["point", "status", *found.inputs, *found.outputs, *LAST]
         write_csv(self.folder / TABLE, names, [[cell(row.get(name)) for name in names] for row in found.rows])
@@ -185,7 +185,7 @@ class Run:
 
 
 def _extended(plan: Plan, folder: Path, add: int) -> tuple[list[dict[str, Any]], Array]:
-    """Values and places of the points: those of the folder's plan.csv first, then what is new."""
+    """Values and positions of the points: those of the folder's plan.csv first, then new ones."""
     before = _places(folder / PLAN, [v.name for v in plan.variables])
     if before is None:
         return plan.values(count=plan.count + add)
@@ -193,7 +193,7 @@ def _extended(plan: Plan, folder: Path, add: int) -> tuple[list[dict[str, Any]],
 
 
 def _places(path: Path, names: list[str]) -> Array | None:
-    """Places (n, d) that a plan.csv holds, or None where there is none or it is damaged."""
+    """Positions (n, d) in a plan.csv, or None if there is none or it is damaged."""
     try:
         head, *rows = csv.reader(file_text(path).splitlines())
         found = np.array([[float(value) for value in row] for row in rows])
@@ -224,7 +224,7 @@ def summary(found: Found) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a sweep came to, in a few lines of text."""
+    """Lines of text on a sweep's `summary`."""
     lines = [f"{summary['done']} of {summary['points']} points done, {summary['failed']} failed"]
     if summary["seconds_a_point"] is not None:
         lines[0] += f"; {summary['seconds_a_point']:.1f} s and up to {summary['most_memory_MB']} MB each"

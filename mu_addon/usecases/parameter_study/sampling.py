@@ -16,8 +16,8 @@ def sample(method: str, count: int, dimensions: int, seed: int, before: Array | 
     """Points (count, d) in [0, 1)^d, the first of them `before` (n, d), made by the same method and seed.
 
     sobol: a scrambled Sobol sequence, whose longer beginnings contain the shorter. latin_hypercube: n points
-    lie in n strata of every axis; what is added goes into strata that are still empty, so that twice (three
-    times ...) as many points are a Latin hypercube again (Sallaberry, Helton, Hora 2008).
+    lie in n strata of every axis; points added go into empty strata, so that twice (three times ...) as many
+    points are a Latin hypercube again (Sallaberry, Helton, Hora 2008).
     """
     from scipy.stats import qmc
 
@@ -36,7 +36,7 @@ def sample(method: str, count: int, dimensions: int, seed: int, before: Array | 
 
 
 def _into_empty_strata(known: Array, count: int, rng: np.random.Generator) -> Array:
-    """Points (count - n, d), each axis of which lies in strata of width 1 / count that no point is in."""
+    """Points (count - n, d) in strata of width 1 / count of each axis that hold no point yet."""
     added = np.empty((count - len(known), known.shape[1]))
     for axis, values in enumerate(known.T):
         # At least so many are empty; more where two points share one.

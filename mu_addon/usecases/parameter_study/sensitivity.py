@@ -19,7 +19,7 @@ class Effect:
     """Mean figure (b,) and its standard error (b,) by groups of an input's values.
 
     places (b,): mean values of a numeric input; labels: texts of one that is not. share: of the figure's
-    variance that the groups explain, corrected for their number, 0 .. 1; nan where nothing can be said.
+    variance that the groups explain, corrected for their number, 0 .. 1; nan where it is undetermined.
     """
 
     places: Array
@@ -30,7 +30,7 @@ class Effect:
 
 
 def main_effect(values: Sequence[Any], figure: Array) -> Effect:
-    """How a figure (n,) depends on one input alone, the others averaged over the points there are."""
+    """Dependence of a figure (n,) on one input alone, averaged over the others."""
     numeric = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
     groups, labels = _groups(values, numeric)
     mean = np.array([figure[g].mean() for g in groups])
@@ -68,8 +68,8 @@ def _explained(groups: Sequence[Array], figure: Array) -> float:
 
 
 def pareto_front(costs: Array) -> Array:
-    """Numbers of the points (n, c), each cost to be small, that no other point is as good as in all and
-    better in one.
+    """Numbers of the points (n, c) that are Pareto-optimal: no other is as small in all costs and smaller in
+    one.
 
     Equal points are all on it; one with a cost that is not finite is not.
     """

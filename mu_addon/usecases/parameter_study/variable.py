@@ -1,4 +1,4 @@
-"""One varied input: its name, its values, and how it enters a study."""
+"""One varied input: its name, its values, and its use in a study."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STEPS = 3
 class Variable:
     """A range from low to high (whole numbers if both are), or a choice among `values`.
 
-    log: whether the range is sampled evenly in its logarithm; steps: its levels in a grid.
+    log: sample evenly in the logarithm; steps: its levels in a grid.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Variable:
     steps: int = STEPS
 
     def at(self, u: float) -> Any:
-        """The value at a place u in [0, 1)."""
+        """Value at a position u in [0, 1)."""
         if self.values:
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         assert self.low is not None
@@ -55,7 +55,7 @@ class Variable:
 
     @property
     def levels(self) -> list[Any]:
-        """Its values in a grid."""
+        """Values in a grid."""
         if self.values:
             return list(self.values)
         assert self.low is not None
@@ -70,7 +70,7 @@ class Variable:
 
     @property
     def table(self) -> dict[str, Any]:
-        """As sweep.toml has it."""
+        """Table of the variable in sweep.toml."""
         if self.values:
             return {"values": list(self.values)}
         return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
@@ -119,7 +119,7 @@ def variable(name: str, given: Any, where: str) -> Variable:
 
 
 def variable_names() -> list[str]:
-    """Every input that can be varied, as unit.toml and study.toml name them."""
+    """Names of all inputs that can be varied, as in unit.toml and study.toml."""
     unit = [f"{s.section}.{d.name}" for s in SECTIONS for d in describe(s)]  # type: ignore[attr-defined]
     study = [f"{stage}.{key}" for stage, keys in SETTINGS.items() for key in keys]
     mesh = [f"simulate.mesh.{f.name}" for f in attrs.fields(MeshSettings)]
@@ -129,7 +129,7 @@ def variable_names() -> list[str]:
 
 @attrs.frozen
 class Inputs:
-    """What a study is made of: unit, protocol, and settings in tables like study.toml's."""
+    """Inputs of a study: unit, protocol, and settings in tables like study.toml's."""
 
     unit: Unit
     protocol: Protocol
@@ -139,7 +139,7 @@ class Inputs:
 def changed_inputs(inputs: Inputs, values: Mapping[str, Any], folder: Path) -> Inputs:
     """Inputs with some of them changed; raises InputError where the unit breaks a rule with them.
 
-    folder: where a file lies that a value names.
+    folder: of files that values name.
     """
     sections: dict[str, dict[str, Any]] = {}
     tables = copy.deepcopy({stage: dict(table) for stage, table in inputs.tables.items()})

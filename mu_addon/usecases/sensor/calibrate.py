@@ -42,7 +42,7 @@ _HOLD_S = 1.0
 
 @attrs.frozen(eq=False)
 class Check:
-    """How the calibration does on a sweep it never saw: error in degrees, share within its 95 % band."""
+    """Accuracy of the calibration on an unseen sweep: error in degrees, share within its 95 % band."""
 
     name: str
     rms_deg: float
@@ -52,7 +52,7 @@ class Check:
 
 @attrs.frozen(eq=False)
 class Sweeps:
-    """Sweeps to fit, those held out by name, the channel of the light, that of the dark or its level in V."""
+    """Sweeps to fit, those held out by name, the light's channel, the dark channel or its level in V."""
 
     fitted: list[CalibrationSweep]
     held: list[tuple[str, CalibrationSweep]]
@@ -73,7 +73,7 @@ class Job:
 
     data: folders of measured data or recordings; channel: the column of the light, needed where there are
     several; dark: the column of the dark level, or volts; angles: CSV of time_s, angle_deg for a recording
-    whose marks do not say them ("angle 30").
+    without marks of angles ("angle 30").
     """
 
     data: tuple[Path, ...]
@@ -100,8 +100,8 @@ def input_texts(
 ) -> dict[str, str]:
     """Text of every file of inputs of a `Job`, by name.
 
-    samples: SHA-256 of the samples (`Sweeps.digest`); without it the run that `resume` starts takes those
-    that it finds, as of a recording that still goes on.
+    samples: SHA-256 of the samples (`Sweeps.digest`); without it a run by `resume` takes those present then,
+    as of a recording in progress.
     """
     run = {
         "data": [str(folder.resolve()) for folder in data],
@@ -112,7 +112,7 @@ def input_texts(
 
 
 def read_job(folder: Path) -> Job:
-    """The job that a folder of `calibrate` describes, its data where they lay then; raises InputError."""
+    """The job that a folder of `calibrate` describes, its data at their original path; raises InputError."""
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     places = run.get("data")
@@ -179,7 +179,7 @@ def _sweeps(job: Job) -> Sweeps:
 
 
 def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
-    """What was found, for summary.json."""
+    """Figures of a calibration for summary.json."""
     low, high = found.range_deg
     volts = found.voltage_of(np.array([low, high]))
     return {
@@ -196,7 +196,7 @@ def summary(found: Calibration, checks: Sequence[Check]) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was found, in a few lines of text, of its `summary`."""
+    """Lines of text on a calibration's `summary`."""
     low, high = summary["range_deg"]
     lines = [
         f"{summary['channel']}: {low:.1f} to {high:.1f} deg, {summary['sweeps']} sweeps, leave-one-out "
@@ -262,10 +262,10 @@ def _of_recording(
 
 
 def _marked(recording: Recording, time_s: Array) -> Array:
-    """Angles (n,) in degrees held after marks that say them, nan elsewhere.
+    """Angles (n,) in degrees held after marks that state them, nan elsewhere.
 
-    Only those after the last mark "sweep", with which a guided sweep begins: one that failed before it, with
-    the cable loose or at wrong angles, is left out.
+    Only those after the last mark "sweep", which starts a guided sweep: an earlier one, failed by a loose
+    cable or wrong angles, is left out.
     """
     angle = np.full(len(time_s), math.nan)
     marks = [m for m in recording.messages if m.get("event") == "mark"]

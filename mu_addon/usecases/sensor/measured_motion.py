@@ -1,7 +1,7 @@
-"""From a recording and a calibration to measured data: the angle by the sensor against the pressure.
+"""Measured data from a recording and a calibration: the angle by the sensor against the pressure.
 
 Rows are means over equal spans of time. The angle's standard deviation is half the calibration's 95 %
-interval over 1.96: how far the map may be off as a whole, which no mean makes smaller.
+interval over 1.96: the error of the map as a whole, which averaging does not reduce.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _SIGMAS_OF_95 = 1.959964
 class Job:
     """Inputs of a measured motion, read as it is made. Raises InputError.
 
-    recording: its folder; calibration: its file; pressure: channel of the gauge, in kPa once `zero` of it is
+    recording: its folder; calibration: its file; pressure: channel of the gauge, in kPa after `zero` of it is
     subtracted and it is multiplied by `kPa_per_unit`; rate_hz: rows a second.
     """
 
@@ -108,7 +108,7 @@ def _columns(job: Job) -> dict[str, Array]:
 
 
 def _means(recording: Recording, rate_hz: float) -> dict[str, Array]:
-    """Every column's means over spans of 1 / rate_hz, (n,) each; spans without a sample are left out."""
+    """Means of every column over spans of 1 / rate_hz, (n,) each; spans without a sample are left out."""
     time_s = recording.columns["time_s"]
     span = np.floor((time_s - time_s[0]) * rate_hz).astype(int)
     _, which, count = np.unique(span, return_inverse=True, return_counts=True)
@@ -162,7 +162,7 @@ def measure(job: Job, folder: Path, context: RunContext) -> Path:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What was measured, in two lines of text, of its `summary`."""
+    """Lines of text on a measured motion's `summary`."""
     (p, q), (a, b) = summary["pressure_kPa"], summary["angle_deg"]
     lines = [f"{summary['rows']} rows, {p:.3g} to {q:.3g} kPa, {a:.1f} to {b:.1f} deg"]
     out = summary["out_of_range"]

@@ -1,4 +1,4 @@
-"""`record` as a run of a node tree: so many seconds of the sensor, in a folder of its own."""
+"""`record` as a run of a node tree: some seconds of the sensor, in a separate folder."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _SHORT_S = 0.5
 
 @attrs.frozen
 class Job:
-    """Inputs of a recording: where the samples come from, for how many seconds, and which take it is.
+    """Inputs of a recording: the source of samples, its seconds, and the number of the take.
 
-    port: as of `serial_source`, "" for the only USB one; simulated: a sensor that bends to and fro instead.
+    port: as of `serial_source`, "" for the only USB one; simulated: an oscillating sensor instead.
     """
 
     port: str = ""
@@ -60,9 +60,9 @@ def read_job(folder: Path) -> Job:
 
 
 def record(job: Job, folder: Path, context: RunContext) -> Path:
-    """Record into a new folder within the run's; returns that. What a stopped run recorded stays beside it.
+    """Record into a new folder within the run's, and return it. Recordings of stopped runs stay beside it.
 
-    Raises InputError, OutputError, and MuError where the recording was stopped before its time.
+    Raises InputError, OutputError, and MuError where the recording was stopped early.
     """
     place = next(p for k in range(1, 10**6) if not (p := folder / f"{FOLDER}-{k}").exists())
     source = simulated_source() if job.simulated else serial_source(job.port or None, job.baud)
@@ -92,7 +92,7 @@ def record(job: Job, folder: Path, context: RunContext) -> Path:
 
 
 class _Stopped(MuError):
-    """Asked to stop: so a whole evaluation stops, too."""
+    """The recording was asked to stop, which stops the whole evaluation."""
 
     status = 143
 

@@ -1,4 +1,4 @@
-"""The real sensor from the command line and from Blender: ports, streams, recordings, replays."""
+"""The sensor in use from the command line and from Blender: ports, streams, recordings, replays."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from ...sensing.sources import SerialLine, Simulated, Source, ports
 
 
 def port_lines() -> list[str]:
-    """A line a serial port: its device, the name that finds it in any socket, and what it says it is."""
+    """A line for each serial port: its device, its name independent of the socket, and its description."""
     return [f"{port.device:20s} {port.identity or '-':32s} {port.description}" for port in ports()]
 
 
@@ -38,7 +38,7 @@ def serial_source(port: str | None, baud: int) -> Source:
 
 
 def simulated_source(rate_hz: float = 100.0) -> Source:
-    """A sensor that bends to and fro by 45 degrees in 8 s and loses 0.6 % of its light a degree."""
+    """A simulated sensor that bends by up to 45 degrees in 8 s and loses 0.6 % of its light a degree."""
 
     def volts(t: float) -> tuple[float, ...]:
         angle_deg = 22.5 * (1 - math.cos(2 * math.pi * t / 8.0))
@@ -59,12 +59,11 @@ def stream(
     keep_time: bool = False,
     show: Sink | None = None,
 ) -> None:
-    """Record a source into `folder`, telling what happens; Ctrl-C ends it well.
+    """Record a source into `folder`, reporting events; Ctrl-C ends it cleanly.
 
-    show: hears how it goes five times a second, and of what happens. keep_time: see run_session.
-    calibration: a file whose map is shown beside the voltages. controlled:
-    lines on standard input ask for "pause", "resume", "stop" and "mark WORDS", as Blender does; its end ends
-    the session. Raises InputError and OutputError.
+    show: gets the status five times a second, and events. keep_time: see run_session. calibration: a file
+    whose map is shown beside the voltages. controlled: lines on standard input ask for "pause", "resume",
+    "stop" and "mark WORDS", as Blender does; its end ends the session. Raises InputError and OutputError.
     """
     control = Control()
     if controlled:
@@ -108,7 +107,7 @@ def stream(
 
 
 def require_samples(status: Mapping[str, Any], folder: Path) -> None:
-    """Raise MuError, with what to do, where a session that has ended recorded nothing; status: its last."""
+    """Raise MuError, with the remedy, if an ended session recorded nothing; status: its last."""
     if status["rows"]:
         return
     if status["complaint"]:
@@ -126,7 +125,7 @@ def require_samples(status: Mapping[str, Any], folder: Path) -> None:
 
 @contextmanager
 def ctrl_c_stops(control: Control) -> Iterator[None]:
-    """A stream has no end of its own: asked by Ctrl-C or SIGTERM to stop, it ends well."""
+    """Context in which Ctrl-C or SIGTERM ends a stream, which has no end of its own, cleanly."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -154,7 +153,7 @@ def _obey(control: Control) -> None:
 
 
 class Display:
-    """Shows a stream to people: one live line on a terminal, else a line every five seconds."""
+    """Displays a stream: one live line on a terminal, else a line every five seconds."""
 
     def __init__(self, out: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self.out, self.live, self.clock = out, out.isatty(), clock
@@ -177,7 +176,7 @@ class Display:
 
 
 def status_line(status: Mapping[str, Any]) -> str:
-    """A session's status in a line: time, rate, the latest values, what was lost."""
+    """A session's status in a line: time, rate, the latest values, losses."""
     values = [
         f"{name} {value:.4g}"
         for name, value in zip(status["columns"][3:], list(status["latest"])[3:], strict=False)
@@ -191,7 +190,7 @@ def _losses(status: Mapping[str, Any]) -> list[str]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What a session recorded, in a few lines of text, of its `summary`."""
+    """Lines of text on a session's `summary`."""
     rows, seconds = summary["rows"], summary["duration_s"]
     losses = _losses(summary) or ["nothing lost" if summary["bytes"] else "nothing came"]
     if summary["cut_bytes"]:

@@ -1,7 +1,7 @@
-"""Channels of the last seconds as they are drawn: minimum and maximum in every pixel column.
+"""Channels of the last seconds for drawing: minimum and maximum in every pixel column.
 
-A sample is looked at once, when it comes: what is drawn costs the same at 10 Hz and at 10 kHz, and a spike of
-one sample still shows.
+Each sample is processed once, on arrival, so that drawing costs the same at 10 Hz and at 10 kHz, and a spike
+of one sample still shows.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class Traces:
         return self._low.shape[1]
 
     def copy(self) -> Traces:
-        """The same, on its own."""
+        """An independent copy."""
         return copy.deepcopy(self)
 
     def add(self, time_s: Array, values: Array) -> None:
-        """Take in samples: times (n,) in s and values (n, channels); what is not a number is left out."""
+        """Add samples: times (n,) in s and values (n, channels); values that are not numbers are left out."""
         if not len(time_s):
             return
         place = np.floor(time_s / self.step_s).astype(np.int64)
@@ -57,7 +57,7 @@ class Traces:
     def extremes(self) -> tuple[Array, Array, Array]:
         """Age (b,) in s of every step that holds samples, oldest first, and lowest and highest (channels, b).
 
-        The latest sample's age is 0, of those before it negative.
+        The latest sample's age is 0, earlier ones' negative.
         """
         number = np.arange(self._newest - self.bins + 1, self._newest + 1)
         order = number % self.bins
@@ -74,7 +74,7 @@ def unbroken(age_s: Array, gap_s: float) -> list[slice]:
 
 
 def steady_range(before: tuple[float, float] | None, low: float, high: float) -> tuple[float, float]:
-    """A range around low .. high that stays as it was while that fits and fills a third of it."""
+    """A range around low .. high, unchanged while they fit and fill a third of it."""
     if not (np.isfinite(low) and np.isfinite(high)):
         return before or (0.0, 1.0)
     if before is not None and before[0] <= low and high <= before[1]:

@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 class Watched:
-    """The session that records into `folder`; `status` is what it said last, empty before that."""
+    """A session that records into `folder`; `status` is its last status, empty before that."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -36,7 +36,7 @@ class Watched:
 
     @property
     def silent_s(self) -> float:
-        """Seconds since the session last said how it goes; it says so five times a second."""
+        """Seconds since the session's last status, which it writes five times a second."""
         return time.monotonic() - self._last_status_s
 
     @property
@@ -45,7 +45,7 @@ class Watched:
         return time.monotonic() - self._sampled
 
     def look(self) -> bool:
-        """Read the status if there is a newer one; returns whether there was."""
+        """Read the status if there is a newer one; return True if there was."""
         path = self.folder / STATUS
         try:
             written = path.stat().st_mtime_ns
@@ -74,7 +74,7 @@ class Watched:
         self._name, self._next = name, 0
 
     def fresh(self) -> Array:
-        """Samples (m, columns) that came since the last call; of more than half a ring the latest half."""
+        """Samples (m, columns) since the last call; if more than half a ring, the latest half."""
         if self._ring is None:
             return np.empty((0, len(self.columns)))
         rows, self._next = self._ring.since(self._next)
@@ -87,11 +87,11 @@ class Watched:
         return np.empty((0, len(self.columns))) if self._ring is None else self._ring.latest(n)
 
     def rewind(self) -> None:
-        """Have `fresh` begin again with the oldest samples that are still there."""
+        """Restart `fresh` at the oldest samples still in the ring."""
         self._next = 0
 
     def close(self) -> None:
-        """Let go of the samples."""
+        """Release the samples."""
         if self._ring is not None:
             self._ring.close()
         self._ring, self._name = None, ""

@@ -28,11 +28,11 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class CandidateProblem:
-    """What a sweep is about; plain data, so that it travels to another process.
+    """Candidates of a study to be solved; plain data, so that it can be sent to another process.
 
     jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
-    the jobs, by number, whose displacement of the whole mesh is wanted, too. study: whose unit it is, with
-    its effects and obstacles; without it nothing but pressure acts.
+    numbers of the jobs whose displacement of the whole mesh is also kept. study: with the unit's effects and
+    obstacles; without it only pressure acts.
     """
 
     mesh: Mesh
@@ -46,17 +46,17 @@ class CandidateProblem:
 
     @property
     def parts(self) -> tuple[tuple[int, ...], ...]:
-        """The jobs, by number, that are solved together: each printed waveguide has a mesh of its own."""
+        """Numbers of the jobs that are solved together: each printed waveguide has a separate mesh."""
         every = tuple(range(len(self.jobs)))
         return tuple((job,) for job in every) if self.mesh.resolved else (every,)
 
     def whole_of(self, part: int) -> tuple[int, ...]:
-        """The jobs of a part, by number, whose displacement of the whole mesh is wanted, too."""
+        """Numbers of a part's jobs whose displacement of the whole mesh is also kept."""
         return tuple(job for job in self.whole if job in self.parts[part])
 
 
 class Moved(NamedTuple):
-    """What the jobs of a part do at a state: anchors (jobs, p, 3) in mm, and the `whole` ones' differences.
+    """Results of a part's jobs at a state: anchors (jobs, p, 3) in mm, and the `whole` ones' differences.
 
     whole: displacements (w, n, 3) in mm against Model A's, single precision.
     """
@@ -66,7 +66,7 @@ class Moved(NamedTuple):
 
 
 class PrintedEvaluator:
-    """As `Evaluator`, where the mesh is of the printed unit and the candidates are printed waveguides."""
+    """Evaluator of printed waveguides, on a mesh of the printed unit; otherwise as `Evaluator`."""
 
     def __init__(self, setting: CandidateProblem, threads: int) -> None:
         job = setting.study
@@ -84,9 +84,10 @@ class PrintedEvaluator:
         self._setting = setting
 
     def __call__(self, way: Sequence[State], part: int) -> list[Moved]:
-        """What the one job of a part does at the last of some states of Model A, or at each of them.
+        """Results of a part's one job at the last of some states of Model A, or at each of them.
 
-        At each where it had to be followed from rest, see `PrintedWaveguides.states`. ConvergenceError.
+        At each where the job had to be followed from rest, see `PrintedWaveguides.states`. Raises
+        ConvergenceError.
         """
         (job,) = self._setting.parts[part]
         found = []
@@ -107,7 +108,7 @@ class PrintedEvaluator:
 
 
 def evaluator_of(setting: CandidateProblem, threads: int) -> Evaluator | PrintedEvaluator:
-    """What solves a setting's jobs on its mesh."""
+    """Evaluator of a setting's jobs on its mesh."""
     return (PrintedEvaluator if setting.mesh.resolved else Evaluator)(setting, threads)
 
 
@@ -125,7 +126,7 @@ class Evaluator:
         self._whole = s.whole
 
     def __call__(self, way: Sequence[State], part: int = 0) -> list[Moved]:
-        """What all jobs, the one part, do at the last of some states of Model A. Raises ConvergenceError."""
+        """Results of all jobs, in one part, at the last of some states of Model A. ConvergenceError."""
         state = way[-1]
         states = self._sweep.states(state)
         apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
@@ -165,7 +166,7 @@ def _work_in_time(job: int, time_s: Array, pressure_kPa: Array) -> Array:
 
 
 class CandidatePool:
-    """Processes that solve a setting's jobs at states of Model A; started when first needed, until closed."""
+    """Processes that solve a setting's jobs at states of Model A; started on demand, until closed."""
 
     def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
@@ -174,7 +175,7 @@ class CandidatePool:
         self._submitted: dict[tuple[float, int], Future[list[Moved]]] = {}
 
     def submit(self, way: Sequence[State], part: int) -> Future[list[Moved]]:
-        """Have a process solve a task of `solve`, unless one does; needs two workers or more."""
+        """Submit a task of `solve` to a process unless it was; needs two workers or more."""
         name = way[-1].pressure_MPa, part
         if name not in self._submitted:
             self._submitted[name] = self._pool.submit(_work, way, part)
@@ -191,7 +192,7 @@ class CandidatePool:
     def simulated_in_time(
         self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array
     ) -> Iterator[tuple[int, Array]]:
-        """Each of some jobs, by number, as it is done, and anchors (k, p, 3) in mm it moves at k instants."""
+        """Number of each finished job, and the anchors (k, p, 3) in mm it moves at k instants."""
         if self.workers == 1:
             for job in jobs:
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
@@ -202,10 +203,10 @@ class CandidatePool:
             yield waiting[done], self._pool.result(done)
 
     def solve(self, tasks: Sequence[tuple[Sequence[State], int]]) -> Iterator[tuple[int, list[Moved]]]:
-        """Number of each task as it is done, and what its part's jobs do.
+        """Number of each finished task, and the results of its part's jobs.
 
         A task: Model A's states on one side of rest, in order of pressure, and a part. Its jobs are solved at
-        the last of these, and maybe at all of them on their way there. The same for any `workers`. Raises the
+        the last of these, and possibly at all of them on the way. The same for any `workers`. Raises the
         first ConvergenceError of any.
         """
         if self.workers == 1:
@@ -220,5 +221,5 @@ class CandidatePool:
             yield numbers[done], self._pool.result(done)
 
     def close(self) -> None:
-        """End the processes, at once: whoever stops early does not wait for what nobody will read."""
+        """End the processes at once, without waiting for results that nobody reads."""
         self._pool.close()

@@ -37,8 +37,8 @@ PATH_DIFFERENCE_SHARE = 0.02
 class CandidateSolver:
     """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
 
-    What is solved is kept in the cache. Close it, also when Model A failed. whole: the rule whose
-    candidates' displacements of the whole mesh are kept, too, to be looked at.
+    Solutions are kept in the cache. Close it, also when Model A failed. whole: rule whose candidates'
+    displacements of the whole mesh are also kept, for display.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class CandidateSolver:
 
     @property
     def independent_of_path(self) -> bool:
-        """Whether candidates that start from Model A's states are where their own paths lead to."""
+        """True if candidates from Model A's states reach the same states as along their own paths."""
         return self.path_difference_mm <= self._path_allowed_mm
 
     def _rounds(self, distinct: Array) -> list[list[int]]:
@@ -99,7 +99,7 @@ class CandidateSolver:
         return key(self._key, state.pressure_MPa, part)
 
     def reached(self, state: State) -> None:
-        """Start on a state that Model A has just reached, beside Model A's next one."""
+        """Start on a state that Model A has just reached, in parallel with its next one."""
         self._passed.append(state)
         if any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain):
             way = _way(self._passed, state)
@@ -110,13 +110,13 @@ class CandidateSolver:
                     done.add_done_callback(partial(self._keep_done, way, part))
 
     def _keep_done(self, way: Sequence[State], part: int, done: Future[list[Moved]]) -> None:
-        """Keep what a process found, if it did; what is wrong with it is told where it is asked for."""
+        """Keep a process's result, if it has one; its error is raised where the result is needed."""
         if not done.cancelled() and done.exception() is None:
             with contextlib.suppress(MuError):
                 self._keep(way, part, done.result())
 
     def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
-        """Keep what a part's jobs do at the last of some states of Model A, and at those on the way there."""
+        """Keep the results of a part's jobs at the last of some states of Model A, and on the way there."""
         whole = self._sweeper.setting.whole_of(part)
         with self._keeping:
             for state, moved in zip(way[-len(found) :], found, strict=True):
@@ -132,7 +132,7 @@ class CandidateSolver:
         return range(len(self._sweeper.setting.parts))
 
     def _is_kept(self, state: State, part: int) -> bool:
-        """Whether the cache holds what is to be kept of a part's jobs at a state."""
+        """Return True if the cache holds all results of a part's jobs at a state."""
         kinds = ("sweep", "whole") if self._sweeper.setting.whole_of(part) else ("sweep",)
         return all(self._cache.has(kind, self._name(state, part)) for kind in kinds)
 
@@ -141,8 +141,8 @@ class CandidateSolver:
     ) -> list[Evaluation]:
         """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError.
 
-        verify: whether one of them is also followed along its whole path from rest, and all of them should
-        that lead elsewhere.
+        verify: also follow one of them along its whole path from rest, and all of them if that ends
+        elsewhere.
         """
         distinct = np.array([s.pressure_MPa for s in trajectory.solved])
         order = self._rounds(distinct)
@@ -175,7 +175,7 @@ class CandidateSolver:
         ]
 
     def _together(self, distinct: Array, pair: list[int]) -> list[list[int]]:
-        """A pair of pressures, by number, in the groups that are solved one after the other.
+        """Numbers of pressures in the groups that are solved one after the other.
 
         A printed candidate may be followed from rest to a pressure, and then needs no other on that side.
         """
@@ -184,10 +184,10 @@ class CandidateSolver:
         return [pair]
 
     def _follows_its_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
-        """Whether the job that deviates most is, where it does, what its whole path from rest leads to.
+        """Return True if the most deviating job ends at its maximum where its whole path from rest leads.
 
-        An elastic body without limit points has one state a pressure, and candidates may start from Model
-        A's. Should this one have another, all are solved along their paths.
+        An elastic body without limit points has one state a pressure, so that candidates may start from Model
+        A's. If this one has another, all are solved along their paths.
         """
         kept = self._cache.get("path", self._key)
         if kept is not None and "allowed_mm" in kept:
@@ -210,7 +210,7 @@ class CandidateSolver:
     def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:
         """Differences (jobs, p, 3) in mm at every pressure but 0, each job along its whole path.
 
-        At 0, where weight alone acts and every path begins, they stay as they were found before.
+        At 0, where weight alone acts and every path begins, they keep their earlier values.
         """
         sides = [_outward(distinct, p) for p in (distinct.min(), distinct.max())]
         sides = [side for side in sides if len(side)]
@@ -229,7 +229,7 @@ class CandidateSolver:
     ) -> dict[int, Array]:
         """Anchors (jobs, p, 3) in mm moved by every job at some states, by number; cached part by part.
 
-        on_progress: called with the share that is done.
+        on_progress: called with the finished share.
         """
         setting = self._sweeper.setting
         points = np.empty((len(numbers), len(self._jobs), *self._anchors.shape))
@@ -280,7 +280,7 @@ class CandidateSolver:
 
 
 def _way(states: Sequence[State], to: State) -> tuple[State, ...]:
-    """Of some states those between rest and one of them, in order of pressure, and that one last."""
+    """States between rest and one of them, in order of pressure, and that one last."""
     pressures = np.array([state.pressure_MPa for state in states])
     return (*(states[n] for n in _outward(pressures, to.pressure_MPa)[:-1]), to)
 
@@ -290,7 +290,7 @@ def _in_share(on_progress: Callable[[float], None], done: float, share: float, o
 
 
 def _outward(distinct: Array, target: float) -> Array:
-    """Numbers of the pressures (s,) from 0, without it, to a target on one side of it, in that order."""
+    """Numbers of the pressures (s,) from 0, without it, to a target on the same side, in that order."""
     between = (distinct * np.sign(target) > 0) & (np.abs(distinct) <= np.abs(target) * (1 + 1e-12))
     numbers = np.flatnonzero(between)
     return numbers[np.argsort(np.abs(distinct[numbers]))]

@@ -1,4 +1,4 @@
-"""A study's candidates where contact or wall has memory: each through its whole motion."""
+"""A study's candidates where contact or wall has history: each through its whole motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of a unit side by side: the inputs in which they differ, and what each has found."""
+"""Runs of a unit side by side: the inputs in which they differ, and their results."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _SETTINGS = (
     ("stations", "place", "stations"),
     ("mesh check", "place", "mesh_check"),
 )
-"""Settings of a run: what each is called, its stage in study.toml, and its keys there."""
+"""Settings of a run: the label of each, its stage in study.toml, and its keys there."""
 NONE = "-"
-"""Where a run has no such value."""
+"""Shown where a run has no such value."""
 
 
 @attrs.frozen
 class Row:
-    """One line of a comparison: what, its unit, a value (text) of each run, and whether it is an input."""
+    """One line of a comparison: quantity, unit, a value (text) of each run, and True if it is an input."""
 
     what: str
     unit: str
@@ -83,7 +83,7 @@ def _inputs(runs: Sequence[Run]) -> list[Row]:
 
 
 def _setting(run: Run, stage: str, keys: Sequence[str]) -> Any:
-    """What a run's study.toml has under these keys, one table in another; None where it has not."""
+    """Value of nested keys in a run's study.toml; None where it has none."""
     found: Any = run.tables.get(stage, {})
     for name in keys:
         found = found.get(name) if isinstance(found, dict) else None

@@ -57,7 +57,7 @@ def history(
     pressure_kPa: Array,
     contacts: Sequence[Sequence[ObstacleContact]],
 ) -> ContactHistory:
-    """What contacts, an instant a row, are together; a half mesh's with its mirror image's, k of b each."""
+    """Contacts, an instant a row, as a history; of a half mesh with its mirror image, k of b each."""
     whole, keeps = (2.0, np.array([0.0, 1.0, 1.0])) if "x" in mesh.symmetry else (1.0, np.ones(3))
 
     def values(of: Any) -> Array:

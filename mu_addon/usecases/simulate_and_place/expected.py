@@ -1,4 +1,4 @@
-"""How long the stages of a study take about, before any of them has begun."""
+"""Expected duration of a study's stages."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ FULL_S = {
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
 PACE = {"full": 1.0, "resolved": 7.0, "quick": 0.1}
-"""How a study's equilibria take longer or shorter by its detail."""
+"""Factor on the seconds of a study's equilibria by its detail."""
 MODEL_A_S = {"resolved": 350.0}
-"""Seconds of Model A alone, where it was measured: the printed body's candidates were not."""
+"""Seconds of Model A alone, where measured: the printed body's candidates were not."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 TOUCHING = 7.0
-"""How many times as long as others a state under suction takes where the printed body's walls touch."""
+"""Factor on the seconds of a state under suction where the printed body's walls touch."""
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.
 _SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
@@ -40,7 +40,7 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
 
 
 def work(job: Job, pressures_kPa: Iterable[float]) -> float:
-    """Work of the states at these pressures, in that of one under pressure; at 0 kPa there is none."""
+    """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
     suction = TOUCHING if job.mesh.resolved and job.self_contact else 1.0
     return sum(suction if p < 0 else 1.0 for p in pressures_kPa if p)
 
@@ -54,7 +54,7 @@ def seconds_of(name: str, detail: str) -> float:
 
 
 def plan_of(job: Job) -> Plan:
-    """The stages of a study with the seconds that each is expected to take on two cores."""
+    """The stages of a study with the expected seconds of each on two cores."""
     place, simulates = "place" in job.stages, "simulate" in job.stages
     names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
     if job.path:

@@ -43,10 +43,10 @@ _OTHER_KIND = "its parameters are of another kind of experiment than a whole uni
 
 @attrs.frozen
 class Extended:
-    """A unit with an extended model in it; applied, left_out: in words, what of the model is in it.
+    """A unit with an extended model in it; applied, left_out: parts of the model, in words.
 
-    effects: what of it is no parameter of a unit and belongs into a simulation of one. kept: the model with
-    these effects alone.
+    effects: those that are no parameter of a unit and belong in its simulation. kept: the model with these
+    effects alone.
     """
 
     unit: Unit
@@ -56,7 +56,7 @@ class Extended:
     kept: ExtendedModel
 
     def of_parameters(self) -> Extended:
-        """As far as the unit's parameters go, for what simulates no whole unit."""
+        """The extended unit reduced to its parameters, for jobs that do not simulate the whole unit."""
         beyond = self.effects.words()
         whole = tuple(f"{words}: only `simulate` and `place` simulate the whole unit" for words in beyond)
         applied = tuple(words for words in self.applied if words not in beyond)
@@ -64,12 +64,12 @@ class Extended:
 
 
 def read_extended(unit: Unit, path: str | Path) -> Extended:
-    """The unit as the model of a file has it; raises InputError for a file or value that cannot be used."""
+    """The unit with the model of a file in it; raises InputError for a file or value that cannot be used."""
     return extend(unit, load_model(Path(path)), str(path))
 
 
 def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Extended:
-    """The unit as a model has it. Raises InputError where the unit breaks a rule, or an effect its bounds.
+    """The unit with a model in it. Raises InputError where the unit breaks a rule, or an effect its bounds.
 
     overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
     moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
@@ -122,10 +122,10 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
 
 
 def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> None:
-    """Raise InputError where a law of the lattice is of another print than a unit with a model in it.
+    """Raise InputError where a lattice law is of another print than a unit with a model in it.
 
-    Offset and skin change struts as they change walls: a law of struts as drawn would leave half of the
-    model out.
+    Offset and skin change struts as they change walls: a law of struts as drawn would ignore half of the
+    model.
     """
     own = strut_cell(unit)
     for name in (f.name for f in attrs.fields(Printing)):
@@ -154,7 +154,7 @@ def _listed_values(values: Values) -> str:
 
 
 def _of_effect(name: str) -> Put:
-    """An effect put into a unit as the evidence's own simulator puts it."""
+    """An effect put into a unit as in the evidence's simulator."""
     change = EFFECTS[name].body
     assert change is not None
 

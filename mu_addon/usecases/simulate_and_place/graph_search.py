@@ -84,7 +84,7 @@ def sensitivity_map(study: Study) -> Array | None:
 def _stable(
     study: Study, model: Model, materials: Materials, sides: list[Parity], what_leaves: str
 ) -> Trajectory:
-    """Model A's motion as far as it is stable; the study warns of the pressures that `what_leaves` out."""
+    """Stable part of Model A's motion; the study warns of pressures that `what_leaves` out."""
     assert study.trajectory is not None
     found = stable_part(model, materials, study.trajectory, sides)
     kept = {s.pressure_MPa for s in found.solved}
@@ -193,7 +193,7 @@ def search_graph(study: Study) -> LatticeSearch:
 
 
 def _is_printable(study: Study, points: Array) -> bool:
-    """Whether a waveguide can be printed along a path (h, 3) in mm."""
+    """Return True if a waveguide can be printed along a path (h, 3) in mm."""
     try:
         bar_of(study.job.unit, points)
     except InputError:

@@ -1,9 +1,9 @@
-"""The runs of one unit: every study that was made of it, beside the others, each in a folder of its own.
+"""The runs of one unit: every study made of it, each in a separate folder.
 
 A unit has a home folder. Its runs lie in `runs/` there, each named by the hash of its inputs, so that the
-same inputs find the same folder again and other inputs never touch it. A study in the home folder itself,
-and what its next study has set aside in `stale/`, are of an older version, and are listed with the others.
-What the user calls a run, and whether it is starred, is in its folder's `label.toml`.
+same inputs find the same folder again and other inputs never touch it. A study in the home folder itself, and
+what its next study has set aside in `stale/`, are of an older version, and are listed with the others. What
+the user calls a run, and whether it is starred, is in its folder's `label.toml`.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ if TYPE_CHECKING:
 
 RUNS, LABEL = "runs", "label.toml"
 HOME, STALE = "home", "stale"
-"""Keys of the runs of older versions: in the home folder itself, and of what its next one set aside."""
+"""Keys of the runs of older versions: in the home folder itself, and the one set aside by its next."""
 SUMMARY, OUTPUTS = "summary.json", "blender"
-"""What a run says it has found, and where a process that Blender started leaves its output."""
+"""File of a run's results, and of the output of a process that Blender started."""
 EFFECTS = ("orientation_deg", "effects")
-"""Keys of study.toml's table of the simulation for what measured data named beside the parameters."""
+"""Keys of study.toml's table of the simulation for effects named by measured data."""
 LONGEST_NAME = 80
 _REMOVED = ".removed-"
 _UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, MuError)
-"""What a folder that is half there, or no run's, may raise."""
+"""Errors that an incomplete folder, or one without a run, may raise."""
 
 
 @attrs.frozen(eq=False)
 class Run:
-    """One run: its inputs, what it has found so far, and what the user calls it.
+    """One run: its inputs, its results so far, and its label by the user.
 
     design: hash of what was simulated, see `design_key`; summary: its summary.json, empty before it has one;
     changed_s: when it last wrote that, in seconds since 1970.
@@ -69,19 +69,19 @@ class Run:
 
     @property
     def key(self) -> str:
-        """What tells a unit's runs apart: the name of its folder in `runs/`, else `HOME` or `STALE`."""
+        """Key of a run: the name of its folder in `runs/`, else `HOME` or `STALE`."""
         if self.folder.parent.name == RUNS:
             return self.folder.name
         return STALE if self.folder.name == STALE else HOME
 
     @property
     def complete(self) -> bool:
-        """Whether it came to its end."""
+        """True if the run is complete."""
         return self.summary.get("status") == "complete"
 
     @property
     def state(self) -> str:
-        """How it ended, or that it goes on, and what is there: "cancelled; motion complete", say."""
+        """Status of the run and its results: "cancelled; motion complete", for example."""
         status = str(self.summary.get("status") or "not run")
         reason = self.summary.get("reason") or {}
         if status == "complete" or not self.summary:
@@ -95,7 +95,7 @@ class Run:
 
     @property
     def found(self) -> str:
-        """How far it came, in words."""
+        """Progress of the run in words."""
         if "chosen" in self.summary:
             return "ranking complete"
         # The figures of the solver come with the last state.
@@ -113,7 +113,7 @@ class Run:
 
     @property
     def detail(self) -> str:
-        """`resolved`, struts as printed, `full`, homogenised, or `quick`, homogenised on a coarse mesh."""
+        """True if there are results to show: the run is complete, or its motion is found."""
         mesh = self.tables.get("simulate", {}).get("mesh") or {}
         if mesh.get("fidelity", HOMOGENISED) != HOMOGENISED:
             return "resolved"
@@ -122,12 +122,12 @@ class Run:
 
     @property
     def job(self) -> str:
-        """The last stage that it was asked for: `design`, `simulate` or `place`."""
+        """`resolved`, struts as printed, `full`, homogenised, or `quick`, homogenised on a coarse mesh."""
         return [stage for stage in STAGES if stage in self.tables][-1]
 
     @property
     def title(self) -> str:
-        """What the user calls it, else what it is."""
+        """The user's name of the run, else a description."""
         what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
@@ -135,7 +135,7 @@ class Run:
 
     @property
     def seconds(self) -> float:
-        """How long its stages took together, in s."""
+        """Total time of its stages in s."""
         found = self.summary.get("seconds")
         return sum(map(float, found.values())) if isinstance(found, dict) else 0.0
 
@@ -147,7 +147,7 @@ class Run:
 
     @property
     def rule(self) -> str:
-        """The rule whose best path is the answer, or nothing where no paths were ranked."""
+        """Rule whose best path is the answer, or "" where no paths were ranked."""
         rules = list(self.summary.get("chosen") or {})
         return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
 
@@ -161,7 +161,7 @@ class Run:
 def design_key(
     unit: Unit, body: str, obstacles: Iterable[tuple[str, float]], effects: Mapping[str, Any]
 ) -> str:
-    """Hash of what is simulated, however it is: a unit but for its name, its body, obstacles and effects.
+    """Hash of the simulated design, not of the method: unit without its name, body, obstacles and effects.
 
     body: hash of the envelope's surface, or nothing; obstacles: hash and friction of each.
     """
@@ -173,12 +173,12 @@ def design_key(
 
 @lru_cache(maxsize=256)
 def _shape_hash(unit: Unit) -> str:
-    """Hash of a unit but for its name; kept, since a panel asks for the same one many times a second."""
+    """Hash of a unit without its name; cached, since a panel asks for the same one many times a second."""
     return attrs.evolve(unit, name="unit").hash()
 
 
 def folders(home: Path) -> list[Path]:
-    """Folders of a unit's home that hold a run, or may."""
+    """Folders of a unit's home that may hold a run."""
     try:
         own = [path for path in (home / RUNS).iterdir() if not path.name.startswith(".")]
     except OSError:
@@ -245,10 +245,11 @@ def read_run(folder: Path) -> Run:
 
 
 def best_of(found: Sequence[Run], design: str) -> Run | None:
-    """The run whose results are shown for a design: of those made of it the best, or else the latest of all.
+    """Run whose results are shown for a design: the best of those made of it, or else the latest of all.
 
     Complete before incomplete, quadratic elements before linear ones, a ranking before the motion alone, then
-    the latest: a quick look replaces nothing. A run that has just begun is shown only where no other one is.
+    the latest, so that a quick look replaces nothing. A run that has just begun is shown only if there is no
+    other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
@@ -261,8 +262,8 @@ def best_of(found: Sequence[Run], design: str) -> Run | None:
 def place_of(home: Path, job: Job) -> tuple[Path, Job]:
     """Folder of a unit's home in which a job is run, and the job with the name that its unit has there.
 
-    It is that of a run from the same inputs, also where that was asked for fewer or more stages: finished
-    stages are kept, and a new name makes no result old.
+    A run from the same inputs shares it, also with fewer or more stages: finished stages are kept, and a new
+    name makes no result stale.
     """
     own = _tables(job.tables(), job.unit)
     for run in runs(home):
@@ -279,7 +280,7 @@ def _tables(tables: Mapping[str, Mapping[str, Any]], unit: Unit) -> dict[str, di
 
 
 def label(run: Run, name: str, starred: bool) -> None:
-    """Call a run by a name, empty for none, and star it or not. Raises InputError and OutputError."""
+    """Name a run, "" for no name, and star it or not. Raises InputError and OutputError."""
     name = name.strip()
     if len(name) > LONGEST_NAME or not name.isprintable():
         raise InputError(
@@ -297,7 +298,7 @@ def bytes_of(run: Run) -> int:
 
 
 def remove(run: Run) -> None:
-    """Delete a run's files, whole; what else a unit keeps in its home folder stays.
+    """Delete all of a run's files; others in a unit's home folder stay.
 
     Raises InputError where a process works in the folder, and OutputError.
     """
@@ -319,7 +320,7 @@ def remove(run: Run) -> None:
 
 
 def _own(run: Run) -> list[Path]:
-    """Files and folders of a run: all of its folder, or in the home folder those that a study writes."""
+    """Files and folders of a run: its whole folder, or in the home folder those that a study writes."""
     if run.key != HOME:
         return sorted(run.folder.iterdir())
     names = (NAME, *LAYOUT.optional, *LAYOUT.results, *ALWAYS, *OWN, LABEL, OUTPUTS)
@@ -328,7 +329,7 @@ def _own(run: Run) -> list[Path]:
 
 
 def move_home(old: Path, new: Path) -> bool:
-    """Move a unit's home to another place, whole; returns whether it was: not while a run works in it.
+    """Move a unit's whole home to another path; return False while a run works in it.
 
     Nothing is moved where there is something already. Raises OutputError.
     """

@@ -155,7 +155,7 @@ class Job:
             )
 
     def _require_self_friction(self) -> None:
-        """Raise InputError for a friction that nothing feels, or that the search of the lattice would."""
+        """Raise InputError for a friction without effect, or one that the lattice's search cannot have."""
         if not self.self_friction:
             return
         if not self.self_contact:
@@ -172,7 +172,7 @@ class Job:
             )
 
     def _require_resolvable(self) -> None:
-        """Raise InputError for what the resolved model of a unit does not cover."""
+        """Raise InputError for inputs that the resolved model of a unit does not cover."""
         refused = {
             "a law for the lattice": ("--lattice", self.lattice is not None),
             "linear elements": ("--order", self.mesh.order == 1),
@@ -187,7 +187,7 @@ class Job:
     def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
         """Time in s and pressure in kPa, (k,) each, at which the protocol is solved.
 
-        With effects in time that is the pressure at which the unit without them would stand.
+        With effects in time that is the effective pressure.
         """
         time, pressure = self.protocol.sample(self.times)
         if not self.effects.in_time:
@@ -206,9 +206,9 @@ class Job:
         return self.protocol.sample(self.times)[1]
 
     def tables(self) -> Tables:
-        """Everything that decides the results, a table a stage, as study.toml has it.
+        """All inputs that decide the results, a table for each stage, as in study.toml.
 
-        Not `workers` and `solver`, which decide nothing.
+        Not `workers` and `solver`, which do not.
         """
         mesh = self.mesh.table()
         tables: Tables = {
@@ -243,12 +243,12 @@ class Job:
 
     @property
     def _run(self) -> dict[str, Any]:
-        """The table [run] of study.toml: what decides no figure."""
+        """The table [run] of study.toml, whose keys decide no figure."""
         return {"path": self.path} if self.path else {}
 
     @property
     def headline_rule(self) -> str:
-        """The rule whose best path is the answer: the one that converges with the mesh, if asked for."""
+        """Rule whose best path is the answer: the one that converges with the mesh, if asked for."""
         return "volume_fraction" if "volume_fraction" in self.rules else self.rules[0]
 
     def materials(self, mesh: Mesh) -> Materials:
@@ -284,7 +284,7 @@ class Job:
 
     @property
     def in_time(self) -> bool:
-        """Whether motion is solved instant by instant, since contact or the wall's law remembers."""
+        """True if motion is solved instant by instant, since contact or the wall's law has history."""
         return bool(self.obstacles) or self.unit.wall.has_memory or bool(self.self_friction)
 
     def texts(self) -> dict[str, str]:
@@ -306,11 +306,11 @@ class Job:
     def texts_in(
         self, folder: Path, run: Mapping[str, Any] = MappingProxyType({})
     ) -> tuple[dict[str, str], bool]:
-        """As `texts`, for a folder: with the inputs of further stages that lie there and are still good.
+        """Texts for a folder, with the still valid inputs of further stages there; True if it belongs to
+        them.
 
-        So `design` in the folder of a `place` of the same unit leaves what that found. And whether what lies
-        in the folder belongs to these inputs. run: more for the table [run], which decides no figure. Raises
-        InputError for a study.toml that cannot be used.
+        So `design` in the folder of a `place` of the same unit keeps its results. run: more for the table
+        [run], which decides no figure. Raises InputError for a study.toml that cannot be used.
         """
         own = self.tables()
         old = read_tables(folder)
@@ -324,7 +324,7 @@ class Job:
         return {**self.texts(), **files, NAME: compose(tables, {**self._run, **run})}, True
 
     def lattice_text(self) -> str | None:
-        """effective.toml: the lattice's law and where it is from, or None where it is the unit's modulus."""
+        """effective.toml: the lattice's law and its origin, or None for the unit's modulus."""
         return None if self.lattice is None else self.lattice.text()
 
     def body_text(self) -> str | None:
@@ -339,7 +339,7 @@ class Job:
         """Settings of a mesh for this unit and its obstacles.
 
         Of the whole unit where one is not its own mirror image; solid beside obstacles, and where the wall
-        has a law of its own, neither of which beams take.
+        has a law of its own, since beams support neither.
         """
         if self.unit.wall.names or self.obstacles:
             settings = settings.without_beams
@@ -370,7 +370,7 @@ def protocol_text(protocol: Protocol) -> str:
 
 
 def _named(key: str, text: str | None) -> dict[str, str]:
-    """How a table of study.toml names a file of inputs."""
+    """Entries of study.toml that name a file of inputs."""
     return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
 
 
@@ -393,7 +393,7 @@ def read_job(folder: Path) -> Job:
 def write_study(job: Job, folder: Path) -> None:
     """Write a study's inputs into its folder, for another process to `resume` it.
 
-    What a job of more stages found there from the same inputs is kept; [run] names the stages of this one,
+    Results there of a job of more stages from the same inputs are kept; [run] names the stages of this one,
     and is not kept. Raises InputError, also where another process works in the folder, and OutputError.
     """
     lock = FolderLock(folder)
@@ -426,7 +426,7 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
 
 
 def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) -> Job:
-    """The job of the settings in tables like study.toml's, and of what is given beside them; InputError."""
+    """The job from settings in tables like study.toml's and other given inputs; raises InputError."""
     job = dict(given)
     for stage, table in tables.items():
         own = (*FILES, *OF_FILES)
@@ -521,7 +521,7 @@ def obstacles_for(
 
 
 def optics_of(words: Sequence[str]) -> Optics:
-    """The resin's optics with what NAME=VALUE pairs change; raises InputError."""
+    """The resin's optics, changed by NAME=VALUE pairs; raises InputError."""
     names = [field.name for field in attrs.fields(Optics)]
     values: dict[str, float] = {}
     for word in words:

@@ -35,7 +35,7 @@ _CHECKS = 5
 def signals(study: Study, optics: Optics) -> Signals | None:
     """Follow light along every candidate path through the motion of Model A, after the paths were ranked.
 
-    None, and a warning, where there is nothing to follow: a unit that does not bend, a resin too dark.
+    None, and a warning, for a unit that does not bend or a resin that is too dark.
     """
     try:
         return _signals(study, optics)
@@ -94,7 +94,8 @@ def _signals(study: Study, optics: Optics) -> Signals:
 
 
 def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
-    """Anchors' numbers and waveguide of every candidate path; one without room for it is left out and told.
+    """Anchors' numbers and waveguide of every candidate path; one without room for it is left out with a
+    warning.
 
     Raises InputError where there is room for none.
     """
@@ -119,7 +120,7 @@ def _checked(
 ) -> Checks:
     """Rays through a bar at rest, at its ends of the motion and between them; `moved` begins with rest.
 
-    has_gravity: whether the unit at rest differs from the drawn one, under its own weight.
+    has_gravity: True if the unit at rest differs from the drawn one, by its weight.
     """
     order = np.argsort(angle, kind="stable")
     some = order[np.unique(np.linspace(0, len(order) - 1, _CHECKS).astype(int))]

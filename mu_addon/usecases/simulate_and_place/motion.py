@@ -39,15 +39,15 @@ Array = np.ndarray[Any, Any]
 FOLDER = "motion"
 MODEL_A = "model_a"
 PLAYED = "played"
-"""What is made from these files to be played: point caches and embeddings."""
+"""Files made from these to be played: point caches and embeddings."""
 REGIONS = {"membrane": MEMBRANE, "lattice": LATTICE}
 SENSITIVITY = "dJ_by_modulus_mm_per_MPa"
 IMAGE = "image_"
-"""Begins the names of what is of the nodes' images in the mirror plane."""
+"""Prefix of the names of fields of the nodes' images in the mirror plane."""
 # Of a state, at the nodes of each region's surface. Stresses are Cauchy's.
 FIELDS = ("von_mises_kPa", "largest_principal_stress_kPa", "largest_stretch", "smallest_stretch")
 CONTACT_PRESSURE = "contact_pressure_kPa"
-"""Of a state with self-contact, between pieces of the unit's own surface."""
+"""Pressure of self-contact of a state, between pieces of the unit's own surface."""
 # A path's motion is written only where its own file is named so.
 _NOT_PATHS = ("mesh", MODEL_A, "sensitivity")
 
@@ -63,7 +63,7 @@ class Surface:
 
 @attrs.frozen(eq=False)
 class Skin:
-    """A surface as it is shown: of each vertex the place (v,) in its region's fields and the mesh node (v,).
+    """A surface as shown: for each vertex its index (v,) in its region's fields and its mesh node (v,).
 
     mirror (v,): -1 where the vertex is the node's image in the plane x = 0, else 1; triangles (t, 3).
     """
@@ -96,7 +96,7 @@ class Skin:
 
 @attrs.frozen(eq=False)
 class Motion:
-    """What `motion/` holds: the mesh, its surfaces by region, Model A's states and their fields.
+    """Content of `motion/`: the mesh, its surfaces by region, Model A's states and their fields.
 
     fields: by region and name, (s, v), with the pressure of self-contact where that was simulated;
     sensitivity: by region, (v,), empty where there is none; paths: names of the sensor paths whose motion is
@@ -117,7 +117,7 @@ class Motion:
 
     @property
     def halved(self) -> bool:
-        """Whether the mesh is one half of the body, so that it can be shown cut open."""
+        """True if the mesh is one half of the body, so that it can be shown cut open."""
         return "x" in self.mesh.symmetry
 
     def skin(self, region: str, cut: bool) -> Skin:
@@ -147,7 +147,7 @@ class Motion:
         return self.sides(name)[0]
 
     def sides(self, name: str) -> tuple[Array, Array | None]:
-        """As `displacement`, and that of the nodes' images, reflected into the half, where it differs."""
+        """Return `displacement`, and that of the nodes' images, reflected into the half, if different."""
         if name == MODEL_A:
             return self.model_a, None
         found = self._path(name)
@@ -156,7 +156,7 @@ class Motion:
         return self.model_a + own, None if image is None else self.model_a + image
 
     def field(self, name: str, region: str, field: str, skin: Skin) -> Array | None:
-        """A field (s, v) of Model A or of a path's unit at a skin's vertices; None where it is not known."""
+        """A field (s, v) of Model A or of a path's unit at a skin's vertices; None if it is unknown."""
         still = self.fields[region].get(field)
         if still is None:
             return None
@@ -175,7 +175,7 @@ class Motion:
         return found
 
     def _between(self, found: dict[str, Array], key: str) -> Array | None:
-        """A path's differences at all of Model A's states, or None where its file has none of that name."""
+        """A path's differences at all of Model A's states, or None if its file has none of that name."""
         if key not in found:
             return None
         weights = polynomials(found["state_kPa"], self.state_kPa).astype(np.float32)
@@ -201,7 +201,7 @@ class Motion:
         return made
 
     def at(self, time_s: float) -> tuple[int, int, float]:
-        """The states between which a time lies, and the share of the second; ends hold before and after."""
+        """The states on either side of a time, and the share of the second; constant beyond the ends."""
         place = np.interp(time_s, self.time_s, np.arange(len(self.time_s)))
         first = min(int(place), len(self.time_s) - 2)
         return int(self.state[first]), int(self.state[first + 1]), float(place - first)
@@ -217,8 +217,8 @@ def write_model_a(
 ) -> None:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
 
-    history: what materials with memory remember of a state, by its number; contact_kPa: of every state the
-    pressure (n,) at the mesh's nodes where the unit touches itself, or none without self-contact.
+    history: of materials with memory in a state, by its number; contact_kPa: of every state the pressure (n,)
+    at the mesh's nodes where the unit touches itself, or none without self-contact.
     """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
@@ -356,7 +356,7 @@ def _fields(model: dict[str, Array], region: str) -> dict[str, Array]:
 
 
 def _fits(m: Motion) -> bool:
-    """Whether every number of a node, vertex or state has what it stands for."""
+    """Return True if all numbers of nodes, vertices and states are in range and all shapes agree."""
     states, nodes = len(m.state_kPa), len(m.mesh.nodes)
     fits = m.model_a.shape == (states, nodes, 3) and m.state.max(initial=0) < states
     fits = fits and len(m.time_s) == len(m.state) == len(m.pressure_kPa) > 1

@@ -1,4 +1,4 @@
-"""Effects that measured data named and a simulation of the unit can contain beside its parameters."""
+"""Effects named by measured data that a simulation of the unit can contain beside its parameters."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ _NONE: Values = MappingProxyType({})
 class NamedEffects:
     """Parameters of each effect by name, and the direction of gravity about x: at 0 the tip hangs down.
 
-    Effects of `STATIC` change what is simulated, those of `IN_TIME` the pressure at which it stands. An
-    effect whose size, its first parameter, is at its null is none, and left out. Raises InputError for an
-    unknown name or parameter and for a value out of bounds. where: a table's name, for that error.
+    Effects of `STATIC` change the model, those of `IN_TIME` the effective pressure. An effect whose size, its
+    first parameter, is at its null is none, and left out. Raises InputError for an unknown name or parameter
+    and for a value out of bounds. where: a table's name, for that error.
     """
 
     values: Values = attrs.field(default=_NONE)
@@ -119,11 +119,12 @@ class NamedEffects:
 
     @property
     def in_time(self) -> bool:
-        """Whether the unit stands elsewhere than where its present pressure alone would have it."""
+        """True if the unit's state depends on the past pressure."""
         return any(name in IN_TIME for name in self.values)
 
     def effective_kPa(self, time_s: Array, pressure_kPa: Array) -> Array:
-        """Pressure (n,) in kPa at which the unit without the effects in time would stand, from rest on.
+        """Effective pressure (n,) in kPa at which the unit without the effects in time would stand, from
+        rest.
 
         time_s, pressure_kPa (n,): of the supply, linear in between.
         """
@@ -135,20 +136,20 @@ class NamedEffects:
 
     @property
     def has_gravity(self) -> bool:
-        """Whether the direction of gravity matters."""
+        """True if the direction of gravity matters."""
         return any(EFFECTS[name].has_gravity for name in self.sizes)
 
     @property
     def clogged(self) -> bool:
-        """Whether a neck closes: the model's tangent then lacks what of the pressure the rim bears.
+        """True if a neck is closed: the model's tangent then lacks the pressure on its rim.
 
-        Newton's method only takes longer for it, but what is linear about a state comes out 14 to 26 % off.
+        Newton's method takes longer without it, but a linearisation about a state is off by 14 to 26 %.
         """
         return "clogged_chamber" in self.values
 
     @property
     def tables(self) -> dict[str, Any]:
-        """What study.toml has of them: nothing where there is none, no direction where nothing has weight."""
+        """Entries of study.toml for the effects: none without effects, no direction without weight."""
         if not self:
             return {}
         turned = {"orientation_deg": self.orientation_deg} if self.has_gravity else {}
@@ -156,13 +157,13 @@ class NamedEffects:
 
     @property
     def newton(self) -> NewtonSettings:
-        """Newton's settings that these effects ask for."""
+        """Newton's settings required by these effects."""
         asked = [EFFECTS[name].newton for name in self.sizes]
         return next((n for n in asked if n != SMOOTH), NewtonSettings())
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """What tells a result with these effects from others, in a key; nothing where there is none."""
+        """Parts of a key that distinguish results with these effects; empty without any."""
         return (self.tables,) if self else ()
 
     def words(self) -> list[str]:
@@ -170,7 +171,7 @@ class NamedEffects:
         return [_in_words(name, given) for name, given in self.values.items()]
 
     def materials(self, base: Materials, mesh: Mesh) -> Materials:
-        """Materials of a unit's mesh with these effects, of those without."""
+        """Materials of a unit's mesh with these effects, from those without."""
         sizes = self.sizes
         for name in _LAWS:
             change = EFFECTS[name].materials
@@ -190,7 +191,7 @@ class NamedEffects:
         return found
 
     def load(self, unit: Unit, mesh: Mesh, device: str = "cpu") -> Array | None:
-        """Dead forces (n, 3) in N on a unit's mesh by these effects, None where there are none."""
+        """Dead forces (n, 3) in N on a unit's mesh by these effects, None without any."""
         body = Body(unit, orientation_deg=self.orientation_deg, device=device)
         found = None
         for name, size in self.sizes.items():
@@ -204,7 +205,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
-    """The sets of parameters that an effect may be given by, a law each."""
+    """Sets of parameters by which an effect may be given, one for each law."""
     if name in STATIC:
         return ((EFFECTS[name].parameter,),)
     own = IN_TIME[name].parameters
@@ -217,14 +218,15 @@ def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
 
 
 def parameters_of(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:
-    """The parameters of an effect that is given by these names, None where no law of it has them."""
+    """Parameters of the law of an effect that has these names, None if no law has them."""
     return next((law for law in _laws(name) if {p.name for p in law} == set(given)), None)
 
 
 def law_within(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:
-    """The law of a unit's effect whose parameters are all among those given; None where none is.
+    """Law of a unit's effect whose parameters are all among those given; None without one.
 
-    Beside them may stand those of another kind of experiment; of several laws it is that of most parameters.
+    Parameters of another kind of experiment may be beside them; of several laws the one with most parameters
+    is taken.
     """
     names = set(given)
     whole = [law for law in _laws(name) if {p.name for p in law} <= names]

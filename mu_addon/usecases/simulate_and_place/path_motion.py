@@ -1,4 +1,4 @@
-"""The motion of a unit with a sensor, for display, as differences from Model A's."""
+"""Motion of a unit with a sensor, for display, as differences from Model A's."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The simulated unit at a measured bending angle, interpolated between Model A's states.
 
-Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure all the
-way from rest, an angle belongs to one state; beyond the first turn it would belong to two, so that there the
-twin has nothing to show. Between two states displacements go straight, as the motion on the timeline does.
+Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure from rest,
+an angle belongs to one state. Beyond the first turn it would belong to two, so that the twin shows nothing
+there. Between two states displacements go straight, as the motion on the timeline does.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Poses:
 
     @property
     def range_deg(self) -> tuple[float, float]:
-        """The angles that were simulated."""
+        """Range of simulated angles."""
         return float(self.angle_deg[0]), float(self.angle_deg[-1])
 
     def at(self, angle_deg: float) -> tuple[int, int, float] | None:
-        """The two states about an angle and the share of the second; None beyond what was simulated."""
+        """The two states on either side of an angle and the share of the second; None beyond the range."""
         low, high = self.range_deg
         if not low <= angle_deg <= high:
             return None
@@ -42,12 +42,12 @@ class Poses:
         return int(self.state[k]), int(self.state[k + 1]), float((angle_deg - first) / (second - first))
 
     def pressure_at(self, angle_deg: float) -> float:
-        """The pressure in kPa at which Model A bends so far; nan beyond what was simulated."""
+        """Pressure in kPa at which Model A has this angle; nan beyond the range."""
         return float(np.interp(angle_deg, self.angle_deg, self.pressure_kPa, left=np.nan, right=np.nan))
 
 
 def poses(motion: Motion) -> Poses:
-    """The states that an angle belongs to; raises InputError where the motion does not bend about rest."""
+    """States of a motion by angle; raises InputError where the motion does not bend about rest."""
     order = np.argsort(motion.state_kPa, kind="stable")
     tip = TipSection.of(motion.mesh)
     angles = np.array([tip.angle_deg(motion.model_a[k].astype(float)) for k in order])

@@ -1,6 +1,6 @@
 """The report of a study as one HTML file without scripts or requests.
 
-It answers first (which path), then shows why, and ends with what the answer rests on.
+It states the answer (which path), then its grounds, and ends with the assumptions.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _headline(r: ReportData) -> str:
 
 
 def _caveat(r: ReportData, rule: RuleResult) -> str:
-    """What qualifies the answer: ties within the mesh's uncertainty, and what the other rule says."""
+    """Qualification of the answer: ties within the mesh's uncertainty, and the other rule's path."""
     words = []
     if rule.tied:
         names = _listed([_name(name) for name in rule.tied])
@@ -325,7 +325,7 @@ def _motion(r: ReportData) -> str:
 
 
 def _stretch(r: ReportData) -> str:
-    """How far wall and lattice are stretched: painted on the extreme states, and in numbers for all."""
+    """Stretch of wall and lattice: painted on the extreme states, and in numbers for all."""
     if not r.stretch:
         return ""
     html = "<h3>Stretch</h3>"
@@ -349,7 +349,7 @@ def _painted(states: PaintedStates, low: float, name: str) -> str:
 
 
 def _self_contact(r: ReportData) -> str:
-    """Where walls and struts touch each other: painted on the extreme states, and in numbers for all."""
+    """Self-contact of walls and struts: painted on the extreme states, and in numbers for all."""
     if not r.self_contact:
         return ""
     html = "<h3>Self-contact</h3>"

@@ -1,4 +1,4 @@
-"""The data of a study's report, as far as the study was finished."""
+"""Data of a study's report, of all finished stages."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ FILES = {
 
 
 def write_report(study: Study, stopped: str = "") -> None:
-    """Write report.html (and unit.png); `stopped` says why a study that is not complete stopped.
+    """Write report.html (and unit.png); `stopped`: why an incomplete study stopped.
 
-    Pictures take most of the time: a run that was asked to stop leaves them out. A report that tells of more
-    stages than were run now, from the same inputs, is left as it is.
+    Pictures take most of the time: a run that was asked to stop leaves them out. An existing report on more
+    stages, from the same inputs, is kept.
     """
     from .report import write_html
 
@@ -79,7 +79,7 @@ def write_report(study: Study, stopped: str = "") -> None:
 
 
 def _panel_pictures(study: Study) -> None:
-    """The study's answers as pictures beside its motion, as far as the study came."""
+    """Write pictures of the study's answers for panels, beside its motion."""
     from .panel_pictures import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
@@ -100,7 +100,7 @@ def report_data(
     stopped: str = "",
     search_picture: Picture | None = None,
 ) -> ReportData:
-    """What the report shows of a study, complete or stopped early for a reason."""
+    """Data of the report of a study, complete or stopped early for a reason."""
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
     complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
@@ -187,7 +187,7 @@ def _parameters(study: Study) -> list[Parameter]:
 
 
 def _effect_words(effects: NamedEffects) -> list[str]:
-    """What acts on the unit besides, in words."""
+    """Other effects on the unit, in words."""
     turned = (
         [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
         if effects.has_gravity
@@ -197,7 +197,7 @@ def _effect_words(effects: NamedEffects) -> list[str]:
 
 
 def _effects(effects: NamedEffects) -> list[Parameter]:
-    """Size of every effect beside the unit's parameters, and the direction of gravity where it matters."""
+    """Size of every effect beside the unit's parameters, and the direction of gravity if it matters."""
     rows = [
         Parameter(f"effects.{name}.{p.name}", given[p.name], p.unit, f"the model given: {words}")
         for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
@@ -212,7 +212,7 @@ def _effects(effects: NamedEffects) -> list[Parameter]:
 
 
 def _lattice_parameters(lattice: Effective | None) -> list[Parameter]:
-    """The lattice's law, and what it was found from."""
+    """Parameters of the lattice's law, and its origin."""
     if lattice is None:
         return []
     made = f"{LATTICE_LAW}: {lattice.cell.get('kind', 'a')} cell"
@@ -335,7 +335,7 @@ def _painted(study: Study, field: str, low: float, least: float, word: str) -> P
 
 
 def _search_picture(study: Study) -> Picture | None:
-    """The best path of the whole lattice in the unit cut open, on the side where it is in view."""
+    """Picture of the lattice's best path in the unit cut open, on the side where it is in view."""
     from ...report.render import png
     from ...report.unit_pictures import portrait, unit_parts
 

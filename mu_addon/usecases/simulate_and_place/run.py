@@ -1,4 +1,4 @@
-"""A study of one unit, stage after stage: its solid, its motion, the ranking of sensor paths."""
+"""A study of one unit by stages: its solid, its motion, the ranking of sensor paths."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .study_file import LAYOUT
 
 
 def simulate_and_place(job: Job, folder: Path, context: RunContext) -> Study:
-    """Run a study's stages in a folder that is its own, and report as far as it came."""
+    """Run a study's stages in its own folder, and report the finished ones."""
     study = Study.begun(job, folder, context)
     context.report = lambda stopped: write_report(study, stopped)
     run_stages(study)
@@ -58,7 +58,7 @@ def run_stages(study: Study) -> None:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """Angles, chosen paths and the best of a search, as far as the stages went."""
+    """Lines of text on a study: angles, chosen paths and the best of a search, of finished stages."""
     lines = []
     angles = summary.get("angle_deg")
     if isinstance(angles, dict):

@@ -1,4 +1,4 @@
-"""How far the motion of a unit in one run is from that in another, at the surface that one of them shows."""
+"""Difference between the motions of a unit in two runs, at the surface that one of them shows."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .motion import Motion, Skin
 Array = np.ndarray[Any, Any]
 
 FARTHEST = 0.05
-"""Share of the other mesh's largest extent: what lies farther outside of it is not compared."""
+"""Share of the other mesh's largest extent beyond which points outside of it are not compared."""
 _LEAST_SHARE = 0.5
-"""Share of the points that must lie in or by the other mesh, or the units are not comparable."""
+"""Least share of the points in or near the other mesh; with less, the units are not comparable."""
 
 
 @attrs.frozen(eq=False)
 class Difference:
-    """Distance (s, v) in mm between where two runs have moved a surface's points, at the first one's states.
+    """Distance (s, v) in mm between a surface's points in two runs, at the first one's states.
 
-    A point that lies too far outside the other mesh has none, NaN; unknown: share of these points.
+    It is NaN for a point too far outside the other mesh; unknown: share of these points.
     """
 
     distance_mm: Array
@@ -30,11 +30,11 @@ class Difference:
 
 
 def difference(one: Motion, name: str, skin: Skin, other: Motion, other_name: str) -> Difference:
-    """Compare the motion of Model A or a path (`name`) in one run with another's, point by point at rest.
+    """Compare the motion of Model A or a path (`name`) in one run with another's, point by point.
 
-    On equal meshes nodes are compared. Else the surface's points are put into the other mesh, which carries
-    them along by its shape functions. Raises InputError where the runs cannot be compared: pressures over
-    time that differ, units of which less than half is in common, a motion that is not there.
+    On equal meshes nodes are compared. Otherwise the surface's points are embedded in the other mesh, by its
+    shape functions. Raises InputError where the runs cannot be compared: different pressures over time, units
+    with less than half in common, a missing motion.
     """
     states = _states(one, other)
     own, image = one.sides(name)
@@ -58,7 +58,7 @@ def difference(one: Motion, name: str, skin: Skin, other: Motion, other_name: st
 
 
 def _states(one: Motion, other: Motion) -> Array:
-    """Of every state of one run the state (s,) of another one at the same time."""
+    """State (s,) of another run at the time of each state of one."""
     same = len(one.time_s) == len(other.time_s)
     if not same or not (
         np.allclose(one.time_s, other.time_s) and np.allclose(one.pressure_kPa, other.pressure_kPa)

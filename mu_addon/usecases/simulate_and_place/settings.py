@@ -1,4 +1,4 @@
-"""Settings of a study, stated once: the job, the command line, nodes and Blender take them from here.
+"""Settings of a study, used by the job, the command line, nodes and Blender.
 
 No solver or array library is loaded: the command line's --help reads this module.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from ...design.quantity import described
 
 STAGES = ("design", "simulate", "place")
-"""In the order they need each other; a study has the first, the first two or all."""
+"""Stages in order of need; a study has the first, the first two or all."""
 PROTOCOL = described(
     "protocol",
     "",

@@ -84,7 +84,7 @@ COARSER = 0.7
 
 @attrs.define
 class Study:
-    """A study under way: what has been found so far is here, and in `folder` as soon as it is whole."""
+    """State of a study; results are also in `folder` as soon as they are complete."""
 
     job: Job
     folder: Path
@@ -107,15 +107,15 @@ class Study:
 
     @classmethod
     def open(cls, job: Job, folder: Path, context: RunContext) -> Study:
-        """A study in a folder that becomes its own, see `begin_study`. Raises InputError and OutputError."""
+        """Open a study in a folder, which becomes its own (`begin_study`); InputError and OutputError."""
         begin_study(job, folder, context)
         return cls.begun(job, folder, context)
 
     @classmethod
     def begun(cls, job: Job, folder: Path, context: RunContext) -> Study:
-        """A study in a folder that is its own already; its inputs are in the summary.
+        """A study in a folder already its own; its inputs are in the summary.
 
-        Raises OutputError where the disk has too little room.
+        Raises OutputError if the disk has too little room.
         """
         study = cls(job, folder, context)
         study._require_space(_expected_nodes(job) if "simulate" in job.stages else 0)
@@ -130,11 +130,11 @@ class Study:
 
     @property
     def progress(self) -> Progress:
-        """Where the run says how it goes."""
+        """Progress of the run."""
         return self.context.progress
 
     def _summarise_settings(self) -> None:
-        """Settings of the simulation in the summary, and warnings of what they leave out."""
+        """Put settings of the simulation into the summary, and warn of what they leave out."""
         job, summary = self.job, self.context.summary
         summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
         summary["study"] |= {"mesh": job.mesh.table(), "mesher": job.mesher}
@@ -166,7 +166,7 @@ class Study:
 
     @property
     def has_more(self) -> bool:
-        """Whether the folder has the results of a further stage than this job's, from the same inputs."""
+        """Return True if the folder has results of further stages than this job's, from the same inputs."""
         further = STAGES[len(self.job.stages) :]
         return any(_FIGURE_OF_STAGE[stage] in self.context.summary for stage in further)
 
@@ -201,7 +201,7 @@ class Study:
         return solid
 
     def make_mesh(self) -> Mesh:
-        """Analysis mesh and its quality; kept, since one of its meshers is not repeatable."""
+        """Make the analysis mesh and its quality; cached, since one of its meshers is not repeatable."""
         with self.progress.stage("mesh"):
             self.mesh = self._mesh(self.job.mesh)
             self.progress.made(f"{len(self.mesh.nodes)} nodes and {len(self.mesh.tets)} elements")
@@ -245,9 +245,9 @@ class Study:
         return mesh
 
     def simulate(self, candidates_beside: bool = False) -> Trajectory:
-        """Model A: the unit without a sensor through the pressure protocol.
+        """Simulate Model A: the unit without a sensor through the pressure protocol.
 
-        candidates_beside: whether other processes go on with the candidates as soon as a state is there.
+        candidates_beside: let other processes solve the candidates as soon as a state is there.
         """
         assert self.mesh is not None
         time, pressure = self.job.samples
@@ -298,7 +298,7 @@ class Study:
             self._ahead.reached(state)
 
     def _model_a(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
-        """Model A's trajectory on a model's mesh, load step by load step from the cache where it is there."""
+        """Model A's trajectory on a model's mesh, load step by load step, from the cache where present."""
         materials = self.job.materials(model.mesh)
         if self.job.in_time:
             return self._in_time(model, time, pressure, on_state)
@@ -329,7 +329,7 @@ class Study:
         )
 
     def _in_time(self, model: Model, time: Array, pressure: Array, on_state: Any) -> Trajectory:
-        """Model A instant by instant, since contact or the wall remembers, from the cache likewise."""
+        """Model A instant by instant, since contact or wall has history, from the cache likewise."""
         job, materials = self.job, self.job.materials(model.mesh)
         name = self._in_time_key(model, time, pressure)
         found: list[list[ObstacleContact]] = []
@@ -372,7 +372,7 @@ class Study:
         )
 
     def _remembered(self, model: Model) -> Callable[[int], tuple[Array, ...]]:
-        """What the wall remembers of an instant of the protocol, by its number; nothing of an elastic one."""
+        """Function of an instant's number that returns the wall's history there; empty for an elastic one."""
         if not self.job.unit.wall.has_memory:
             return lambda number: ()
         name = self._in_time_key(model, *self.job.samples)
@@ -430,7 +430,7 @@ class Study:
         write_trajectory(self.folder / "model_a.pvd", self.mesh, reached)
 
     def _write_in_time(self, states: Any) -> None:
-        """As `_write_motion`, an instant a row: with contact or memory the way back differs."""
+        """Write the motion, an instant a row: with contact or history the way back differs."""
         assert self.mesh is not None
         reached = self._instants(states)
         rows = [
@@ -462,7 +462,7 @@ class Study:
     def motion_in_order(self) -> tuple[Array, Array]:
         """Pressure (s,) in kPa and bending angle (s,) in degrees of the motion as far as it was computed.
 
-        One state a pressure, ascending; one an instant where contact, the wall or an effect remembers.
+        One state a pressure, ascending; one an instant where contact, the wall or an effect has history.
         """
         states = self.trajectory.solved if self.trajectory else tuple(self.states)
         if self.job.in_time or self.job.effects.in_time:
@@ -473,14 +473,14 @@ class Study:
         return np.array([p for p, _ in shown]), np.array(angles)
 
     def _write_contact(self) -> None:
-        """What the unit touched, where it may touch something."""
+        """Write the contacts with obstacles, if there are any."""
         if self.contact is None:
             return
         write_csv(self.folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
         self.context.summary["contact"] = self.contact.summary()
 
     def _write_self_contact(self, model: Model, states: tuple[State, ...]) -> list[Array]:
-        """Where the unit touches itself in every state; the pressure (n,) in kPa there at all nodes."""
+        """Write the self-contact of every state; return its pressure (n,) in kPa at all nodes."""
         self.self_contact = []
         if model.self_contact is None:
             return []
@@ -500,7 +500,7 @@ class Study:
         return [touch.pressure_kPa for touch in found]
 
     def _write_stretch(self, states: tuple[State, ...]) -> None:
-        """How far wall and lattice are stretched in every state, and where most."""
+        """Write the largest stretches of wall and lattice in every state, and their positions."""
         assert self.mesh is not None
         self.stretch = []
         struts = "struts" if self.mesh.resolved else "homogenised lattice"
@@ -513,7 +513,7 @@ class Study:
         write_csv(self.folder / "stretch.csv", list(STRETCH_COLUMNS), self.stretch)
 
     def _look_for_self_intersection(self, states: tuple[State, ...]) -> None:
-        """Name the first pressure, on either side, at which walls pass through each other, and which."""
+        """Report the first pressure, on either side, at which walls pass through each other, and which."""
         assert self.mesh is not None
         found: dict[str, Any] = {}
         # With self-contact no step passes a touch.
@@ -536,9 +536,9 @@ class Study:
         self.context.summary["walls_cross_at_kPa"] = found
 
     def _tell_of_snaps(self, states: tuple[State, ...]) -> None:
-        """Name the first pressure on either side that lies beyond a limit point, and how far a node moved.
+        """Report the first pressure on either side beyond a limit point, and how far a node moved.
 
-        Of a motion solved instant by instant, the first instant.
+        For a motion solved instant by instant, the first instant.
         """
         snapped = [s for s in states if s.snapped_mm]
         if self.job.in_time:
@@ -556,7 +556,7 @@ class Study:
                 )
 
     def _look_beyond_the_fit(self, states: tuple[State, ...]) -> None:
-        """Warn where the lattice is strained further than its law was fitted, or than it is stable."""
+        """Warn where the lattice is strained beyond the range of its law's fit or stability."""
         if self.job.lattice is None:
             return
         assert self.mesh is not None
@@ -596,7 +596,7 @@ class Study:
             )
 
     def _keep_partial_motion(self) -> None:
-        """What was found before a failure is kept; summary.json says that it is partial."""
+        """Write the motion found before a failure; summary.json says that it is partial."""
         if self.mesh is not None and self.states:
             start = [] if self.job.in_time or self.job.effects.has_gravity else [rest(self.mesh)]
             self._write_motion([*start, *self.states])
@@ -605,7 +605,7 @@ class Study:
         return [(c, rule) for rule in self.job.rules for c in candidate_paths(self.anchors, self.windows)]
 
     def place(self) -> dict[str, str]:
-        """Every candidate under every rule against Model A; returns the chosen path of each rule."""
+        """Compare every candidate under every rule with Model A; return the chosen path of each rule."""
         assert self.mesh is not None
         assert self.trajectory is not None
         jobs = self._jobs()
@@ -635,7 +635,7 @@ class Study:
     ) -> list[Evaluation]:
         """Evaluation of every (candidate, rule) on a mesh against its Model A; see `sweeping`.
 
-        to_look_at: whether the paths' motion is kept, too; of the study's own mesh or the whole body's.
+        to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's.
         """
         if self.job.in_time:
             self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = {"along_paths": True}
@@ -663,10 +663,10 @@ class Study:
         return found
 
     def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
-        """How far a coarser mesh moves each J_hat: the most of any path, by rule.
+        """Largest change of any path's J_hat on a coarser mesh, by rule.
 
-        Both meshes are compared at the protocol's extreme pressures; the change there, relative to the
-        deviation there, stands for the change of J_hat.
+        Both meshes are compared at the protocol's extreme pressures; the relative change of the deviation
+        there stands for that of J_hat.
         """
         assert self.trajectory is not None
         coarse = attrs.evolve(self.job.mesh, refine=self.job.mesh.refine * COARSER)
@@ -720,13 +720,13 @@ class Study:
         return chosen
 
     def tied(self, rule: str, chosen: str) -> list[str]:
-        """Paths whose J_hat is closer to the chosen one's than the mesh moves it."""
+        """Paths whose J_hat differs from the chosen one's by less than the mesh uncertainty."""
         J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
         limit = self.uncertainty_mm.get(rule, 0.0)
         return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
 
     def _warn_of_another_cell(self) -> None:
-        """Say where the lattice's law was found for another cell than the unit's."""
+        """Warn where the lattice's law was found for another cell than the unit's."""
         assert self.job.lattice is not None
         own = strut_cell(self.job.unit)
         values = {f.name: getattr(own, f.name) for f in attrs.fields(type(own))} | {"kind": own.kind.name}
@@ -740,7 +740,7 @@ class Study:
             self.warn(f"The lattice law was computed for another cell than the unit's: {', '.join(other)}.")
 
     def _warn_of_missed_corners(self) -> None:
-        """Say where uniform samples miss the protocol's extremes."""
+        """Warn where uniform samples miss the protocol's extremes."""
         corners = self.job.protocol.pressure_kPa
         samples = self.job.supplied_kPa
         for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
@@ -751,7 +751,7 @@ class Study:
                 )
 
     def warn(self, text: str) -> None:
-        """Tell something that the user should know, now and in the report."""
+        """Warn the user, now and in the report."""
         if text not in self.warnings:
             self.warnings.append(text)
             self.progress.warning(text)
@@ -760,8 +760,8 @@ class Study:
 def begin_study(job: Job, folder: Path, context: RunContext) -> None:
     """Make a folder a study's; results of other inputs are moved to stale/, never shown as current.
 
-    What a job of more stages found there from the same inputs is kept. Raises InputError, also where
-    another process works in the folder, and OutputError.
+    Results there of a job of more stages from the same inputs are kept. Raises InputError, also where another
+    process works in the folder, and OutputError.
     """
     context.lock_folder(folder)
     texts, current = job.texts_in(folder)
@@ -773,7 +773,7 @@ def begin_study(job: Job, folder: Path, context: RunContext) -> None:
 
 
 def _state(arrays: dict[str, Array]) -> State:
-    """The state that the cache kept."""
+    """State in the cache."""
     return State(
         float(arrays["pressure_MPa"]),
         arrays["u"],
@@ -785,13 +785,13 @@ def _state(arrays: dict[str, Array]) -> State:
 
 
 def extremes(pressure_kPa: Array) -> Array:
-    """The pressures, ascending, that stand for a protocol: its extremes, without 0."""
+    """Extreme pressures of a protocol, ascending, without 0."""
     found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
     return found[found != 0]
 
 
 def _earlier(folder: Path) -> dict[str, Any]:
-    """Figures of a folder's last run, as far as this version of the program found them."""
+    """Figures of a folder's last run, if this version of the program computed them."""
     try:
         found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
     except (OSError, InputError):
@@ -802,7 +802,7 @@ def _earlier(folder: Path) -> dict[str, Any]:
 
 
 def _expected_nodes(job: Job) -> int:
-    """How many nodes a mesh will have, from those of mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
+    """Expected number of a mesh's nodes, from mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
     share = {"half": 1.0, "full": 2.0}[job.mesh.fraction]
     of_order = {1: 0.15, 2: 1.0}[job.mesh.order]
     units = job.unit.dimensions.count / 6

@@ -59,7 +59,7 @@ Tables = dict[str, dict[str, Any]]
 
 
 def compose(tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any] = MappingProxyType({})) -> str:
-    """Text of study.toml with a table a stage, and a table [run] of what decides no figure."""
+    """Text of study.toml with a table a stage, and a table [run] of keys that decide no figure."""
     return toml_text({"format": FORMAT, **tables, **({RUN: run} if run else {})}, HEADER)
 
 
@@ -134,7 +134,7 @@ def parse(text: str, folder: Path) -> Tables:
 
 
 def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, str] | None:
-    """Texts of the files that some stages' tables name, by name, or None where one is not as it was then."""
+    """Texts of the files that some stages' tables name, by name, or None where one has changed."""
     texts = {}
     for stage, values in tables.items():
         for key in _FILES_OF[stage]:

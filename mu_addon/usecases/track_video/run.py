@@ -1,6 +1,6 @@
-"""From a tracked video to an experiment in a folder of measured data: pressure, angle, positions.
+"""Measured data from a tracked video: pressure, angle, positions.
 
-What is followed comes from a tracker: Blender's, or a CSV file of pixels from any other.
+Tracks come from Blender's tracker, or from any other as a CSV file of pixels.
 """
 
 from __future__ import annotations
@@ -49,15 +49,16 @@ HEAD = (
 OF_MARKER = ("name", "pixel", "place_mm")
 OF_EXPERIMENT = tuple(k for k in COMMON + KINDS[KIND].may_have_keys if k not in ("kind", "file"))
 MARKER_KINDS = ("crosses", "dots")
-"""What markers look like: `crosses` show how they turn, `dots` do not."""
+"""Kinds of markers: `crosses` show their rotation, `dots` do not."""
 
 
 @attrs.frozen
 class MarkerSettings:
-    """What a tracker is told of the markers.
+    """Settings of the markers for a tracker.
 
-    pixels: place of each by name in the first frame, right and down from the upper left corner; kind: one of
-    `MARKER_KINDS`; pattern_px: side of the square that is compared; search_px: of the one that is searched.
+    pixels: position of each by name in the first frame, right and down from the upper left corner; kind: one
+    of `MARKER_KINDS`; pattern_px: side of the square that is compared; search_px: of the one that is
+    searched.
     """
 
     pixels: Mapping[str, tuple[float, float]]
@@ -68,7 +69,7 @@ class MarkerSettings:
 
 @attrs.frozen
 class Bench:
-    """How a video was made: the view, the markers, the clock, and keys of the experiment.
+    """Setup of a video: the view, the markers, the clock, and keys of the experiment.
 
     fps: frames a second, the clip's own where it is None; starts_s: the pressure's clock at the first frame.
     """
@@ -85,7 +86,7 @@ Tracker = Callable[[Path, MarkerSettings], Tracks]
 
 @attrs.frozen(eq=False)
 class Filmed:
-    """An experiment made from a video: rows within the pressure's record, and what is odd about it."""
+    """An experiment made from a video: rows within the pressure's record, and remarks on it."""
 
     tracks: Tracks
     time_s: Array
@@ -157,7 +158,7 @@ _TYPES = {"camera": str, "marks": str, "follow_base": bool}
 
 
 def _given(document: Mapping[str, Any], at: Callable[[str], str], **keys: str) -> dict[str, Any]:
-    """Values of the keys that are there, of their type, by the names they are wanted under."""
+    """Values of the keys that are present, of their type, by the names they are wanted under."""
     found = {}
     for name, key in keys.items():
         if key not in document:
@@ -184,7 +185,7 @@ def _pair(document: Mapping[str, Any], key: str, at: Callable[[str], str]) -> Pa
 def _markers(
     tables: Any, origin: str
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
-    """Pixels and places of the markers by name."""
+    """Pixels and positions of the markers by name."""
     pixels: dict[str, tuple[float, float]] = {}
     places: dict[str, tuple[float, float]] = {}
     names: list[str] = []
@@ -294,10 +295,10 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
 
 
 def write_experiment(found: Filmed, bench: Bench, name: str, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
-    """Put an experiment into a folder of measured data; returns its CSV file and what the reader remarks.
+    """Put an experiment into a folder of measured data; return its CSV file and the reader's remarks.
 
-    An experiment of that name that was made from a video before is made anew. Raises InputError where
-    another holds the name, or the data could not be read again; OutputError.
+    An experiment of that name made from a video before is replaced. Raises InputError where another holds the
+    name, or the data could not be read again; OutputError.
     """
     table = f"{file_stem(name)}.csv"
     block = _block(name, table, bench)
@@ -312,7 +313,7 @@ def _block(name: str, file: str, bench: Bench) -> str:
 
 
 def _table(found: Filmed, bench: Bench) -> str:
-    """The CSV file of an experiment: a comment on where it comes from, then a row a frame."""
+    """CSV file of an experiment: a comment on its origin, then a row for each frame."""
     m, view = found.motion, bench.view
     stream = io.StringIO()
     stream.write(f"# from a video; {m.mm_per_pixel:.6g} mm a pixel, noise {m.noise_px:.2g} pixels\n")
@@ -333,12 +334,12 @@ def _table(found: Filmed, bench: Bench) -> str:
 
 
 def _csv(columns: Mapping[str, Array]) -> str:
-    """CSV text of columns (n,); nobody measures less than a micrometre."""
+    """CSV text of columns (n,), rounded to a micrometre."""
     return csv_text(columns, lambda v: f"{v:.10g}" if v == int(v) else f"{v:.6f}")
 
 
 def _pixels(found: Filmed, starts_s: float) -> str:
-    """Places in the picture, a row a frame with the time in the clip, as `read_pixels` reads them."""
+    """Positions in the picture, a row for each frame with the clip's time, in the format of `read_pixels`."""
     columns: dict[str, Array] = {"time_s": found.time_s - starts_s}
     for name, at in zip(found.tracks.names, found.tracks.pixels, strict=True):
         columns |= {f"{name} right_px": at[:, 0], f"{name} down_px": at[:, 1]}
@@ -346,9 +347,9 @@ def _pixels(found: Filmed, starts_s: float) -> str:
 
 
 def read_pixels(path: Path) -> Tracks:
-    """Markers that were followed by any tracker: a CSV with `NAME right_px`, `NAME down_px` for each.
+    """Markers tracked by any program: a CSV with `NAME right_px`, `NAME down_px` for each.
 
-    One row a frame; empty where a marker was lost; time_s, where it is there, is the time of each. Raises
+    One row a frame; empty where a marker was lost; time_s, if present, is the time of each. Raises
     InputError.
     """
     try:
@@ -394,9 +395,9 @@ def read_pixels(path: Path) -> Tracks:
 
 
 def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filmed:
-    """The experiment that a clip shows; writes nothing. Raises InputError.
+    """Experiment in a clip; writes nothing. Raises InputError.
 
-    follow: follows the markers, see `Tracker`; not asked where the clip is a CSV file of pixels.
+    follow: tracks the markers, see `Tracker`; not used if the clip is a CSV file of pixels.
     """
     if not Path(clip).exists():
         raise InputError(
@@ -422,7 +423,7 @@ def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filme
 def track_into(
     folder: Path, clip: Path, bench: Bench, pressure: Path, follow: Tracker, context: RunContext
 ) -> None:
-    """Put what a clip shows into a folder of measured data, as a run whose remarks are warnings.
+    """Put a clip's experiment into a folder of measured data, as a run whose remarks are warnings.
 
     A clip that cannot be used leaves no folder.
     """
@@ -442,7 +443,7 @@ def track_into(
 
 
 def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
-    """What an experiment from a video comes to, in plain data."""
+    """Figures of an experiment from a video, in plain data."""
     m = found.motion
     lost = {n: int(np.isnan(p[:, 0]).sum()) for n, p in zip(m.names, m.places_mm, strict=True)}
     return {
@@ -461,7 +462,7 @@ def figures(found: Filmed, name: str, table: Path) -> dict[str, Any]:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """What came of a video, in a few lines."""
+    """Lines of text on a video's `summary`."""
     low, high = summary["pressure_kPa"]
     lines = [
         f"{summary['experiment']}: {summary['frames']} frames, {summary['duration_s']:.4g} s, "
