@@ -1,4 +1,4 @@
-"""The designer's seat in Blender; the only package that imports bpy, and no module of the core imports it."""
+"""The Blender extension; the only package that imports bpy, and no module of the core imports it."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ _MODULES = (
     "jobs.header",
     "shared.menus",
 )
-"""Modules with something to register, in the order they need each other."""
+"""Modules with something to register, in order of dependence."""
 
 _registered = False
 
 
 def register() -> None:
-    """Add classes, menus and handlers to Blender; where that fails, nothing is left behind."""
+    """Register classes, menus and handlers with Blender; on failure nothing is left behind."""
     global _registered
     if _registered:
         return
@@ -102,7 +102,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take everything out of Blender again and end the jobs that do not go on without it."""
+    """Unregister everything, and end the jobs that need Blender."""
     global _registered
     if _registered:
         _remove(_modules())

@@ -1,9 +1,8 @@
-"""Resins and printers from the asset browser: what is dropped on a unit becomes its parameters.
+"""Resins and printers dropped on a unit from the asset browser: they set its parameters.
 
-A resin is a material: dropped, Blender puts it into a slot of the unit's mesh. A printer is a box of its
-build volume: dropped, Blender adds it to the scene, and the nearest unit is meant. A moment later, from a
-timer, since no operator may be called while Blender tells of a change, the unit takes over what they stand
-for, in one undo step, and they go.
+A resin is a material: Blender puts it into a slot of the unit's mesh. A printer is a box of its build volume:
+Blender adds it to the scene, and the nearest unit gets it. No operator may be called in a depsgraph update,
+so a timer then applies their parameters to the unit, in one undo step, and removes them.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -25,7 +24,7 @@ from ..unit import drawing
 from ..unit import object as unit_object
 
 RESIN, PRINTER = "mu_resin", "mu_printer"
-"""On a material: its parameters as JSON, by section and name. On an object: the name of a shipped printer."""
+"""On a material: parameters as JSON, by section and name. On an object: the name of a shipped printer."""
 
 
 class MU_OT_take_asset(bpy.types.Operator):
@@ -71,7 +70,7 @@ def _take_resin(root: Any, resin: Any) -> None:
 
 
 def _restore_slots(root: Any) -> None:
-    """Take resins out of a unit's slots, which have the colours of its parts."""
+    """Remove resins from a unit's slots, which hold the colours of its parts."""
     usual = drawing.SLOTS if root.data == root.mu_unit.preview else ()
     # Struts have their colour from nodes: over them Blender makes a slot more.
     while usual and len(root.data.materials) > len(usual) and root.data.materials[-1].get(RESIN):
@@ -118,7 +117,7 @@ def waiting() -> tuple[str, str] | None:
 
 
 def take() -> None:
-    """Have a unit take what was dropped on it, with one undo step."""
+    """Apply a dropped asset to its unit, with one undo step."""
     found = waiting()
     if found is not None and bpy.context.mode == "OBJECT":
         unit, asset = found
@@ -132,7 +131,7 @@ def _later() -> None:
 
 
 _restoring = False
-"""Whether undo or redo is at work: what they bring back was dropped before."""
+"""True during undo or redo: restored assets were dropped before."""
 
 
 @persistent
@@ -143,7 +142,7 @@ def _begin_restoring(*_: Any) -> None:
 
 @persistent
 def _restored(*_: Any) -> None:
-    """Take away what undo has brought back from between a drop and its taking: the drop is undone, too."""
+    """Remove a drop that undo restored before it was applied: the drop itself is undone, too."""
     global _restoring
     while (found := waiting()) is not None:
         root, box = unit_object.by_uuid(found[0]), bpy.context.scene.objects.get(found[1])
@@ -171,13 +170,13 @@ _register, _unregister = bpy.utils.register_classes_factory((MU_OT_take_asset,))
 
 
 def register() -> None:
-    """The operator, and a look after each change."""
+    """Register the operator, and handlers that look for drops."""
     _register()
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_later):
         bpy.app.timers.unregister(_later)

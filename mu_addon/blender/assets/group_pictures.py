@@ -1,4 +1,4 @@
-"""What the asset browser shows of a node group: its result on a small curve, mesh or cloud of points."""
+"""Previews of node groups for the asset browser: their result on a small curve, mesh or point cloud."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = np.ndarray[Any, Any]
 
 
 def group_pixels(name: str, size: int) -> Array:
-    """Pixels (size, size, 4) of what the group of that name makes, from 0 to 1, rows from the bottom up."""
+    """Pixels (size, size, 4) of a group's result, from 0 to 1, rows from the bottom up."""
     mesh, inputs = _SAMPLES[name]()
     obj = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(obj)
@@ -119,4 +119,4 @@ _SAMPLES: dict[str, Callable[[], tuple[Any, dict[str, Any]]]] = {
     nodes.waveguide.NAME: _waveguide,
     nodes.field.NAME: _field,
 }
-"""By a group's name: a new mesh that it is shown on, and its inputs."""
+"""By a group's name: a new mesh for its preview, and its inputs."""

@@ -1,8 +1,8 @@
 """Presets and node groups as an asset library of the user's, written by the Blender that will read it.
 
-One that came in the archive would be of one Blender's format and nodes; this one fits the Blender at hand.
-A preset is an object: dropped into a scene it is a unit of its own. A resin is a material, a printer a box
-of its build volume: dropped on a unit they become its parameters, see `dropped`.
+An archive's library would be in one Blender's format and nodes; this one fits the running Blender. A preset
+is an object: dropped into a scene it is a unit. A resin is a material, a printer a box of its build volume:
+dropped on a unit they set its parameters, see `dropped`.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ UNITS_CATALOGUE = "2d1c1c0e-8d0f-4b5e-9a55-6f6c2f0f4a10"
 CATALOGUES = "blender_assets.cats.txt"
 _PIXELS = 128
 _OWN = ", your own"
-"""After the title of a user's preset that is called as one of the extension's."""
+"""Suffix of the title of a user's preset with the name of a shipped one."""
 
 
 def write() -> Path:
-    """Write presets, node groups and catalogues into the user's folder; returns it. Raises OutputError."""
+    """Write presets, node groups and catalogues into the user's folder; return it. Raises OutputError."""
     folder = user_folder("assets")
     before, materials = set(bpy.data.node_groups), set(bpy.data.materials)
     groups = {nodes.group(name) for name in nodes.GROUPS}
@@ -70,7 +70,7 @@ def write_units(target: Path) -> None:
 
 
 def _titles() -> dict[str, str]:
-    """What every preset is called in the asset browser, by its name."""
+    """Title of every preset in the asset browser, by its name."""
     titles: dict[str, str] = {}
     for name in presets.names():
         title = name.removeprefix(presets.USER)
@@ -80,9 +80,9 @@ def _titles() -> dict[str, str]:
 
 @contextmanager
 def _set_aside(names: set[str]) -> Iterator[None]:
-    """Objects, meshes and materials of this file that have one of these names have another one meanwhile.
+    """Rename this file's objects, meshes and materials of these names temporarily.
 
-    Names are unique in a file: beside a unit called as its preset the preset would be "mu-1.0x.001".
+    Names are unique in a file: beside a unit with its preset's name, the preset would be "mu-1.0x.001".
     """
     data = [
         d
@@ -150,7 +150,7 @@ def write_resins_and_printers(target: Path) -> None:
 
 
 def _picture(data: Any, pixels: np.ndarray[Any, Any]) -> None:
-    """Give an asset the picture (_PIXELS, _PIXELS, 4) that the asset browser shows."""
+    """Set the preview (_PIXELS, _PIXELS, 4) of an asset in the asset browser."""
     preview = data.preview_ensure()
     preview.image_size = (_PIXELS, _PIXELS)
     preview.image_pixels_float.foreach_set(pixels.astype(np.float32).ravel())
@@ -166,7 +166,7 @@ def _write(target: Path, data: set[Any]) -> None:
 
 
 def listed() -> Any | None:
-    """The entry of the user's asset libraries that shows the folder, or None."""
+    """Entry of the user's asset libraries for the folder, or None."""
     folder = user_folder("assets").resolve()
     libraries = bpy.context.preferences.filepaths.asset_libraries
     return next((entry for entry in libraries if entry.path and Path(entry.path).resolve() == folder), None)
@@ -181,7 +181,7 @@ def add() -> Path:
 
 
 def remove() -> None:
-    """Take the folder out of the user's asset libraries, and the files out of the folder."""
+    """Remove the folder from the user's asset libraries, and the files from the folder."""
     entry = listed()
     if entry is not None:
         bpy.context.preferences.filepaths.asset_libraries.remove(entry)

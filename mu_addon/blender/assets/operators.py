@@ -65,7 +65,7 @@ class MU_OT_skin(bpy.types.Operator):
 
 
 class MU_OT_sample(bpy.types.Operator):
-    """Add a sample: an overview, or what one task begins with"""
+    """Add a sample scene: an overview, or the start of one task"""
 
     bl_idname = "mu.sample"
     bl_label = "Sample Scene"

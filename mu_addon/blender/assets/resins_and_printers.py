@@ -1,4 +1,4 @@
-"""The shipped resins and printers as assets: what they are in a file, and their pictures."""
+"""Shipped resins and printers as assets: their data in a file, and their pictures."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), 
 
 
 def names_of_all() -> set[str]:
-    """What the shipped resins and printers are called in a file."""
+    """Names of the shipped resins and printers in a file."""
     return {load_printer(name).title for name in asset_names("printers")} | {r.name for r in _resins()}
 
 
 def _resins() -> list[Any]:
-    """The shipped resins; none without the solver's packages, which reading a law loads."""
+    """Shipped resins; empty without the solver's packages, which reading a law loads."""
     try:
         from ...materials import load_material, material_names
     except (ImportError, OSError, RuntimeError):
@@ -38,7 +38,7 @@ def _resins() -> list[Any]:
 
 
 def resins() -> list[Any]:
-    """A new material for every shipped resin, with what it makes of a unit's parameters."""
+    """A new material for every shipped resin, with the unit's parameters that it sets."""
     made = []
     for resin in _resins():
         found = bpy.data.materials.new(resin.name)

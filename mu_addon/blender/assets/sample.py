@@ -1,4 +1,4 @@
-"""Sample scenes: what the extension makes, side by side, and one for each task, by a designer's operators."""
+"""Sample scenes: an overview of the extension, and one for each task, made by the user's operators."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ APART_MM = 130.0
 
 
 def build(context: Any, name: str = "overview") -> list[Any]:
-    """The sample scene of that name, in view; its roots."""
+    """Build the sample scene of that name, in view; return its roots."""
     return SCENES[name][1](context)
 
 
 def _overview(context: Any) -> list[Any]:
-    """Three units in the scene, whole, cut open with paths, and in a body, and a curve; the roots."""
+    """Add three units, whole, cut open with paths, and in a body, and a curve; return the roots."""
     cursor = context.scene.cursor.location.copy()
     roots = []
     try:
@@ -120,7 +120,7 @@ SCENES: dict[str, tuple[str, Callable[[Any], list[Any]]]] = {
     "measured": ("A unit with measured data, ready for Diagnose", _measured),
     "tree": ("A unit that follows the node tree of its steps", _tree),
 }
-"""Sample scenes by name: what is in it, and what makes it."""
+"""Sample scenes by name: their description, and the function that makes them."""
 
 
 def _beside(context: Any, number: int) -> Any:
@@ -152,7 +152,7 @@ def _barrel(context: Any, root: Any) -> Any:
 
 
 def _curve(context: Any, at: Any) -> Any:
-    """A curve of the user's own kind, with a waveguide and its wells along it."""
+    """A user's curve, with a waveguide and its wells along it."""
     curve = bpy.data.curves.new("Own Curve", "CURVE")
     curve.dimensions = "3D"
     spline = curve.splines.new("BEZIER")

@@ -1,6 +1,6 @@
 """A small picture of a surface by numpy alone, seen from +x and a little from above and the side.
 
-Blender's window waits for it, and the renderer of reports would first load Warp.
+It blocks Blender's window, and the renderer of reports would first load Warp.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A body of the user's own: check it, make it the unit's envelope, take it out again."""
+"""The user's own body: check it, make it the unit's envelope, remove it."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -33,7 +33,7 @@ def selected_mesh(context):
 
 
 def report_flaws(operator, root, found, sound):
-    """Mark the places of a body's flaws and report what they are; the text `sound` where there are none."""
+    """Mark the locations of a body's flaws and report them; the text `sound` if there are none."""
     unit_object.mark(root, [place for flaw in found for place in flaw.places])
     if not found:
         operator.report({"INFO"}, sound)

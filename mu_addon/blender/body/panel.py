@@ -1,4 +1,4 @@
-"""The part of the panel Lattice for an envelope of the user's own."""
+"""The part of the panel Lattice for the user's own envelope."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bodies of the user's own: a selected mesh, taken into a unit's frame, examined by the core, and kept."""
+"""The user's own bodies: a selected mesh in a unit's frame, checked by the core, and kept."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def arrays_of(obj: Any, root: Any) -> tuple[Any, Any]:
 
 
 def put_repaired(obj: Any, root: Any, mended: Repair) -> Any:
-    """A new object with a repaired surface in place of an object, which is hidden; it is selected."""
+    """Replace an object, which is hidden, by a new one with a repaired surface, and select that."""
     mesh = bpy.data.meshes.new(f"{obj.name} repaired")
     mesh.from_pydata(mended.vertices.tolist(), [], mended.triangles.tolist())
     copy = bpy.data.objects.new(mesh.name, mesh)
@@ -56,7 +56,7 @@ def put_repaired(obj: Any, root: Any, mended: Repair) -> Any:
 
 
 def examined(body: Body, d: Dimensions) -> list[Flaw]:
-    """Why a body cannot be the envelope of a unit of these dimensions."""
+    """Reasons why a body cannot be the envelope of a unit of these dimensions."""
     return flaws(body) or misfits(body, d)
 
 

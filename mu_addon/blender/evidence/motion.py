@@ -1,8 +1,8 @@
-"""Measured and simulated motion side by side on the timeline: a dial of the angle, markers on the unit.
+"""Measured and simulated motion together on the timeline: a dial of the angle, markers on the unit.
 
-Objects are known by the custom property `EVIDENCE`: "SERIES|WHAT", where SERIES is measured, model or
-extended, and WHAT the angle, a marker, the dial or the key to the colours. They are children of one hidden
-object of the unit's root: to a parent that is seen Blender would draw a dashed line from each.
+Objects are identified by the custom property `EVIDENCE`: "SERIES|WHAT", where SERIES is measured, model or
+extended, and WHAT the angle, a marker, the dial or the key to the colours. Their parent is a hidden child of
+the unit's root: Blender draws a dashed line to a visible parent.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LOOKS = {
     "extended": ("Extended Model", "MU Extended Model"),
 }
 RANGE_DEG = 70
-"""Half of what the dial shows."""
+"""Half of the dial's range."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -38,18 +38,18 @@ def parts(root: Any) -> list[Any]:
 
 
 def shown(root: Any) -> str:
-    """Name of the experiment that is shown, or nothing."""
+    """Name of the experiment that is shown, or ""."""
     return next((part[EXPERIMENT] for part in parts(root)), "")
 
 
 def hide(root: Any) -> None:
-    """Take the measured motion out of the scene."""
+    """Remove the measured motion from the scene."""
     for part in parts(root):
         displays.remove(part)
 
 
 def show(root: Any, name: str, course: Course, scene: Any) -> None:
-    """Show an experiment on the scene's timeline, in its own time, in place of any other."""
+    """Show an experiment on the scene's timeline, in its own time, replacing any other."""
     hide(root)
     frame = _linked(root, FRAME, "Evidence", None)
     frame.hide_viewport = frame.hide_render = True
@@ -123,7 +123,7 @@ def reading(root: Any, scene: Any) -> tuple[float, dict[str, float]]:
 
 
 def _animate(part: Any, path: str, channels: dict[int, Any], frames: Any) -> None:
-    """Let channels of a property follow values (n,); where one is missing, the object is not there."""
+    """Animate channels of a property by values (n,); where one is missing, the object is hidden."""
     values = np.array(list(channels.values()))
     seen = np.isfinite(values).all(axis=0)
     for index, row in zip(channels, values, strict=True):
@@ -194,7 +194,7 @@ def _dial(long: float) -> tuple[Any, Any]:
 
 
 def _needle(long: float, row: int) -> tuple[Any, Any]:
-    """A needle that points along z, the later ones shorter and in front: none hides another."""
+    """A needle along z; later ones are shorter and in front, so that none hides another."""
     wide, x = 0.08 * long, 0.01 * long * (row + 1)
     tip = (1.0 - 0.25 * row) * long
     vertices = [(x, -wide / 2, 0.0), (x, wide / 2, 0.0), (x, 0.0, tip), (x, 0.0, -0.12 * long)]

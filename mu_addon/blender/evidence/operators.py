@@ -20,7 +20,7 @@ NO_DATA = "Choose a folder of measured data first"
 
 
 def _current(context):
-    """The unit's root and what was diagnosed of it, or None and why there is nothing to use."""
+    """The unit's root and its diagnosis, or None and why there is none to use."""
     root = unit_object.active_root(context)
     found = evidence.diagnosis(root)
     if found is None or not found.name:
@@ -158,7 +158,7 @@ class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_evidence_protocol(UnitOperator, bpy.types.Operator):
-    """Let the unit's next simulation follow an experiment's pressures, so that both play in the same time"""
+    """Use an experiment's pressures for the unit's next simulation, so that both play in the same time"""
 
     bl_idname = "mu.evidence_protocol"
     bl_label = "Simulate These Pressures"

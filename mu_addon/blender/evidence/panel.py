@@ -1,4 +1,4 @@
-"""The panel Evidence of the sidebar tab MU: measured data, their verdict, and what to do with it."""
+"""The panel Evidence of the sidebar tab MU: measured data, their verdict, and actions on it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from . import state as evidence
 
 JOB = "evidence_"
 ROWS = 5
-"""Rows of the dependence table that are shown; the report has them all."""
+"""Number of rows of the dependence table that are shown; the report has them all."""
 ICONS = {"none": "CHECKMARK", "named": "LIGHT", "ambiguous": "QUESTION"}
 ICONS |= {"unidentifiable": "QUESTION", "unexplained": "ERROR"}
 
@@ -54,7 +54,7 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
 
 
 def _experiments(layout, context, root, measured):
-    """A line an experiment, with a button that plays it; then what the reader remarked."""
+    """A line for each experiment, with a button that plays it; then the reader's remarks."""
     shown = evidence_motion.shown(root)
     column = layout.column(align=True)
     for e in measured.experiments:

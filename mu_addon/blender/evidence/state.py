@@ -1,4 +1,4 @@
-"""A unit's measured data and what was diagnosed from them, read again only when files change."""
+"""A unit's measured data and their diagnosis, read again only when files change."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -30,13 +30,13 @@ from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit
 FOLDER = "evidence"
 """Folder of the diagnosis in the unit's study folder."""
 PROTOCOL = "measured-pressures.csv"
-"""Pressures of an experiment, in the unit's study folder, for a simulation to follow."""
+"""An experiment's pressures, in the unit's study folder, for a simulation to follow."""
 AT_REST = 0.02
 """A record that begins within this share of its range of 0 begins at rest."""
 MODEL, REPORT, RESIDUALS = "model.toml", "report.html", "residuals.csv"
 NAMES = {"none": "No effect found", "named": "Named", "ambiguous": "Ambiguous"}
 NAMES |= {"unidentifiable": "Not identifiable", "unexplained": "Unexplained"}
-"""Verdicts as they are headed."""
+"""Verdicts by their headings."""
 
 
 class MU_PG_evidence(bpy.types.PropertyGroup):
@@ -63,7 +63,7 @@ class MeasuredFolder:
 
 @attrs.frozen(eq=False)
 class Diagnosis:
-    """What a diagnosis found: verdict.json and summary.json; stale: why it is not of the unit now."""
+    """Result of a diagnosis: verdict.json and summary.json; stale: why it does not belong to the unit now."""
 
     folder: Path
     status: str
@@ -73,12 +73,12 @@ class Diagnosis:
 
     @property
     def name(self) -> str:
-        """Its verdict, one of the keys of `NAMES`, or nothing where the run did not come to its end."""
+        """Verdict, one of the keys of `NAMES`, or "" where the run is not complete."""
         return str(self.verdict.get("verdict", "")) if self.status == "complete" else ""
 
     @property
     def dependence(self) -> list[tuple[str, float, str]]:
-        """What the base model's residuals depend on: name, p-value and where, smallest p-value first."""
+        """Quantities that the base model's residuals depend on: name, p-value and where, by p-value."""
         rows = self.verdict.get("residual_table") or []
         found = [(str(r["against"]), float(r["p_value"]), str(r.get("where") or "")) for r in rows]
         return sorted(found, key=lambda row: row[1])
@@ -118,7 +118,7 @@ def _read_data(folder: Path) -> MeasuredFolder:
 
 
 def diagnosis(root: Any) -> Diagnosis | None:
-    """What the diagnosis in the unit's folder found, or None where there is none."""
+    """Result of the diagnosis in the unit's folder, or None."""
     folder = folder_of(root)
     files = [folder / name for name in ("summary.json", "verdict.json", "diagnose.toml", "unit.toml")]
     known = _runs.read(files, lambda: _read_run(*files))
@@ -143,7 +143,7 @@ def _read_run(
 
 
 def write_inputs(root: Any, folder: Path) -> None:
-    """Write what the unit's diagnosis is asked to do into its folder; raises InputError and OutputError."""
+    """Write the inputs of the unit's diagnosis into its folder; raises InputError and OutputError."""
     # Only now: it brings in the solver's packages, which a Blender may lack.
     from ...usecases.diagnose.job import LAYOUT, Job
 
@@ -174,15 +174,15 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
 
 
 def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:
-    """Remember, on the unit as it is before, that it gets the diagnosis's model.
+    """Record, on the unit in its present state, that it gets the diagnosis's model.
 
-    In words what its parameters get, and what its simulation gets beside them.
+    In words: the part for its parameters, and the part for its simulation.
     """
     root.mu_evidence.applied = "\n".join([_model(root), _having(root), to_unit_, to_simulation])
 
 
 def applied(root: Any) -> str:
-    """What of the diagnosis's model the unit has, in words, or nothing: given twice it would count twice."""
+    """Part of the diagnosis's model that the unit has, in words, or "": twice it would count twice."""
     model, before, to_unit_, to_simulation = (*root.mu_evidence.applied.split("\n"), "", "", "", "")[:4]
     try:
         now = _having(root)
@@ -224,7 +224,7 @@ SERIES = {"base_model": "model", "extended_model": "extended"}
 
 
 def course(root: Any, name: str) -> Course | None:
-    """A unit_pressure experiment with what the diagnosis predicted of it, or None where there is no such."""
+    """A unit_pressure experiment with the diagnosis's prediction of it, or None."""
     found, judged = measured_data(root), diagnosis(root)
     every = found.measured.of("unit_pressure") if found and found.measured else ()
     e = next((e for e in every if e.name == name), None)
@@ -238,7 +238,7 @@ def course(root: Any, name: str) -> Course | None:
 
 
 def _predicted(path: Path, e: Any) -> dict[str, dict[str, Any]]:
-    """The columns of residuals.csv that are of an experiment, at its rows."""
+    """Columns of residuals.csv for an experiment, at its rows."""
     place = {int(row): i for i, row in enumerate(e.rows)}
     found: dict[str, dict[str, Any]] = {name: {} for name in SERIES.values()}
     try:
@@ -261,7 +261,7 @@ def _predicted(path: Path, e: Any) -> dict[str, dict[str, Any]]:
 
 
 def write_protocol(course: Course, path: Path) -> Path:
-    """Write an experiment's pressures as a protocol; raises InputError where it does not begin at rest."""
+    """Write an experiment's pressures as a protocol; raises InputError if it does not begin at rest."""
     time, pressure = course.time_s - course.time_s[0], course.pressure_kPa.copy()
     if abs(pressure[0]) > AT_REST * np.ptp(pressure):
         raise InputError(

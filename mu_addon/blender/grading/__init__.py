@@ -1,1 +1,1 @@
-"""Struts graded by hand: a factor on their diameters painted cell by cell."""
+"""Manual grading of struts: a factor on their diameters painted cell by cell."""

@@ -1,4 +1,4 @@
-"""Paint factors on the struts' diameters, cell by cell, and take them over into the unit."""
+"""Paint factors on the struts' diameters, cell by cell, and apply them to the unit."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -13,7 +13,7 @@ from . import state
 
 
 def _leave(context, root):
-    """Back to the unit, in object mode, without the object that was painted on."""
+    """Return to the unit, in object mode, and remove the painted object."""
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     displays.remove(state.painted_on(root))
@@ -57,7 +57,7 @@ class _WhilePainting(UnitOperator):
 
 
 class MU_OT_paint_struts_apply(_WhilePainting, bpy.types.Operator):
-    """Give the struts of each cell the factor that was painted, on both sides of the bending plane"""
+    """Give the struts of each cell the painted factor, on both sides of the bending plane"""
 
     bl_idname = "mu.paint_struts_apply"
     bl_label = "Apply"

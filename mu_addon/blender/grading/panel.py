@@ -9,7 +9,7 @@ PAINTED = "Weight 0.5 leaves struts as they are, 0 halves their diameter, 1 doub
 
 
 def draw(layout, root) -> None:
-    """Paint, or apply and discard while there is something painted."""
+    """Draw buttons to paint, or to apply and discard a painting."""
     if state.painted_on(root) is None:
         layout.operator("mu.paint_struts", icon="WPAINT_HLT")
         return

@@ -1,4 +1,4 @@
-"""The object that is painted on: a cube in each cell, whose weights are factors on its struts' diameters."""
+"""The painted object: a cube in each cell, whose weights are factors on its struts' diameters."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def factors_on(obj: Any, field: Field) -> np.ndarray[Any, Any]:
 
 
 def weights_of(factors: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Weights from 0 to 1 of factors: by their logarithm, 0.5 where struts stay as they are."""
+    """Weights from 0 to 1 of factors: by their logarithm, 0.5 for factor 1."""
     return np.clip(np.log(factors / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""The grasp on the timeline: both fingers and the cube, as the latest run found them."""
+"""The grasp on the timeline: both fingers and the cube, of the latest run."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def show(root: Any, scene: Any) -> None:
 
 
 def hide(root: Any) -> None:
-    """Take the grasp out of the scene; its files stay."""
+    """Remove the grasp from the scene; its files stay."""
     for obj in parts(root):
         displays.remove(obj)
     _hide_preview(root, False)
 
 
 def _hide_preview(root: Any, hidden: bool) -> None:
-    """Draw the gripper without what the grasp shows in its place, or whole again."""
+    """Hide the parts of the gripper that the grasp shows, or show it whole again."""
     cube = gripper_object.part(root, "cube")
     if cube is not None:
         cube.hide_viewport = cube.hide_render = hidden

@@ -1,6 +1,6 @@
 """A gripper in the scene: one mesh object that holds its parameters, with both fingers and the plate.
 
-The cube is a child, known by the custom property `mu_grip`; frame and places are the core's.
+The cube is a child, identified by the custom property `mu_grip`; frame and positions are the core's.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from ..unit.fields import exact
 from .properties import PARAMETERS_CHANGED, from_gripper, to_gripper
 
 PART = displays.GRIPPER
-"""Marks the parts beside the gripper's own mesh: `cube`, and what plays the grasp."""
+"""Mark of the parts beside the gripper's own mesh: `cube`, and those that play the grasp."""
 MOVING = "moving:"
-"""What the names of the parts that play the grasp begin with: `moving:SIDE`, `moving:cube`."""
+"""Prefix of the names of the parts that play the grasp: `moving:SIDE`, `moving:cube`."""
 SIDES = ("left", "right")
 SHOWN = ("membranes", "struts", "wells")
 """Steps of a finger's unit that are drawn."""
 BEYOND_MM = 3.0
-"""The cube's middle beyond the tips where it is put first, as the core's `Grip` has it; that cannot be asked
-without the solver."""
+"""Initial distance of the cube's middle beyond the tips, equal to the core's `Grip`, which needs the solver.
+"""
 
 
 def roots() -> list[Any]:
-    """All grippers of this file; those of linked libraries are none of them."""
+    """All grippers of this file, without those of linked libraries."""
     return [o for o in bpy.data.objects if o.mu_gripper.uuid and displays.editable(o)]
 
 
 def active(context: Any) -> Any | None:
-    """The gripper to work on: that of the active object, or the only one there is if no unit is worked on."""
+    """Gripper to work on: that of the active object, or the only one if no unit is worked on."""
     obj = unit_object.active_object(context)
     while obj is not None:
         if obj.mu_gripper.uuid:
@@ -69,7 +69,7 @@ def create(context: Any, gripper: Gripper) -> Any:
 
 
 def delete(root: Any) -> None:
-    """Remove a gripper with all that shows it; children of the user's own stay."""
+    """Remove a gripper with its displays; the user's own children stay."""
     mesh = root.data
     for child in root.children_recursive:
         if child.get(displays.OWNER) == root.mu_gripper.uuid:
@@ -80,7 +80,7 @@ def delete(root: Any) -> None:
 
 
 def rebuild(root: Any) -> bool:
-    """Draw the gripper from its parameters; where they break a rule the last good one stays."""
+    """Draw the gripper from its parameters; if they break a rule the last valid one stays."""
     props = root.mu_gripper
     if root.mode == "EDIT":
         return not props.trouble
@@ -116,7 +116,7 @@ def _draw(root: Any, gripper: Gripper) -> None:
 
 
 def beyond_mm(root: Any) -> float:
-    """How far beyond the tips the cube's middle is, where the user has it."""
+    """Distance of the cube's middle beyond the tips, as placed by the user."""
     cube = part(root, "cube")
     if cube is None:
         return BEYOND_MM
@@ -133,7 +133,7 @@ def put_box(root: Any, name: str, low: Any, high: Any, material: str) -> Any:
 
 
 def new_part(root: Any, name: str) -> Any:
-    """A new part of the gripper, locked in its place."""
+    """Add a part of the gripper, with its transform locked."""
     title = name.replace(":", " ").capitalize()
     return displays.lock(displays.add(root, PART, name, bpy.data.meshes.new(title)))
 
@@ -144,10 +144,10 @@ def _parameters_changed(root: Any) -> None:
 
 
 def register() -> None:
-    """Rebuild a gripper when its parameters change."""
+    """Connect the rebuild to changes of a gripper's parameters."""
     PARAMETERS_CHANGED.connect(_parameters_changed)
 
 
 def unregister() -> None:
-    """Rebuild it no more."""
+    """Disconnect it."""
     PARAMETERS_CHANGED.disconnect(_parameters_changed)

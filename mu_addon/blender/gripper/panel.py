@@ -1,4 +1,4 @@
-"""The panel Monolithic Gripper of the sidebar tab MU: its parameters, its grasp, and what that found."""
+"""The panel Monolithic Gripper of the sidebar tab MU: its parameters, its grasp, and the results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import state as grasps
 
 JOB = "grasp_"
 PHASES = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
-"""Phases of a grasp in a word; the core's `grip.phases.MEANING` has them in full."""
+"""Phases of a grasp in one word; the core's `grip.phases.MEANING` describes them."""
 
 
 class GripperPanel(RootPanel):
@@ -25,7 +25,7 @@ class GripperPanel(RootPanel):
 
 
 class MU_PT_gripper(GripperPanel, bpy.types.Panel):
-    """The gripper that is worked on"""
+    """The active gripper"""
 
     bl_idname = "MU_PT_gripper"
     bl_label = "Monolithic Gripper"

@@ -1,4 +1,4 @@
-"""A gripper's parameters on its root object: generated from the core's, and what it is to grasp."""
+"""A gripper's parameters on its root object: generated from the core's, and the settings of its grasp."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -128,7 +128,7 @@ CLASSES = (*GROUPS.values(), MU_PG_gripper)
 
 
 def to_gripper(props) -> Gripper:
-    """The core's gripper that the properties stand for; raises InputError where a rule is broken."""
+    """The core's gripper from the properties; raises InputError where a rule is broken."""
     sections = {}
     for section in SECTIONS:
         group = getattr(props, section.section)

@@ -1,4 +1,4 @@
-"""Grasps of a gripper in the scene: the job that is asked for, and what it has found."""
+"""Grasps of a gripper in the scene: the job, and its results."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", h
 
 
 def job_of(root: Any) -> Job:
-    """The grasp that a gripper's properties ask for; raises InputError."""
+    """Grasp job from a gripper's properties; raises InputError."""
     # Only now: they bring in the solver's packages, which a Blender may lack.
     from ...meshing.settings import HOMOGENISED, RESOLVED
     from ...usecases.grip.grasp import Cube, Grip
@@ -56,7 +56,7 @@ def job_of(root: Any) -> Job:
 
 
 def write_inputs(root: Any, folder: Path) -> None:
-    """Write what the gripper's job is asked to do into its folder; raises InputError and OutputError."""
+    """Write the inputs of the gripper's job into its folder; raises InputError and OutputError."""
     job = job_of(root)
     from ...usecases.grip.job import LAYOUT
 
@@ -69,7 +69,7 @@ def _side(props: Any) -> float:
 
 @attrs.frozen(eq=False)
 class Grasped:
-    """What a grasp found: figures by name, and whether the gripper or the cube were changed since.
+    """Results of a grasp: figures by name, and True if the gripper or the cube were changed since.
 
     rows: of the grasp at times `time_s` (k,): `phase` (k,) and by name of the CSV's column (k,).
     """

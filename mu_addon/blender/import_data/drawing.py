@@ -8,7 +8,7 @@ from ..shared.panels import wrapped
 
 
 def draw_import(layout, root):
-    """The button that imports files, and the questions of an import that is under way."""
+    """Draw the button that imports files, and the questions of an import in progress."""
     state = root.mu_import
     if not state.files:
         layout.operator("mu.import_files", icon="IMPORT")

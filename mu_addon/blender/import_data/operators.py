@@ -1,4 +1,4 @@
-"""Import files; what they do not say is asked in the panel."""
+"""Import of files; missing information is asked for in the panel."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -15,12 +15,12 @@ from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
 FOLDER = "measured"
-"""Folder of imported data in the unit's study folder, where no folder of measured data is chosen."""
+"""Folder of imported data in the unit's study folder, if no folder of measured data is chosen."""
 ENDINGS = "*.csv;*.txt;*.tsv;*.dat;*.tra;*.xlsx;*.xls;*.xlsm;*.xlsb;*.ods"
 
 
 class MU_OT_import_files(UnitOperator, bpy.types.Operator):
-    """Read files as test machines and data loggers export them into the unit's measured data"""
+    """Read files exported by test machines and data loggers into the unit's measured data"""
 
     bl_idname = "mu.import_files"
     bl_label = "Import Files..."
@@ -84,7 +84,7 @@ class MU_OT_import_cancel(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_import_page(UnitOperator, bpy.types.Operator):
-    """Open the page that shows what was understood of the files"""
+    """Open the page that shows how the files were read"""
 
     bl_idname = "mu.import_page"
     bl_label = "What Was Understood"
@@ -103,13 +103,13 @@ class MU_OT_import_page(UnitOperator, bpy.types.Operator):
 
 
 def _folder(root):
-    """The unit's folder of measured data, or the one that imported files make."""
+    """The unit's folder of measured data, or a new one for imported files."""
     given = root.mu_evidence.folder
     return Path(bpy.path.abspath(given)) if given else studies.assign_folder(root) / FOLDER
 
 
 def _import(operator, root):
-    """Import what the answers allow; the questions that are left stand in the panel."""
+    """Import the experiments without open questions; the panel shows the questions left."""
     # Only now: charts bring in matplotlib.
     from ...usecases.import_data.run import write, write_page
     from ...usecases.import_data.understood import understand

@@ -1,4 +1,4 @@
-"""Files on their way into a unit's measured data, and the questions that they leave open."""
+"""Files being imported into a unit's measured data, and their open questions."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -9,12 +9,12 @@ from ..shared.registration import property_group_factory
 
 
 def _offered(self, context, typed):
-    """The answers that a question offers."""
+    """Answers that a question offers."""
     return [choice for choice in self.choices.split("\n") if typed.casefold() in choice.casefold()]
 
 
 class MU_PG_import_answer(bpy.types.PropertyGroup):
-    """A question that files leave open, and its answer."""
+    """An open question of an import, and its answer."""
 
     key: StringProperty(options={"HIDDEN"})
     words: StringProperty(options={"HIDDEN"})
@@ -30,7 +30,7 @@ class MU_PG_import_answer(bpy.types.PropertyGroup):
 
 
 class MU_PG_import(bpy.types.PropertyGroup):
-    """Files on their way into a folder of measured data."""
+    """Files being imported into a folder of measured data."""
 
     files: StringProperty(options={"HIDDEN"})
     answers: CollectionProperty(type=MU_PG_import_answer, options={"HIDDEN"})

@@ -1,1 +1,1 @@
-"""Jobs in child processes: `start_child` starts and watches them, `child_main` is what they run."""
+"""Jobs in child processes: `start_child` starts and watches them, `child_main` runs in them."""

@@ -1,7 +1,7 @@
-"""What a child process runs, without bpy: `python child_main.py resume FOLDER --json`.
+"""Entry point of a child process, without bpy: `python child_main.py resume FOLDER --json`.
 
-It makes the package it lies in importable as `mu_addon`, whatever Blender calls it. The processes that it
-starts run these lines, too, and find the package the same way.
+It makes its own package importable as `mu_addon`, whatever Blender calls it. Processes that it starts run
+these lines, too, and find the package likewise.
 """
 
 import ctypes.util
@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 WITHOUT_SOLVER = (
     "presets", "design", "check", "export", "specimens", "ports", "stream", "record", "replay", "calibrate",
 )  # fmt: skip
-"""Commands for design, the printer and the sensor on the bench: they need no solver."""
+"""Commands for design, the printer and the sensor on the bench, which need no solver."""
 
 
 def _provide_package():
@@ -31,7 +31,7 @@ def _provide_package():
 
 
 def _provide_gmsh():
-    """Tell gmsh where its library is: Blender unpacks wheels without moving their data into place."""
+    """Let gmsh find its library: Blender unpacks wheels without installing their data."""
     find = ctypes.util.find_library
 
     def found(name):
@@ -52,7 +52,7 @@ os.environ["MU_ENTRY"] = str(Path(__file__).resolve())
 
 
 def _trouble(solves):
-    """Why a command cannot run here, as an error message, or None. solves: whether it needs the solver."""
+    """Error message if a command cannot run here, or None. solves: True if it needs the solver."""
     try:
         import attrs  # noqa: F401
 
@@ -76,7 +76,7 @@ def _trouble(solves):
 
 
 def _command(arguments):
-    """Name of the command, for `resume` that of the run in its folder where it needs no solver."""
+    """Name of the command, for `resume` that of the folder's run if it needs no solver."""
     if arguments[0] != "resume":
         return arguments[0]
     runs = (name for name in WITHOUT_SOLVER if Path(arguments[1], f"{name}.toml").is_file())
@@ -84,14 +84,14 @@ def _command(arguments):
 
 
 def main(arguments):
-    """Exit status of one command line of the core, in a process that is watched."""
+    """Run one command line of the core in a watched process; return its exit status."""
     ends_with_input = bool(os.environ.get("MU_ENDS_WITH_INPUT"))
     watched = importlib.import_module("mu_addon.cli.watched")
     return watched.run_watched(arguments, lambda: run(arguments), ends_with_input)
 
 
 def run(arguments):
-    """Exit status of one command line of the core; `check` alone only tells whether the solver loads."""
+    """Run one command line of the core; return its exit status. `check` only tests the solver."""
     helps = not arguments or "-h" in arguments or "--help" in arguments
     solves = not helps and (len(arguments) < 2 or _command(arguments) not in WITHOUT_SOLVER)
     trouble = _trouble(solves)

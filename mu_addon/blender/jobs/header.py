@@ -1,7 +1,7 @@
-"""Jobs at the right end of the status bar: the one that runs, how many wait, and a notice when one has ended.
+"""Jobs at the right end of the status bar: the running one, the queue's length, and a notice at its end.
 
-Nothing of Blender's own stands there that they would push aside. Where the user hides the status bar they are
-at the end of the 3D view's header.
+Blender shows nothing of its own there. If the user hides the status bar they are at the end of the 3D view's
+header.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -18,13 +18,13 @@ from . import start_child
 from .panel import shortened, whole
 
 WIDTH = 16
-"""Width of the bar in the interface's units: its words change, its place does not."""
+"""Width of the bar in units of the interface, fixed while its words change."""
 STAGE_LETTERS, NOTICE_LETTERS = 14, 64
-"""What fits: the name of a stage beside its number and the time left; a notice."""
+"""Letters that fit: a stage's name beside its number and the time left; a notice."""
 
 
 def listed() -> list[str]:
-    """Keys of the jobs that the header tells of: those that run, then those that wait."""
+    """Keys of the jobs in the header: running ones, then waiting ones."""
     return [key for key in start_child.running() if start_child.title_of(key)]
 
 
@@ -56,7 +56,7 @@ class MU_OT_job_cancel(bpy.types.Operator):
 
 
 class MU_OT_job_dismiss(bpy.types.Operator):
-    """Dismiss what is said of ended jobs, here and in their panels; their results stay"""
+    """Dismiss the notices of ended jobs, here and in their panels; their results stay"""
 
     bl_idname = "mu.job_dismiss"
     bl_label = "Dismiss"
@@ -76,7 +76,7 @@ class MU_OT_job_dismiss(bpy.types.Operator):
 
 
 class MU_MT_jobs(bpy.types.Menu):
-    """Jobs that run and wait, each with its own Cancel"""
+    """Running and waiting jobs, each with its own Cancel"""
 
     bl_idname = "MU_MT_jobs"
     bl_label = "Jobs"
@@ -98,12 +98,12 @@ class MU_MT_jobs(bpy.types.Menu):
 
 
 def draw(self, context) -> None:
-    """In the status bar: Cancel, queue and bar; or the notice of the job that ended last."""
+    """Draw, in the status bar, Cancel, queue and bar, or the notice of the job that ended last."""
     _jobs(self.layout)
 
 
 def draw_in_view(self, context) -> None:
-    """The same in the 3D view's header, where the status bar is hidden."""
+    """Draw the same in the 3D view's header, if the status bar is hidden."""
     if not context.screen.show_statusbar:
         _jobs(self.layout)
 
@@ -133,7 +133,7 @@ def _running(layout, keys: list[str]) -> None:
 
 
 def _words(key: str) -> str:
-    """How a job ended, in words."""
+    """Result of an ended job in words."""
     child, title = start_child.child_of(key), start_child.title_of(key)
     if child.state == DONE:
         return f"Done in {spell(child.seconds)}: {title}"
@@ -157,14 +157,14 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 
 
 def register() -> None:
-    """Operators, the menu, and the bar."""
+    """Register operators, the menu, and the bar."""
     _register_classes()
     bpy.types.STATUSBAR_HT_header.append(draw)
     bpy.types.VIEW3D_HT_header.append(draw_in_view)
 
 
 def unregister() -> None:
-    """Take them out again."""
+    """Unregister them."""
     bpy.types.VIEW3D_HT_header.remove(draw_in_view)
     bpy.types.STATUSBAR_HT_header.remove(draw)
     _unregister_classes()

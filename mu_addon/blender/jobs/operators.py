@@ -1,4 +1,4 @@
-"""The three operators that every kind of job has: cancel it, dismiss its message, open its files."""
+"""The three operators of every kind of job: cancel it, dismiss its message, open its files."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -16,14 +16,14 @@ from ..shared.operators import UnitOperator, open_file, reports_errors
 from .start_child import OWN_FOLDER, JobKind
 
 FILES = {"report": "report.html", "log": "log.ndjson", "errors": f"{OWN_FOLDER}/{ERRORS}", "folder": ""}
-"""What a run leaves in its folder, the folder itself last, by the name that `RUN_FILES` gives it."""
+"""Files that a run writes into its folder, the folder itself last, by their name in `RUN_FILES`."""
 RUN_FILES = [
     ("report", "Report", "Report of the run, in the browser"),
     ("log", "Log", "Every message of the run, as a text in Blender"),
     ("errors", "Errors", "What the process wrote to its error output, as a text in Blender"),
     ("folder", "Folder", "Folder of the run"),
 ]
-"""What can be opened of a run, as items of a property."""
+"""Files of a run that can be opened, as items of a property."""
 
 
 class _Cancel:
@@ -74,8 +74,8 @@ def job_operators(
     """Operator classes mu.PREFIXcancel, mu.PREFIXdismiss and mu.PREFIXopen of a kind of job.
 
     noun: the job in words; kept: what is left when it is stopped; first: what to do before there is a file;
-    base: operator of the object that has the job; items: what can be opened, its path given by
-    `path_of(root, what)`, by default in the folder of the run.
+    base: operator of the object with the job; items: files to open, with paths by `path_of(root, what)`, by
+    default in the run's folder.
     """
 
     def in_run(root: Any, what: str) -> Path:

@@ -1,4 +1,4 @@
-"""What panels show of a job: its button, its progress while it runs, and how it ended."""
+"""A job in panels: its button, its progress, and its result."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from ..shared.panels import CHARACTERS, alert, large_button, wrapped
 from ..shared.wording import in_panel
 
 STAGE_LETTERS = 20
-"""What fits into a panel's bar beside number and time left: a longer stage is numbered alone."""
+"""Letters that fit into a panel's bar beside number and time left; a longer stage is only numbered."""
 
 
 def start_button(layout, child, operator: str, icon: str, **settings) -> None:
-    """The button that starts a job, unless its child runs or waits."""
+    """Draw the button that starts a job, unless its child runs or waits."""
     if child is None or child.state not in (RUNNING, WAITING):
         large_button(layout, operator, icon, **settings)
 
 
 def job_state(layout, child, where: str, prefix: str = "") -> None:
-    """Progress of a job's child while it runs and its end; nothing without a child.
+    """Draw the progress of a job's child while it runs, and its end; nothing without a child.
 
-    where: where its results are shown; prefix: what the names of its operators begin with.
+    where: name of the panel with the results; prefix: of the names of its operators.
     """
     if child is None:
         return
@@ -33,10 +33,10 @@ def job_state(layout, child, where: str, prefix: str = "") -> None:
 
 
 def whole(child, width: int = 0) -> tuple[float, str]:
-    """How much of a job's whole is done, 0..1, and that, its stage, their number and time left in words.
+    """Finished share of a whole job, 0..1, and that, its stage, their number and time left in words.
 
-    Of a stage that cannot tell how far it is no share is said.
-    width: letters that the stage's name has at most, 0 for all of it: a longer one is only numbered.
+    A stage without a known fraction shows no share. width: most letters of the stage's name, 0 for all of it:
+    a longer one is only numbered.
     """
     if child.state == WAITING:
         return 0.0, "waiting for the job before it"
@@ -63,7 +63,7 @@ def shortened(text: str, width: int) -> str:
 
 
 def _running(layout, child, prefix: str) -> None:
-    """Cancel, stage and time left of a child: Cancel first, since what is below comes and goes."""
+    """Draw Cancel, stage and time left of a child: Cancel first, since the rows below it change."""
     row = layout.row()
     row.label(text=f"running for {spell(child.seconds)}" if child.state == RUNNING else "not started yet")
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
@@ -78,7 +78,7 @@ def _running(layout, child, prefix: str) -> None:
 
 
 def _ended(layout, child, where: str, prefix: str) -> None:
-    """How a child ended, and where its results are shown."""
+    """Draw how a child ended, and where its results are shown."""
     if child.state == FAILED:
         error = child.error or {}
         box = alert(layout, in_panel(str(error.get("what", ""))))

@@ -1,4 +1,4 @@
-"""The extension's preferences: what becomes of jobs when Blender is closed."""
+"""The extension's preferences: jobs when Blender is closed."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 

@@ -1,7 +1,7 @@
-"""Jobs that go on when Blender is closed: written down by each session, taken up by the next.
+"""Jobs that outlive Blender: recorded by each session, taken over by the next.
 
-A session has a folder, locked as long as it lives, with a file a job. Whoever finds such a folder unlocked
-takes up its jobs: they run on, or have ended meanwhile.
+A session has a folder, locked while it lives, with a file for each job. A later session that finds the folder
+unlocked takes over its jobs: they still run, or have ended meanwhile.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _own: FolderLock | None = None
 
 @attrs.frozen
 class Record:
-    """A job as it is written down: its key, what it is in words, the folder of its run, when it began, plan.
+    """Record of a job: its key, its description, the folder of its run, its start, its plan.
 
-    heavy: whether of such jobs one runs at a time; started_s: since the epoch.
+    heavy: only one such job runs at a time; started_s: since the epoch.
     """
 
     key: str
@@ -54,20 +54,20 @@ def _place(key: str) -> Path:
 
 
 def keep(record: Record) -> None:
-    """Write a job down. One that cannot be written is not found again, and runs all the same."""
+    """Record a job. One that cannot be recorded is not found again, but runs all the same."""
     with suppress(MuError):
         write_json(_place(record.key), {**attrs.asdict(record), "run": str(record.run)})
 
 
 def drop(key: str) -> None:
-    """A job has ended, and was seen to."""
+    """Remove the record of an ended job."""
     if _own is not None:
         with suppress(OSError):
             _place(key).unlink(missing_ok=True)
 
 
 def take_up() -> list[Record]:
-    """Jobs of sessions that are gone; their files are removed."""
+    """Return the jobs of ended sessions, and remove their files."""
     return [record for folder in sorted(_home().glob("session-*")) for record in _of_session(folder)]
 
 
@@ -103,7 +103,7 @@ def _read(path: Path) -> Record | None:
 
 
 def close(leaves: bool) -> None:
-    """Give this session's folder free; remove it unless it leaves jobs that go on."""
+    """Release this session's folder; remove it unless it leaves running jobs."""
     global _own
     if _own is None:
         return

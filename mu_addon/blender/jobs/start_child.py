@@ -1,9 +1,9 @@
-"""Child processes of jobs: one a job, read by a timer.
+"""Child processes of jobs: one for each job, read by a timer.
 
-Those that take minutes go on when Blender is closed, unless the user wants otherwise, and the next session
-takes them up (`sessions`); the others end with the session that started them.
+Jobs of minutes outlive Blender, unless the user decides otherwise, and the next session takes them over
+(`sessions`); the others end with their session.
 
-What runs is kept here, in Python, and never in the .blend file: a file that is loaded later has no button
+Running jobs are kept here, in Python, and never in the .blend file, so that a file loaded later has no button
 stuck at "running". Nothing here writes to Blender's data.
 """
 
@@ -40,14 +40,14 @@ WRITERS = (
     "mu_addon.usecases.simulate_and_place.named_effects",
     "mu_addon.usecases.simulate_and_place.job",
 )
-"""What writes a job's inputs, in parts that each load well within a tenth of a second; no solver."""
+"""Modules that write a job's inputs, each loaded well within a tenth of a second; no solver."""
 CHILD_MAIN = Path(__file__).with_name("child_main.py")
 SOLVER = ("warp", "scipy", "cvxopt", "meshio", "matplotlib")
-"""Modules that a simulation cannot do without."""
+"""Modules that a simulation needs."""
 PACKAGE = __package__.rpartition(".blender")[0]
-"""Name of the extension's package, by which Blender keeps its preferences."""
+"""Name of the extension's package, under which Blender keeps its preferences."""
 OWN_FOLDER = "blender"
-"""Folder within a run's folder for what the child writes to its outputs."""
+"""Folder within a run's folder for files that the child adds to its outputs."""
 
 JOB_ENDED = Signal()
 """Sent with the key of a job that has ended."""
@@ -57,16 +57,16 @@ _titles: dict[str, str] = {}
 _heavy: set[str] = set()
 """Keys of jobs of which one runs at a time."""
 _lasting: set[str] = set()
-"""Keys of jobs that may go on without Blender."""
+"""Keys of jobs that may outlive Blender."""
 
 
 def missing(modules: Sequence[str] = SOLVER) -> list[str]:
-    """Names of those modules that this Blender does not find."""
+    """Names of those modules that this Blender does not have."""
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
 def lacking(modules: Sequence[str] = SOLVER) -> str:
-    """Which of those modules this Blender does not find, in words; empty where it finds all."""
+    """Names of those modules that this Blender does not have, in words; empty if it has all."""
     names = missing(modules)
     return f"Not in this Blender: {', '.join(names)}" if names else ""
 
@@ -85,12 +85,11 @@ def start(
 
 @attrs.frozen(eq=False)
 class JobKind:
-    """A kind of job that objects of the scene have done for them, one at a time for each object.
+    """A kind of job for objects of the scene, one at a time for each object.
 
-    name: what tells the kinds apart; uuid_of, folder_of: identifier of a root object and folder of its run.
-    title: the job in words; heavy: whether it takes the machine for minutes, so that of such jobs one runs at
-    a time and the others wait for it; plan_of: its stages for an object, as they are expected; outlives:
-    whether it may go on when Blender is closed, as the heavy ones may.
+    name: of the kind; uuid_of, folder_of: identifier of a root object and folder of its run. title: the job
+    in words; heavy: takes the machine for minutes, so that only one such job runs at a time and others wait;
+    plan_of: its expected stages for an object; outlives: may outlive Blender, as the heavy ones may.
     """
 
     name: str
@@ -110,7 +109,7 @@ class JobKind:
         return child_of(self.key(root))
 
     def is_running(self, root: Any) -> bool:
-        """Whether the job runs, or waits for another one."""
+        """Return True if the job runs, or waits for another one."""
         return self.key(root) in running()
 
     def start(
@@ -134,7 +133,7 @@ class JobKind:
         return watch(key, child, title)
 
     def dismiss(self, root: Any) -> None:
-        """Forget an ended job, so that no panel shows it."""
+        """Remove an ended job, so that no panel shows it."""
         child = self.child(root)
         if child is not None and child.state not in (RUNNING, WAITING):
             forget(self.key(root))
@@ -146,12 +145,12 @@ def child_of(key: str) -> Child | None:
 
 
 def running() -> list[str]:
-    """Keys of the jobs that run or wait for one, in the order in which they were started."""
+    """Keys of the running or waiting jobs, in the order in which they were started."""
     return [key for key, child in _children.items() if child.state in (RUNNING, WAITING)]
 
 
 def title_of(key: str) -> str:
-    """What a job is, and of what object, in words; nothing for one that has no place in the header."""
+    """Title of a job with its object; "" for one without a place in the header."""
     return _titles.get(key, "")
 
 
@@ -161,31 +160,31 @@ def ended() -> list[str]:
 
 
 def last(record: sessions.Record) -> None:
-    """Have a job go on when Blender is closed, where the user does not want otherwise."""
+    """Let a job outlive Blender, unless the user decides otherwise."""
     _lasting.add(record.key)
     sessions.keep(record)
 
 
 def goes_on(key: str) -> bool:
-    """Whether a job goes on when Blender is closed: one that runs, and not one that waits."""
+    """Return True if a job outlives Blender: it runs, and does not wait."""
     child = _children.get(key)
     return _wanted() and key in _lasting and child is not None and child.state == RUNNING
 
 
 def _wanted() -> bool:
-    """Whether the user wants jobs to go on; without preferences, as in a script, there is no next session."""
+    """Return True if the user lets jobs outlive Blender; False without preferences, as in a script."""
     extension = bpy.context.preferences.addons.get(PACKAGE)
     return bool(getattr(getattr(extension, "preferences", None), "jobs_go_on", False))
 
 
 def forget(key: str) -> None:
-    """Forget a job that has ended."""
+    """Remove a job that has ended."""
     _children.pop(key, None)
     _titles.pop(key, None)
 
 
 def watch(key: str, child: Child, title: str = "") -> Child:
-    """Have the timer read what a child says, as the job of that key; title: what the header calls it."""
+    """Let the timer read a child's messages, as the job of that key; title: in the header."""
     # Anew at the end: jobs are listed in the order in which they were started.
     forget(key)
     _children[key] = child
@@ -198,13 +197,13 @@ def watch(key: str, child: Child, title: str = "") -> Child:
 
 
 def poll() -> bool:
-    """Read what every child has written; returns whether there was anything new."""
+    """Read the new output of every child; return True if there was any."""
     news = [child.poll() for child in _children.values()]
     return _begin_next() or any(news)
 
 
 def _begin_next() -> bool:
-    """Start the first job that waits, where none of its kind runs; returns whether there was one."""
+    """Start the first waiting job if none of its kind runs; return True if there was one."""
     heavy = [child for key, child in _children.items() if key in _heavy]
     waiting = [child for child in heavy if child.state == WAITING]
     if not waiting or any(child.state == RUNNING for child in heavy):
@@ -232,7 +231,7 @@ def _poll() -> float | None:
 
 
 def _end_all() -> None:
-    """What does not go on without Blender ends with it."""
+    """End the jobs that do not outlive Blender."""
     leaves = False
     for key, child in _children.items():
         if goes_on(key):
@@ -244,7 +243,7 @@ def _end_all() -> None:
 
 
 def _take_up() -> None:
-    """Watch what former sessions left: it goes on, or has ended meanwhile."""
+    """Watch the jobs of former sessions: they still run, or have ended meanwhile."""
     for record in sessions.take_up():
         if record.key in running():
             continue
@@ -260,7 +259,7 @@ def _take_up() -> None:
 
 
 def _load_writer() -> float | None:
-    """Load what writes a job's inputs, a module at a time: so the first job starts as quickly as the next."""
+    """Load the writers of a job's inputs, a module at a time, so that the first job starts quickly."""
     if missing(WRITERS[:1]):
         return None
     for name in WRITERS:
@@ -272,14 +271,14 @@ def _load_writer() -> float | None:
 
 
 def register() -> None:
-    """Take up what former sessions left; at the end, end what does not go on without Blender."""
+    """Take over jobs of former sessions; at exit, end those that do not outlive Blender."""
     atexit.register(_end_all)
     for timer in (_load_writer, _take_up):
         bpy.app.timers.register(timer, first_interval=LOAD_AFTER_S, persistent=True)
 
 
 def unregister() -> None:
-    """End every child that does not go on without Blender, and the timers."""
+    """End every child that does not outlive Blender, and the timers."""
     atexit.unregister(_end_all)
     _end_all()
     for kept in (_children, _titles, _heavy, _lasting):

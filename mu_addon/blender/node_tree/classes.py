@@ -1,6 +1,6 @@
-"""The tree and its nodes as Blender has them, made from the core's definitions.
+"""Blender's tree and nodes, made from the core's definitions.
 
-A node that the core gains appears with its sockets, fields, bounds and tooltips without a line of code.
+A node added to the core appears with its sockets, fields, bounds and tooltips without a line of code.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -24,7 +24,7 @@ GROUP = "MU_NT_group"
 CHANGED = Signal()
 """Sent with a tree whose nodes, links or values have changed."""
 MOST_SHOWN = 8
-"""A node of more numbers has their sockets hidden at first: its fields are in the sidebar."""
+"""A node with more numbers hides their sockets at first: its fields are in the sidebar."""
 _ICONS = {
     COMPUTED: "CHECKMARK",
     CACHED: "FILE_TICK",
@@ -34,20 +34,20 @@ _ICONS = {
     MUTED: "HIDE_ON",
 }
 _STATES = {}
-"""What drawing knows of nodes: see `state_of`."""
+"""States of nodes for drawing: see `state_of`."""
 
 
 _RUNNING = {}
-"""Of each tree that is being evaluated the node, its stage and fraction: see `set_running`."""
+"""The running node of each evaluated tree, with stage and fraction: see `set_running`."""
 
 
 def set_running(tree, node="", stage="", fraction=None) -> None:
-    """Have a node drawn as the one that is being computed; none with ""."""
+    """Draw a node as the running one; none with ""."""
     _RUNNING[tree.session_uid] = {"node": node, "stage": stage, "fraction": fraction}
 
 
 def set_states(tree, found) -> None:
-    """Have nodes of a tree drawn with these states, by name."""
+    """Draw nodes of a tree with these states, by name."""
     _STATES[tree.session_uid] = found
 
 
@@ -62,7 +62,7 @@ def node_class(kind: str) -> str:
 
 
 def attribute(setting: Setting) -> str:
-    """Name of a setting's property on its node: its own, unless every node of Blender has such a one."""
+    """Name of a setting's property on its node: its own, unless Blender's nodes have one of that name."""
     return f"{setting.name}_" if setting.name in bpy.types.Node.bl_rna.properties else setting.name
 
 
@@ -101,7 +101,7 @@ def _is_unit(node, obj):
 
 
 class _Node:
-    """What all nodes have in common."""
+    """Base of all nodes."""
 
     @classmethod
     def poll(cls, tree):
@@ -178,7 +178,7 @@ class _CoreNode(_Node):
 
 
 def draw_source(node, layout) -> None:
-    """The parameters of the unit in the scene that a node shows: the very fields of the unit's sidebar."""
+    """Draw the parameters of the scene's unit that a node shows: the same fields as the unit's sidebar."""
     from ...design.parameters import SECTIONS, describe
 
     props = node.source.mu_unit
@@ -193,7 +193,7 @@ def draw_source(node, layout) -> None:
 
 
 def draw_state(node, layout) -> None:
-    """State, time and remark of a node, and its error in red."""
+    """Draw state, time and remark of a node, and its error in red."""
     found = state_of(node)
     if found is None:
         return
@@ -222,7 +222,7 @@ def draw_state(node, layout) -> None:
 
 
 def _property(s: Setting):
-    """The Blender property of a setting."""
+    """Blender property of a setting."""
     d = s.description
     if d.type is str and not d.choices:
         paths = {FILE: "FILE_PATH", FOLDER: "DIR_PATH"}

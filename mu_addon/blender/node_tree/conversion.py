@@ -1,4 +1,4 @@
-"""Between Blender's node tree and the core's: groups and reroutes become plain links, and back."""
+"""Conversion between Blender's node tree and the core's: groups and reroutes become plain links, and back."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..unit.properties import to_unit
 from .classes import GROUP, TREE, attribute, node_class
 
 DEEPEST = 16
-"""Groups in groups."""
+"""Deepest nesting of groups."""
 
 
 @attrs.define
 class _Flat:
-    """A tree of Blender's, or one use of a group: what its nodes' names begin with, what its input gives."""
+    """A tree of Blender's, or one use of a group: prefix of its nodes' names, sources of its inputs."""
 
     tree: Any
     prefix: str = ""
@@ -43,7 +43,7 @@ class _Flat:
                 self._links.setdefault(key, []).append(link)
 
     def sources(self, node: Any, identifier: str) -> tuple[Source, ...]:
-        """Where a socket's links come from, through reroutes and groups, in the order they are drawn in."""
+        """Sources of a socket's links, through reroutes and groups, in the order they are drawn in."""
         found: list[Source] = []
         for link in self._links.get((node.name, identifier), ()):
             found += self._through(link.from_node, link.from_socket)
@@ -65,7 +65,7 @@ class _Flat:
         return (Source(self.prefix + node.name, socket.identifier),)
 
     def inside(self, node: Any) -> _Flat | None:
-        """The use of a group that a node stands for; None where it has no tree."""
+        """Use of a group that a node stands for; None if it has no tree."""
         if node.node_tree is None:
             return None
         given = {s.identifier: self.sources(node, s.identifier) for s in node.inputs}
@@ -106,7 +106,7 @@ class _Flat:
 
 
 def _absolute(node: Any) -> tuple[float, float]:
-    """Place of a node in its tree, whatever frame it is in, to a whole number."""
+    """Position of a node in its tree, whatever frame it is in, as whole numbers."""
     x = y = 0.0
     while node is not None:
         x, y, node = x + node.location.x, y + node.location.y, node.parent
@@ -137,14 +137,14 @@ def _value(s: Setting, value: Any) -> Any:
 
 
 def to_tree(tree: Any) -> NodeTree:
-    """The core's tree of one of Blender's; raises InputError for groups without end or a broken unit."""
+    """The core's tree from one of Blender's; raises InputError for endless groups or a broken unit."""
     found: dict[str, Node] = {}
     _Flat(tree).collect(found)
     return NodeTree(tree.name, found)
 
 
 def mark_links(tree: Any, refused: Mapping[tuple[str, str], frozenset[Source]]) -> None:
-    """Have Blender draw links with a fault in red, those in groups too; see `_Flat.refuse`."""
+    """Draw links with a fault in red, also within groups; see `_Flat.refuse`."""
     _Flat(tree).refuse(refused)
 
 
@@ -208,7 +208,7 @@ def _link(tree: Any, before: Any, output: str, after: Any, key: str) -> None:
 
 
 def _set(new: Any, node: Node) -> None:
-    """Set a node's fields; a value of another type, or no choice, is refused as the core refuses it."""
+    """Set a node's fields; a value of another type or choice is refused as by the core."""
     # As they are: one that a rule ties to another one may differ in a file, and is then told.
     with updates.paused():
         for s in new.definition.settings:

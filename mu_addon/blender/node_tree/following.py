@@ -1,7 +1,7 @@
-"""A unit that follows a node of a tree: one set of values, whether the tree or the sidebar is edited.
+"""A unit that follows a node of a tree: one set of values, edited in the tree or the sidebar.
 
-What the sidebar changes is written into the fields of the tree's nodes. A value that comes by a link or a
-driver is the tree's: it comes back, and the sidebar says where from.
+Changes in the sidebar are written into the fields of the tree's nodes. A value set by a link or a driver
+belongs to the tree: it is restored, and the sidebar shows its source.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..unit.properties import from_unit, section_of
 from .classes import TREE, attribute, node_class
 
 _agreed: dict[str, dict[str, Any]] = {}
-"""By UUID of a unit: the values, by `section.name`, that it and its tree had in common last."""
+"""By UUID of a unit: its latest values in common with its tree, by `section.name`."""
 _kept: dict[str, list[str]] = {}
-"""By UUID: labels of the fields that were set in the sidebar last and are not the sidebar's to set."""
+"""By UUID: labels of the fields last edited in the sidebar that only the tree can set."""
 
 
 def followed(root: Any) -> Any | None:
-    """The node that a unit in the scene follows, or None."""
+    """Node that a unit in the scene follows, or None."""
     for tree in bpy.data.node_groups:
         if tree.bl_idname == TREE and tree.library is None:
             for node in tree.nodes:
@@ -47,12 +47,12 @@ def take(root: Any, design: Any) -> None:
 
 
 def agree(root: Any) -> None:
-    """Keep what a unit and its tree have in common now."""
+    """Store the present values as those in common of a unit and its tree."""
     _agreed[root.mu_unit.uuid] = _values(root.mu_unit)
 
 
 def give_back(root: Any) -> bool:
-    """Write what the sidebar changed into the nodes that a unit follows; returns whether anything was."""
+    """Write changes of the sidebar into the nodes that a unit follows; return True if there were any."""
     node, before = followed(root), _agreed.get(root.mu_unit.uuid)
     if node is None or before is None:
         return False
@@ -68,7 +68,7 @@ def give_back(root: Any) -> bool:
 
 
 def kept_by_tree(root: Any) -> list[str]:
-    """Labels of the fields that were set in the sidebar last, and that only the tree can set."""
+    """Labels of the fields last edited in the sidebar that only the tree can set."""
     return _kept.get(root.mu_unit.uuid, [])
 
 
@@ -86,7 +86,7 @@ def _values(props: Any) -> dict[str, Any]:
 
 
 def _write(node: Any, path: str, value: Any) -> bool:
-    """Set a parameter in the node that gives it; returns whether there is one whose own field it is."""
+    """Set a parameter in the node with its own field; return True if there is one."""
     if path == "path" and _lay_waveguide(node, bool(value)) and not value:
         return True
     for source in _upstream(node):
@@ -100,9 +100,9 @@ def _write(node: Any, path: str, value: Any) -> bool:
 
 
 def _lay_waveguide(node: Any, there: bool) -> bool:
-    """Link the wells to the unit or take their link away, as the tree of a unit's steps has them.
+    """Link the wells to the unit or unlink them, as in the tree of a unit's steps.
 
-    Returns whether the unit is made of steps, so that this is its path or its having none.
+    Return True if the unit is made of steps, so that its path is set this way.
     """
     tree, found = node.id_data, False
     wells = next((n for n in tree.nodes if n.bl_idname == node_class("wells")), None)
@@ -120,7 +120,7 @@ def _lay_waveguide(node: Any, there: bool) -> bool:
 
 
 def _upstream(node: Any) -> Iterator[Any]:
-    """A node and those that it is made from, the nearest first; groups are not looked into."""
+    """A node and its upstream nodes, the nearest first, without those in groups."""
     waiting, seen = [node], {node.name}
     while waiting:
         node = waiting.pop(0)
@@ -134,7 +134,7 @@ def _upstream(node: Any) -> Iterator[Any]:
 
 
 def _setting(node: Any, path: str) -> Setting | None:
-    """The setting of a node that is the parameter of that path; None where it has none."""
+    """Setting of a node for the parameter of that path; None if it has none."""
     definition = node.definition
     if definition.kind == "set_parameter":
         ours = node.parameter == path and not node.mute
@@ -147,7 +147,7 @@ def _setting(node: Any, path: str) -> Setting | None:
 
 
 def _is_free(node: Any, setting: Setting) -> bool:
-    """Whether a setting is the node's own field: neither a link nor a driver gives it."""
+    """Return True if a setting is the node's own field: neither a link nor a driver sets it."""
     socket = next((s for s in node.inputs if s.identifier == setting.name), None)
     data = node.id_data.animation_data
     field = node.path_from_id(attribute(setting))
@@ -156,6 +156,6 @@ def _is_free(node: Any, setting: Setting) -> bool:
 
 
 def forget() -> None:
-    """Forget what units and trees had in common: other values are there, by undo or another file."""
+    """Drop the values in common of units and trees, which undo or another file has changed."""
     _agreed.clear()
     _kept.clear()

@@ -1,4 +1,4 @@
-"""Groups: several nodes as one, edited in a tree of their own, used in as many places as wanted."""
+"""Groups: several nodes as one, edited in a separate tree, used in any number of places."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -12,7 +12,7 @@ from .classes import GROUP, TREE, attribute
 
 
 def active_tree(context):
-    """The node tree of ours that the editor shows, or None."""
+    """Our node tree in the editor, or None."""
     space = context.space_data
     tree = getattr(space, "edit_tree", None)
     return tree if tree is not None and tree.bl_idname == TREE else None
@@ -30,7 +30,7 @@ class TreeOperator:
 
 
 def make_group(tree, nodes):
-    """Put nodes of a tree into a new group; returns the node that stands for them. Raises InputError."""
+    """Put nodes of a tree into a new group; return the node that stands for them. Raises InputError."""
     nodes = [node for node in nodes if node.bl_idname != "NodeFrame"]
     if not nodes:
         raise InputError("no node is selected", tree.name, "select the nodes of the group")
@@ -81,7 +81,7 @@ def make_group(tree, nodes):
 
 
 def take_apart(tree, node):
-    """Put a group's nodes in the place of the node that stands for them. Raises InputError."""
+    """Put a group's nodes in place of the node that stands for them. Raises InputError."""
     if node.node_tree is None:
         raise InputError("the group is empty", node.name, "choose its tree first")
     group = node.node_tree
@@ -199,14 +199,14 @@ _KEYS = (
     ("mu.node_group_ungroup", "G", {"ctrl": True, "alt": True}),
     ("mu.node_group_edit", "TAB", {}),
 )
-"""The keys that Blender's own groups have: those operators do not take trees of other kinds."""
+"""Keys of Blender's own groups, whose operators do not accept trees of other kinds."""
 _keymaps: list = []
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
 def register() -> None:
-    """Operators, and their keys in node editors; in background there are none."""
+    """Register operators, and their keys in node editors; in background there are none."""
     _register_classes()
     config = bpy.context.window_manager.keyconfigs.addon if bpy.context.window_manager else None
     if config is not None:
@@ -217,7 +217,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them out again."""
+    """Unregister them."""
     for keymap, item in _keymaps:
         keymap.keymap_items.remove(item)
     _keymaps.clear()

@@ -1,4 +1,4 @@
-"""Operators of node trees: evaluate, stop, open what a node left, templates, files, units of the scene."""
+"""Operators of node trees: evaluate, stop, open results, templates, files, units of the scene."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -34,7 +34,7 @@ _TEXTS = {
 
 
 def root_tree(context):
-    """The tree that is evaluated: the outermost of those that the editor has open."""
+    """Tree to be evaluated: the outermost of those open in the editor."""
     path = getattr(context.space_data, "path", None)
     if path and path[0].node_tree is not None and path[0].node_tree.bl_idname == TREE:
         return path[0].node_tree
@@ -54,7 +54,7 @@ class _TreeOperator(TreeOperator):
 
 
 class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
-    """Evaluate the tree in a process of its own; finished nodes are not repeated, and Blender stays usable"""
+    """Evaluate the tree in a separate process; finished nodes are not repeated, and Blender stays usable"""
 
     bl_idname = "mu.tree_evaluate"
     bl_label = "Evaluate"
@@ -226,7 +226,7 @@ def _node_editor(context):
 
 
 class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
-    """Open what the active node's run left: its report, its folder or its table"""
+    """Open the results of the active node's run: its report, its folder or its table"""
 
     bl_idname = "mu.node_open"
     bl_label = "Open"

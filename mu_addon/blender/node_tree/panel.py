@@ -1,4 +1,4 @@
-"""What the node editor shows besides the nodes: Add menu, header, sidebar."""
+"""The node editor's menu Add, header and sidebar."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
 
 
 class MU_PT_node(_Panel, bpy.types.Panel):
-    """The active node: what it is, its state, what its run left"""
+    """The active node: its kind, its state, its results"""
 
     bl_idname = "MU_PT_node"
     bl_label = "Active Node"
@@ -89,7 +89,7 @@ class MU_PT_node(_Panel, bpy.types.Panel):
 
 
 def _entry(layout, text: str, kind: str) -> None:
-    """An entry of the Add menu: a node of that kind, which then follows the mouse."""
+    """Draw an entry of the Add menu: a node of that kind, which then follows the mouse."""
     add = layout.operator("node.add_node", text=text)
     add.type, add.use_transform = kind, True
 
@@ -172,14 +172,14 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 
 
 def register() -> None:
-    """Panels and menus, the entries in the editor's Add menu and header."""
+    """Register panels and menus, the entries in the editor's Add menu and header."""
     _register_classes()
     bpy.types.NODE_MT_add.append(_add)
     bpy.types.NODE_HT_header.append(_header)
 
 
 def unregister() -> None:
-    """Take them out again."""
+    """Unregister them."""
     bpy.types.NODE_HT_header.remove(_header)
     bpy.types.NODE_MT_add.remove(_add)
     _unregister_classes()

@@ -1,4 +1,4 @@
-"""What the run of a tree is expected to take: a stage for each node that starts a run, with its seconds."""
+"""Expected duration of a tree's run: a stage for each node that starts a run, with its seconds."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ SECONDS = {
     "calibrate": 2.0,
     "measure": 1.0,
 }
-"""What a node of a kind takes about, on two cores, where it never ran in the tree's folder."""
+"""Expected seconds of a kind of node on two cores, if it never ran in the tree's folder."""
 OTHER_S = 30.0
 
 
 def plan_of(tree: NodeTree, states: Mapping[str, State], wanted: Iterable[str], folder: Path) -> Plan:
-    """Nodes whose runs are still to be done, in their order, with the seconds of each.
+    """Nodes still to be run, in order, with the seconds of each.
 
-    states: of the tree's latest refresh; wanted: nodes that are asked for, all where none is; folder: of the
-    tree's runs, whose last evaluation knows what each node took.
+    states: of the tree's latest refresh; wanted: nodes asked for, all if empty; folder: of the tree's runs,
+    whose last evaluation has each node's seconds.
     """
     order, _ = tree.ordered()
     needed = tree.upstream(tuple(wanted) or tree.nodes)
@@ -50,7 +50,7 @@ def _runs(tree: NodeTree, name: str) -> bool:
 
 
 def _taken(folder: Path) -> dict[str, float]:
-    """Seconds that the nodes took when they were last computed in a folder, by name."""
+    """Seconds of the nodes when they were last computed in a folder, by name."""
     path = folder / STATES
     try:
         nodes = parse_json(file_text(path), str(path))["nodes"]

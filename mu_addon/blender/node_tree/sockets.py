@@ -48,12 +48,12 @@ def identifier(type_: str) -> str:
 
 
 def type_of(types: tuple[str, ...]) -> str:
-    """The type that an input's socket has."""
+    """Type of an input's socket."""
     return types[0] if len(types) == 1 else ANY
 
 
 class _Socket:
-    """What all sockets of node trees draw."""
+    """Base of all sockets of node trees."""
 
     mu_type = ""
 

@@ -1,7 +1,7 @@
-"""What trees of the file come to: a refresh after every change, and the run of a tree in its own process.
+"""Values of the file's trees: a refresh after every change, and the run of a tree in a process.
 
-A refresh makes what takes milliseconds, parameters and the steps' geometry, and takes the rest from the
-records that runs have left in the tree's folder.
+A refresh computes parameters and the steps' geometry, in milliseconds, and reads the rest from the records of
+runs in the tree's folder.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .plan import plan_of
 
 WAIT_S = 0.05
 SCENE_KEY = "mu_node_trees"
-"""Custom property of the scene that points to its trees: Blender evaluates drivers of what it reaches."""
+"""Custom property of the scene that points to its trees: Blender evaluates drivers only of reachable data."""
 
 _kept = Kept()
 _records: FileCache[dict[str, Record]] = FileCache()
@@ -49,17 +49,17 @@ _states: dict[int, dict[str, State]] = {}
 
 
 def trees() -> Iterator[Any]:
-    """Every node tree of ours in the file; those linked from another one are evaluated there."""
+    """Our node trees in the file, without linked ones, which are evaluated in theirs."""
     return (g for g in bpy.data.node_groups if g.bl_idname == TREE and g.library is None)
 
 
 def _is_group(tree: Any) -> bool:
-    """Whether a tree is a group's, made for use in others."""
+    """Return True if a tree is a group's, for use in others."""
     return any(node.bl_idname in ("NodeGroupInput", "NodeGroupOutput") for node in tree.nodes)
 
 
 def uuid_of(tree: Any) -> str:
-    """Identifier of a tree; a copy has its own by its name."""
+    """Identifier of a tree; a copy is distinguished by its name."""
     return f"{_number(tree)}:{tree.name}"
 
 
@@ -69,7 +69,7 @@ def folder_of(tree: Any) -> Path:
 
 
 def _number(tree: Any) -> str:
-    """The UUID of a tree, given to it when it is first asked for."""
+    """UUID of a tree, created on the first call."""
     if not tree.mu_uuid:
         tree.mu_uuid = uuid.uuid4().hex
     return str(tree.mu_uuid)
@@ -80,7 +80,7 @@ RUN = JobKind("graph", uuid_of, folder_of, outlives=True)
 
 
 def refresh(tree: Any) -> dict[str, State]:
-    """Evaluate a tree as far as that takes milliseconds; mark its links, show states, update followers."""
+    """Evaluate the fast part of a tree; mark its links, show states, update followers."""
     conversion.sync_groups(tree)
     try:
         core = conversion.to_tree(tree)
@@ -105,7 +105,7 @@ def refresh(tree: Any) -> dict[str, State]:
 
 
 def _of_groups(tree: Any, found: dict[str, State]) -> dict[str, State]:
-    """For each group node the first error inside it, and for the nodes in the group their own states."""
+    """First error inside each group node; sets the states of the nodes in the groups."""
     shown = {}
     for node in tree.nodes:
         if node.bl_idname == classes.GROUP and node.node_tree is not None:
@@ -119,7 +119,7 @@ def _of_groups(tree: Any, found: dict[str, State]) -> dict[str, State]:
 
 
 def _follow(tree: Any, evaluation: Evaluation) -> None:
-    """Give units in the scene the parameters of nodes that they follow."""
+    """Give units in the scene the parameters of the nodes that they follow."""
     for node in tree.nodes:
         root = getattr(node, "follower", None)
         design = evaluation.outputs.get(node.name, {}).get("unit")
@@ -134,7 +134,7 @@ def _follow(tree: Any, evaluation: Evaluation) -> None:
 
 
 def _keep_reachable(tree: Any) -> None:
-    """Have the scene point to the tree, so that its drivers are evaluated and a file keeps it."""
+    """Let the scene point to the tree, so that its drivers are evaluated and it is saved."""
     scene = bpy.context.scene
     if scene is None or _is_group(tree):
         return
@@ -145,7 +145,7 @@ def _keep_reachable(tree: Any) -> None:
 
 
 def schedule(tree: Any) -> None:
-    """Have a tree refreshed soon: after a change, and not before Blender has ended it."""
+    """Schedule a refresh of a tree, to run after Blender has finished the present change."""
     _pending.add(tree.session_uid)
     if not bpy.app.timers.is_registered(_refresh_pending):
         bpy.app.timers.register(_refresh_pending, first_interval=WAIT_S)
@@ -163,7 +163,7 @@ def _refresh_pending() -> None:
 
 
 def redraw() -> None:
-    """Have every node editor drawn again."""
+    """Redraw every node editor."""
     manager = bpy.context.window_manager
     for window in manager.windows if manager else ():
         for area in window.screen.areas:
@@ -172,14 +172,14 @@ def redraw() -> None:
 
 
 def job_of(tree: Any, wanted: tuple[str, ...] = ()) -> Job:
-    """The evaluation of a tree; raises InputError for a fault of a node."""
+    """Job that evaluates a tree; raises InputError for a fault of a node."""
     job = Job(conversion.to_tree(tree), wanted, tree.mu_reports)
     job.require_sound()
     return job
 
 
 def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
-    """Evaluate a tree in a process of its own; raises MuError."""
+    """Evaluate a tree in a separate process; raises MuError."""
     job = job_of(tree, wanted)
     folder = folder_of(tree)
     if not tree.mu_folder:
@@ -193,7 +193,7 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
 
 
 def _redraw_running() -> float | None:
-    """Show which node is being computed, and those that are done meanwhile."""
+    """Show the running node, and those finished meanwhile."""
     running = [tree for tree in trees() if RUN.is_running(tree)]
     for tree in running:
         child = RUN.child(tree)
@@ -224,7 +224,7 @@ def tree_of_unit(root: Any, steps: bool = False) -> Any:
 
 
 def places(node: Any) -> tuple[str, ...]:
-    """What can be opened of a node: its run's folder and report, its table."""
+    """Results of a node that can be opened: its run's folder and report, its table."""
     found = classes.state_of(node)
     if found is not None and found.folder is not None:
         return "folder", "report"
@@ -232,7 +232,7 @@ def places(node: Any) -> tuple[str, ...]:
 
 
 def place_of(tree: Any, node: Any, what: str) -> Path | None:
-    """Where that lies, or None where the node has none."""
+    """Path of a node's result, or None where the node has none."""
     found = classes.state_of(node)
     if what == "table":
         return folder_of(tree) / f"compare-{file_name(node.name)}.csv"
@@ -263,7 +263,7 @@ def _all(*_: Any) -> None:
 
 @persistent
 def _driven(scene: Any, *_: Any) -> None:
-    """Refresh the trees with drivers or animation whose values may be others now."""
+    """Refresh the trees with drivers or animation, whose values may have changed."""
     now = time.monotonic()
     for tree in trees():
         data = tree.animation_data
@@ -288,7 +288,7 @@ _CONNECTIONS = (
 
 
 def register() -> None:
-    """Handlers and signals that start a refresh."""
+    """Register handlers and signals that start a refresh."""
     handlers.add(_HANDLERS)
     handlers.add(_DRIVEN)
     for signal, function in _CONNECTIONS:
@@ -296,7 +296,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them out, and a refresh that waits."""
+    """Unregister them, and cancel a waiting refresh."""
     for signal, function in _CONNECTIONS:
         signal.disconnect(function)
     handlers.remove(_DRIVEN)

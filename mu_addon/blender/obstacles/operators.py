@@ -22,7 +22,7 @@ NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
 
 
 class ObstacleOperator(UnitOperator):
-    """An operator on the obstacles of the active unit; greyed, with the reason, where it has none."""
+    """An operator on the obstacles of the active unit; greyed out, with the reason, where it has none."""
 
     name: StringProperty(
         name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}
@@ -38,7 +38,7 @@ class ObstacleOperator(UnitOperator):
         return True
 
     def chosen(self, root):
-        """Objects that it is to act on; raises InputError for a name that is none."""
+        """Objects to act on; raises InputError for an unknown name."""
         found = obstacles.of_unit(root)
         chosen = [o for o in found if o.name == self.name] if self.name else found
         if not chosen:

@@ -39,7 +39,7 @@ class MU_PT_obstacles(UnitPanel, bpy.types.Panel):
 
 
 def _troubles(root, obj):
-    """What is known to be wrong with an obstacle as it stands, a text each."""
+    """Known faults of an obstacle in its present place, a text each."""
     try:
         known = obstacles.placed(root, obj).flaws or []
     except InputError as error:

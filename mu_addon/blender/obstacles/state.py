@@ -1,7 +1,7 @@
 """Obstacles of a unit: closed meshes of the scene that it may touch, rigid and fixed.
 
-They stay the user's own objects: moved, scaled or edited, they are read again, in the unit's frame, and what
-was simulated with them before is stale. Copies of an obstacle are obstacles; undo and deletion need no care.
+They stay the user's own objects: after a change they are read again, in the unit's frame, and earlier
+simulations with them become stale. Copies of an obstacle are obstacles; undo and deletion need no handling.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -23,7 +23,7 @@ from ..shared.registration import property_group_factory
 from ..unit.fields import blender_property, exact
 
 ODD_SIZE_MM = (0.1, 2000.0)
-"""An obstacle smaller or larger than that is more likely in another unit of length."""
+"""An obstacle outside this range is probably in another unit of length."""
 
 
 class MU_PG_obstacle(bpy.types.PropertyGroup):
@@ -40,14 +40,14 @@ class MU_PG_obstacle(bpy.types.PropertyGroup):
 
 @attrs.frozen(eq=False)
 class Placed:
-    """An obstacle as it stands now, in mm of the unit's frame; flaws: why it cannot be one, if looked for."""
+    """An obstacle in its present place, in mm of the unit's frame; flaws: its faults, if checked."""
 
     body: Body
     flaws: list[Flaw] | None = None
 
 
 _placed: dict[tuple[str, str], tuple[Any, Placed]] = {}
-"""By unit and object: where the object stood against the unit, and what it was there."""
+"""By unit and object: the object's transform relative to the unit, and its surface there."""
 
 
 def of_unit(root: Any) -> list[Any]:
@@ -57,7 +57,7 @@ def of_unit(root: Any) -> list[Any]:
 
 
 def placed(root: Any, obj: Any) -> Placed:
-    """An obstacle as it stands now; raises InputError for what is no surface."""
+    """An obstacle in its present place; raises InputError for an object without a surface."""
     key = root.mu_unit.uuid, obj.name_full
     where = _where(root, obj)
     kept = _placed.get(key)
@@ -67,7 +67,7 @@ def placed(root: Any, obj: Any) -> Placed:
 
 
 def examined(root: Any, obj: Any, unit: Unit) -> list[Flaw]:
-    """Why an object cannot be an obstacle of a unit as it stands: its surface, its size, its place."""
+    """Reasons why an object cannot be an obstacle in its place: its surface, its size, its position."""
     body = placed(root, obj).body
     found = unsound(body) or overlaps(body, unit.dimensions, bodies.envelope_in(root, unit))
     _placed[root.mu_unit.uuid, obj.name_full] = _where(root, obj), Placed(body, found)
@@ -75,7 +75,7 @@ def examined(root: Any, obj: Any, unit: Unit) -> list[Flaw]:
 
 
 def unsound(body: Body) -> list[Flaw]:
-    """Why a surface cannot be an obstacle wherever it stands."""
+    """Reasons why a surface cannot be an obstacle anywhere."""
     found = flaws(body)
     size = float((body.bounds[1] - body.bounds[0]).max())
     low, high = ODD_SIZE_MM
@@ -91,12 +91,12 @@ def unsound(body: Body) -> list[Flaw]:
 
 
 def inputs(root: Any) -> list[tuple[str, float]]:
-    """Hash of the surface and friction of every obstacle, sorted; InputError for what is no surface."""
+    """Hash of the surface and friction of every obstacle, sorted; InputError for one without a surface."""
     return sorted((placed(root, o).body.hash, exact(o.mu_obstacle.friction)) for o in of_unit(root))
 
 
 def rigid_bodies(root: Any, unit: Unit) -> tuple[RigidBody, ...]:
-    """A unit's obstacles as a simulation takes them; InputError for one that cannot be as it stands."""
+    """A unit's obstacles as inputs of a simulation; InputError for one invalid in its present place."""
     found: dict[str, RigidBody] = {}
     for number, obj in enumerate(of_unit(root), 1):
         body = placed(root, obj).body
@@ -111,13 +111,13 @@ def rigid_bodies(root: Any, unit: Unit) -> tuple[RigidBody, ...]:
 
 
 def _where(root: Any, obj: Any) -> Any:
-    """Where an object stands against a unit."""
+    """Transform of an object relative to a unit."""
     return [tuple(row) for row in root.matrix_world.inverted() @ obj.matrix_world]
 
 
 @persistent
 def _edited(scene, depsgraph):
-    """What was edited is read again: `placed` sees by itself where it was only moved."""
+    """Drop edited surfaces, to be read again; `placed` itself notices moves."""
     changed = {u.id.name_full for u in depsgraph.updates if u.is_updated_geometry}
     for key in [key for key in _placed if key[1] in changed]:
         del _placed[key]
@@ -135,11 +135,11 @@ _register, _unregister = property_group_factory(bpy.types.Object, "mu_obstacle",
 
 
 def register() -> None:
-    """The property on objects, and handlers that notice edits."""
+    """Register the property on objects, and handlers that notice edits."""
     _register()
 
 
 def unregister() -> None:
-    """Take them out; what is an obstacle stays so in the file."""
+    """Unregister them; obstacles stay such in the file."""
     _unregister()
     _placed.clear()

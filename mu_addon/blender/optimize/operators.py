@@ -52,7 +52,7 @@ FIRST = (
     "material.lattice_modulus_kPa",
     "scale",
 )
-"""Parameters in the order in which the list proposes them: those that move a unit's angle most come first."""
+"""Order in which the list proposes parameters: those with most effect on a unit's angle come first."""
 
 
 class MU_OT_optimize_unlist(UnitOperator, bpy.types.Operator):

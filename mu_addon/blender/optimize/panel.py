@@ -1,4 +1,4 @@
-"""The panel Optimize: targets, parameters that may change, progress, and the units that are proposed."""
+"""The panel Optimize: targets, free parameters, progress, and the proposed units."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ UNITS |= {"tip_force": "N", "tip_position": "mm", "workspace": "mm"}
 BARELY = "QUESTION"
 """Sign of a target that is met, but within two standard errors of being missed."""
 LABELS = 0.4
-"""Share of a field's width that its name takes."""
+"""Share of a field's width for its name."""
 FRONT_SIZE = 11.0
-"""Side of the picture of the front, in heights of a button."""
+"""Side of the front's picture, in heights of a button."""
 
 
 class MU_PT_optimize(UnitPanel, bpy.types.Panel):
-    """Units that do what is asked: targets and parameters that may change in, proposed units out"""
+    """Find units that meet targets within given ranges of parameters"""
 
     bl_idname = "MU_PT_optimize"
     bl_label = "Optimize"
@@ -56,7 +56,7 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
 
 
 def _more(layout, props) -> None:
-    """A fold with what is seldom changed."""
+    """Draw a fold with seldom changed settings."""
     header, body = layout.panel("MU_optimize_more", default_closed=True)
     header.label(text="More")
     if not body:
@@ -75,7 +75,7 @@ def _more(layout, props) -> None:
 
 
 def _head(layout, text: str, what: str):
-    """A head with a button that adds a row to a list."""
+    """Draw a head with a button that adds a row to a list."""
     row = layout.row()
     row.label(text=text)
     row.operator("mu.optimize_list", text="", icon="ADD").what = what
@@ -87,7 +87,7 @@ def _remove(row, what: str, index: int) -> None:
 
 
 def _targets(layout, props) -> None:
-    """A box a target: the quantity, where it is read, and what is asked of it."""
+    """Draw a box for each target: the quantity, where it is read, and its goal."""
     _head(layout, "The Unit Shall Have", "targets")
     if not props.targets:
         wrapped(layout, "Press + to say what is asked for: an angle at a pressure, say", "INFO")
@@ -114,7 +114,7 @@ def _targets(layout, props) -> None:
 
 
 def _freedoms(layout, root, props) -> None:
-    """A box a parameter that may change: which, from where to where, and what it is now."""
+    """Draw a box for each free parameter: its range, and its present value."""
     _head(layout, "By Changing", "freedoms")
     if not props.freedoms:
         wrapped(layout, "Press + for each parameter that the search may change", "INFO")
@@ -143,7 +143,7 @@ def _freedoms(layout, root, props) -> None:
 
 
 def asked_title(target, name: str) -> str:
-    """What stands beside a field of a target: its name and unit, for a curve the units of a pair."""
+    """Label beside a field of a target: its name and unit, for a curve the units of a pair."""
     unit = UNITS.get(target.kind, "")
     if name == "points":
         return f"kPa: {unit or 'value'}"
@@ -171,7 +171,7 @@ def _results(layout, found) -> None:
 
 
 def _proposed(layout, proposed) -> None:
-    """A fold for a proposed unit: how it stands to every target, what changed, and what to do with it."""
+    """Draw a fold for a proposed unit: its targets, changes and actions."""
     header, body = layout.panel(f"MU_proposed_{proposed.number}", default_closed=proposed.number > 1)
     missed = [t for t in proposed.targets if not t["met"]]
     header.label(text=f"Unit {proposed.number}", icon="ERROR" if missed else "CHECKMARK")
@@ -204,7 +204,7 @@ def labelled(text: str) -> str:
 
 
 def target_line(target) -> str:
-    """A target in a line: its name, the value with its standard error, and what is asked."""
+    """A target in a line: its name, the value with its standard error, and the goal."""
     if target["value"] is None:
         # The print check's answer, or that of a unit that does not bear the pressure.
         return f"{target['name']}: {'yes' if target['met'] else 'no'}"
@@ -215,7 +215,7 @@ def target_line(target) -> str:
 
 
 def target_icon(target) -> str:
-    """Met for all values within two standard errors, met, or missed; an objective has none of these."""
+    """Icon of a target: met for all values within two standard errors, met, or missed, if it has a goal."""
     if target["objective"]:
         return "DRIVER_DISTANCE"
     return "CHECKMARK" if target["robust"] else BARELY if target["met"] else "ERROR"

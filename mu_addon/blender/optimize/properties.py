@@ -1,4 +1,4 @@
-"""What a unit shall do and what of it is free, as Blender properties on the unit's object."""
+"""Targets and free parameters of a unit, as Blender properties on its object."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -26,7 +26,7 @@ from ..unit.fields import blender_property, exact, label, true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
-"""Sections whose numbers may be free; those of sensor, printer and laws with memory are not offered."""
+"""Sections whose numbers may be free; those of sensor, printer and laws with history are not offered."""
 FREE = {
     name: d
     for name, d in parameters().items()
@@ -38,9 +38,9 @@ NAMED = {
     PATH: ("Sensor: Path", "Path of the sensor; a target whose path is left empty is of it"),
     RESIN: ("Resin", "Resin of the library: its moduli, density and elongation at break"),
 }
-"""What has names in place of numbers: how each is listed, and what it is."""
+"""Choices by name instead of numbers: the label of each, and its description."""
 AROUND = 0.25
-"""A parameter that is made free may first change by this share of its value to either side."""
+"""Share of its value by which a newly freed parameter may first change to either side."""
 
 KINDS = [
     ("angle", "Angle", "Bending angle under a pressure, in degrees"),
@@ -63,14 +63,14 @@ AT_PRESSURE = ("angle", "tip_force", "tip_position", "stretch", "safety", "air_v
 OF_PATH = ("deviation", "sensor_slope")
 AT_TWO = (*OF_PATH, "workspace")
 YES = ("walls_apart", "printable")
-"""Kinds of targets that are read at one pressure, that are of a path, read at two, that are a yes or a no."""
+"""Kinds of targets read at one pressure, those of a path, those read at two, those without a number."""
 ASKED = {"low": ("low",), "high": ("high",), "range": ("low", "high"), "value": ("value", "tolerance")}
 ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
-"""What each way of asking needs."""
+"""Fields that each way of asking needs."""
 
 
 class MU_PG_target(bpy.types.PropertyGroup):
-    """One target of a design: a quantity and what is asked of it."""
+    """One target of a design: a quantity and its goal."""
 
     kind: EnumProperty(name="Quantity", description="What is asked for", items=KINDS)
     pressure_kPa: FloatProperty(
@@ -146,12 +146,12 @@ class MU_PG_target(bpy.types.PropertyGroup):
 
 
 def asks_curve(target) -> bool:
-    """Whether a target is asked for as a curve over pressure; one that is a yes or a no never is."""
+    """Return True if a target is a curve over pressure; never for one without a number."""
     return bool(target.ask == "curve" and target.kind not in YES)
 
 
 def _first_range(freedom, context) -> None:
-    """Let a parameter's first range lie around the unit's present value, within the parameter's bounds."""
+    """Set a parameter's first range around the unit's present value, within the parameter's bounds."""
     if freedom.parameter in NAMED:
         freedom.values = ", ".join(names_of(freedom.id_data, freedom.parameter))
         return
@@ -176,7 +176,7 @@ def present(root, name: str) -> float:
 
 
 def names_of(root, name: str) -> list[str]:
-    """All names that a freedom of `NAMED` may have; of a unit that breaks a rule no path."""
+    """All names that a freedom of `NAMED` may have; no path for a unit that breaks a rule."""
     if name == PATH:
         try:
             return [w.name for w in windows(to_unit(root.mu_unit).chambers.count)]
@@ -186,19 +186,19 @@ def names_of(root, name: str) -> list[str]:
 
 
 def title(name: str, d: Description) -> str:
-    """How a parameter is listed: its section and its label, as "Chambers: Wall"."""
+    """Title of a parameter in a list: its section and its label, as "Chambers: Wall"."""
     section = name.rpartition(".")[0]
     return f"{sentence(section)}: {label(d)}" if section else label(d)
 
 
 def scale_of(freedom) -> float:
-    """True millimetres in one of the parameter's; 1 for what is no length, and the same at every scale."""
+    """True millimetres in one of the parameter's; 1 if it is no length or the same at every scale."""
     d = FREE.get(freedom.parameter)
     return 1.0 if d is None or d.unit != "mm" else true_scale(freedom.id_data.mu_unit, d)
 
 
 def _true(name: str, title: str):
-    """The value `name` of a freedom as it is at the unit's scale."""
+    """Value `name` of a freedom at the unit's scale."""
 
     def read(freedom) -> float:
         return getattr(freedom, name) * scale_of(freedom)
@@ -252,7 +252,7 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
 
 
 class MU_PG_optimize(bpy.types.PropertyGroup):
-    """Targets and freedoms of a unit, and how the search goes about them."""
+    """Targets and freedoms of a unit, and settings of the search."""
 
     source: EnumProperty(
         name="Targets",

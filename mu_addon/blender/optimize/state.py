@@ -1,4 +1,4 @@
-"""A unit's optimisation: from the properties to the core's job, and what its run has found."""
+"""A unit's optimisation: the core's job from the properties, and the results of its run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
 DESIGN, UNIT, MODEL, SUMMARY = "design.toml", "unit.toml", "model.toml", "summary.json"
 FRONT = "front.png"
-"""What the core draws of two targets, in the run's folder."""
+"""Picture of two targets' front by the core, in the run's folder."""
 
 
 TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
@@ -39,10 +39,10 @@ TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
 
 @attrs.frozen(eq=False)
 class Proposed:
-    """A proposed unit: its file and, as summary.json has them, its targets, changes and reasons in words.
+    """A proposed unit: its file and, as in summary.json, its targets, changes and reasons in words.
 
-    targets: of each the values of `TARGET_KEYS` and its standard_error;
-    applied: whether the unit in the scene has its parameters.
+    targets: of each the values of `TARGET_KEYS` and its standard_error; applied: True if the unit in the
+    scene has its parameters.
     """
 
     number: int
@@ -55,11 +55,10 @@ class Proposed:
 
 @attrs.frozen(eq=False)
 class Findings:
-    """What the optimisation in a unit's folder has found; other_start: of a unit with other parameters.
+    """Results of the optimisation in a unit's folder; other_start: of a unit with other parameters.
 
-    feasible: whether a unit met every target on the search's mesh; simulated: how many units that run
-    simulated; seconds: what its stages took; in_the_way: names of the targets without which the others can
-    be met.
+    feasible: a unit met every target on the search's mesh; simulated: number of units that run simulated;
+    seconds: of its stages; in_the_way: names of the targets without which the others can be met.
     """
 
     folder: Path
@@ -79,7 +78,7 @@ def folder_of(root: Any) -> Path:
 
 
 def plan_of(root: Any) -> list[tuple[str, float]]:
-    """Stages of an optimisation, with the seconds that each is expected to take."""
+    """Stages of an optimisation, with the expected seconds of each."""
     s = root.mu_optimize
     units = s.evaluations
     found = findings(root)
@@ -123,7 +122,7 @@ def target_table(target: Any) -> dict[str, Any]:
 
 
 def _numbers(text: str, between: str) -> list[Any]:
-    """Numbers of a text, whole ones as such; a part that is none stays text, which the core refuses."""
+    """Numbers in a text, whole ones as integers; other parts stay text, which the core refuses."""
     found: list[Any] = []
     for part in text.split(between):
         try:
@@ -134,7 +133,7 @@ def _numbers(text: str, between: str) -> list[Any]:
 
 
 def freedom_table(freedom: Any) -> dict[str, Any]:
-    """A freedom of the panel as its [[freedom]] table; what a rule ties to it follows."""
+    """A freedom of the panel as its [[freedom]] table, with the parameters tied to it."""
     if freedom.parameter in NAMED:
         names = [name.strip() for name in freedom.values.split(",")]
         return {"parameter": freedom.parameter, "values": [name for name in names if name]}
@@ -156,7 +155,7 @@ def freedom_table(freedom: Any) -> dict[str, Any]:
 
 
 def document(root: Any) -> dict[str, Any]:
-    """What design.toml says of the panel's targets and freedoms."""
+    """Content of design.toml from the panel's targets and freedoms."""
     s = root.mu_optimize
     more: dict[str, Any] = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
     if s.printed_struts:
@@ -174,7 +173,7 @@ def document(root: Any) -> dict[str, Any]:
 
 
 def job_of(root: Any) -> Job:
-    """The optimisation that a unit's properties ask for; raises InputError."""
+    """Optimisation job from a unit's properties; raises InputError."""
     # Only now: it brings in the solver's packages, which a Blender may lack.
     from ...optimization.design_file import parse_design
     from ...toml_writer import toml_text
@@ -190,7 +189,7 @@ def job_of(root: Any) -> Job:
 
 
 def write_inputs(root: Any, folder: Path) -> None:
-    """Write what the unit's optimisation is asked to do into a folder; raises InputError, OutputError."""
+    """Write the inputs of the unit's optimisation into a folder; raises InputError, OutputError."""
     from ...usecases.optimize.job import LAYOUT
 
     job = job_of(root)
@@ -213,7 +212,7 @@ _units: FileCache[str] = FileCache()
 
 
 def findings(root: Any) -> Findings | None:
-    """What the unit's optimisation has found, or None where there is none that can be read."""
+    """Results of the unit's optimisation, or None where none can be read."""
     folder = folder_of(root)
     files = [folder / name for name in (SUMMARY, UNIT)]
     found = _found.read(files, lambda: _read(files[0]))
@@ -260,7 +259,7 @@ def _now(root: Any) -> str:
 
 
 def as_kept(unit: Unit) -> Unit:
-    """The unit with its numbers as Blender's single precision keeps them; raises InputError by a rule."""
+    """The unit with its numbers rounded to Blender's single precision; raises InputError by a rule."""
     sections = {}
     for section in SECTIONS:
         own = getattr(unit, section.section)
@@ -272,7 +271,7 @@ def as_kept(unit: Unit) -> Unit:
 
 
 def proposed_unit(root: Any, number: int) -> Unit:
-    """The proposed unit of a number from 1, as its file has it; raises InputError where there is none."""
+    """Proposed unit of a number from 1, from its file; raises InputError where there is none."""
     found = findings(root)
     rows = () if found is None else found.proposed
     if not 1 <= number <= len(rows):

@@ -1,4 +1,4 @@
-"""Names and ranks of the candidate paths, and what their colours mean, drawn over the viewport."""
+"""Names and ranks of the candidate paths, and the key to their colours, drawn over the viewport."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from ..unit.drawing import CANDIDATE
 from . import ranking
 
 BETTER = "Mean deviation [mm], smaller is better"
-"""What a ranking says of its numbers, beside the lattice and in the panel."""
+"""Note on a ranking's numbers, beside the lattice and in the panel."""
 BESIDE = 190
-"""Pixels that the legend of a field takes, to the left of this one."""
+"""Pixels taken by the legend of a field, to the left of this one."""
 
 
 def lines(known: ranking.Known) -> list[str]:
-    """Lines above the ramp: what it shows, and where the ranking is stale, that it is."""
+    """Lines above the ramp: its quantity and, if the ranking is stale, a note."""
     if known.stale:
         return ["Mean deviation", "stale: ranked with other parameters, hence grey"]
     return [BETTER]
@@ -71,9 +71,9 @@ def _draw() -> None:
 
 
 def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
-    """The unit whose candidate paths are told of, and those of them that are seen.
+    """Unit of the visible candidate paths, and these paths.
 
-    It is the active one, or another one while that shows none: colours and legend go together.
+    It is the active one, or another if that shows none: colours and legend go together.
     """
     active = unit_object.active_root(context)
     for root in [active, *(other for other in unit_object.roots() if other != active)]:
@@ -97,7 +97,7 @@ def _legend(context: Any, root: Any, known: ranking.Known, scale: float) -> None
 
 
 def _seen(root: Any) -> list[tuple[str, Any]]:
-    """Candidate paths that are seen, by name."""
+    """Visible candidate paths, by name."""
     found = ((str(child.get(PART, "")), child) for child in root.children)
     return [
         (part.removeprefix(CANDIDATE), child)

@@ -36,7 +36,7 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
 
 
 def selected_candidate(context) -> str:
-    """Name of the candidate path that is the active object, or nothing."""
+    """Name of the candidate path that is the active object, or ""."""
     obj = unit_object.active_object(context)
     part = obj.get(PART, "") if obj else ""
     return part.removeprefix(CANDIDATE) if part.startswith(CANDIDATE) else ""

@@ -39,7 +39,7 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
 
 def _list(layout, context, root) -> None:
-    """Every path: its anchors and, once they are ranked, its mean deviation and rank."""
+    """Draw every path: its anchors and, once ranked, its mean deviation and rank."""
     ranked = ranking.ranked(root)
     row = layout.row(align=True)
     row.use_property_split = False
@@ -62,7 +62,7 @@ def _list(layout, context, root) -> None:
 
 
 def in_order(root, ranked, order: str):
-    """Windows of a unit by their names or, where they are ranked and it is wanted, the best first."""
+    """Windows of a unit by their names or, if ranked and wanted, the best first."""
     found = windows(root.mu_unit.chambers.count)
     if order == "name":
         return found
@@ -76,7 +76,7 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 
 
 def register() -> None:
-    """The panel, and the order of its list, which no file keeps."""
+    """Register the panel, and the order of its list, which no file keeps."""
     bpy.types.WindowManager.mu_path_order = EnumProperty(
         name="Order", description="Order of the list of paths", items=ORDERS, default="deviation"
     )
@@ -84,6 +84,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     _unregister_classes()
     del bpy.types.WindowManager.mu_path_order

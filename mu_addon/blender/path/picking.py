@@ -1,7 +1,7 @@
-"""A click on a candidate path in the 3D view chooses it, as its button in the panel does.
+"""A click on a candidate path in the 3D view chooses it, like its button in the panel.
 
-Blender tells of a selection by an update of its dependency graph, from which no operator may be called: the
-choice follows a moment later, from a timer.
+Blender reports a selection by an update of its dependency graph, in which no operator may be called: a timer
+makes the choice a moment later.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ..unit import object as unit_object
 from .operators import selected_candidate
 
 _last = 0
-"""Number of the object that was active at the last look: only another one is a click."""
+"""Number of the object that was active at the last check: only another one is a click."""
 
 
 _restoring = False
-"""Whether undo or redo is at work: what they make active was clicked before."""
+"""True during undo or redo: an object they make active was clicked before."""
 
 
 def _active() -> int:
@@ -74,12 +74,12 @@ _HANDLERS = {
 
 
 def register() -> None:
-    """Look which object is active."""
+    """Register handlers that watch the active object."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """Look no more."""
+    """Unregister them."""
     handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_choose):
         bpy.app.timers.unregister(_choose)

@@ -1,4 +1,4 @@
-"""Candidate paths by what the study found: J and rank of each, and the colour and label of its tube."""
+"""Candidate paths by the study's results: J and rank of each, and the colour and label of its tube."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ from ..simulate import study_folder as studies
 
 @attrs.frozen
 class Known:
-    """What the shown run knows of the candidate paths: J_hat in mm by name, the best first.
+    """Candidate paths of the shown run: J_hat in mm by name, the best first.
 
-    stale: whether it is of a unit with other parameters.
+    stale: True if it is of a unit with other parameters.
     """
 
     j: dict[str, float]
     stale: bool = False
 
     def share(self, name: str) -> float:
-        """Place of a path's J between the smallest, 0, and the largest, 1, as its colour shows it."""
+        """Position of a path's J between the smallest, 0, and the largest, 1, shown by its colour."""
         return self.share_of(self.j[name])
 
     def share_of(self, j: float) -> float:
-        """As `share`, of a J in mm. By the root: the best paths are told apart best."""
+        """Position of a J in mm, as `share`. Its root, which separates the best paths most."""
         low, high = min(self.j.values()), max(self.j.values())
         return float(np.sqrt((j - low) / (high - low))) if high > low else 0.0
 
 
 def known(root: Any) -> Known:
-    """J of every path by the shown run, also where that is stale; empty without a ranking."""
+    """J of every path in the shown run, also if that is stale; empty without a ranking."""
     found = studies.findings(root)
     return Known({}) if found is None else Known(dict(found.ranking), found.stale)
 
 
 def ranked(root: Any) -> dict[str, tuple[float, int]]:
-    """J_hat in mm and rank, from 1, of every path by name; empty without results or where they are stale."""
+    """J_hat in mm and rank, from 1, of every path by name; empty without results or if they are stale."""
     found = known(root)
     return {} if found.stale else {name: (j, rank) for rank, (name, j) in enumerate(found.j.items(), 1)}
 
 
 def free(root: Any) -> tuple[str, float, Any] | None:
-    """Name, J_hat in mm and points (h, 3) in mm of the whole lattice's best path; None if not known."""
+    """Name, J_hat in mm and points (h, 3) in mm of the whole lattice's best path; None if unknown."""
     found = studies.findings(root)
     best = None if found is None or found.stale else (found.summary.get("search") or {}).get("best")
     return (best["name"], best["J_hat_mm"], np.array(best["points_mm"])) if best else None
@@ -56,7 +56,7 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
     """Colour and label candidate tubes, objects by path; the chosen one keeps its colour.
 
-    What is stale is grey, its rank with a question mark.
+    Stale ones are grey, their rank with a question mark.
     """
     found = known(root)
     for rank, name in enumerate(found.j, 1):
@@ -76,7 +76,7 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
 
 
 def write_colour(tube: Any) -> None:
-    """Have a tube's points carry the colour of its material, which solid shading shows by attribute."""
+    """Give a tube's points the colour of its material, which solid shading shows by attribute."""
     mesh = tube.data
     colour = np.float32(mesh.materials[0].diffuse_color)
     attribute = mesh.color_attributes.get(field_colours.COLOUR) or mesh.color_attributes.new(

@@ -1,4 +1,4 @@
-"""Colours of the parts, as materials that the user may change: they are made once and then left alone."""
+"""Colours of the parts, as materials that the user may change: made once and then left alone."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def material(name: str):
 
 
 def unlit(name: str):
-    """As `material`, but it shines by itself, so that light does not change what its colour says."""
+    """The material of that name with emission, so that light does not change its colour."""
     return bpy.data.materials.get(name) or shining(material(name))
 
 
 def shining(found):
-    """Turn a material's surface into a plain emission of its colour."""
+    """Make a material's surface a plain emission of its colour."""
     if found.node_tree is None:  # before 5.0
         found.use_nodes = True
     nodes = found.node_tree.nodes
@@ -61,7 +61,7 @@ def shining(found):
 
 
 def assign(mesh, *names: str) -> None:
-    """Give a mesh these materials in its slots, in order, where it has none yet."""
+    """Give a mesh these materials in its slots, in order, if it has none yet."""
     if not mesh.materials:
         for name in names:
             mesh.materials.append(material(name))

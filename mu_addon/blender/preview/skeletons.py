@@ -1,6 +1,6 @@
 """Values of the design's steps as arrays to draw, and candidate paths.
 
-Everything here is for the eye and takes milliseconds; what is printed or simulated comes from the core.
+All of it is for display and takes milliseconds; printed or simulated geometry comes from the core.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 AROUND = 48
-"""Flat pieces around the axis."""
+"""Number of flat pieces around the axis."""
 ALONG_STRUT = 4
-"""Straight pieces of a strut, enough to see its taper."""
+"""Number of straight pieces of a strut, enough to show its taper."""
 WIDEST_LANE = 0.4
-"""Distance, in cells, between candidate paths drawn side by side, where the lattice is as wide."""
+"""Largest distance, in cells, between candidate paths drawn side by side, if the lattice is wide enough."""
 CANDIDATE_RADIUS = 0.07
 """Radius, in cells, of a candidate path's tube."""
 _CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -91,7 +91,7 @@ def boxes(graph: Graph | None) -> Skeleton | None:
 
 
 def lines(trimmed: TrimmedStruts | None, cut: bool) -> Skeleton | None:
-    """Axes of the struts that show; with `cut`, those at x <= 0."""
+    """Axes of the visible struts; with `cut`, those at x <= 0."""
     return None if trimmed is None else lattice(Struts(trimmed, None), cut)
 
 
@@ -110,7 +110,7 @@ def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
 
 
 def anchor_skeleton(points: Floats | None, struts: Struts | None) -> Skeleton | None:
-    """Anchors as points, a little wider than the junctions they are in."""
+    """Anchors as points, a little wider than their junctions."""
     if points is None:
         return None
     thick = struts is not None and struts.lattice is not None
@@ -130,7 +130,7 @@ def line_through(path: Path | None) -> Skeleton | None:
 
 
 def bar(found: Bar | None) -> Skeleton | None:
-    """The waveguide's bar and seats (slot 0) with what is cut out of them (slot 1)."""
+    """The waveguide's bar and seats (slot 0) with the volumes cut from them (slot 1)."""
     if found is None:
         return None
     solid = [*found.legs, *(seat.body.corners for seat in found.seats)]
@@ -145,7 +145,7 @@ def candidates(unit: Unit, cut: bool) -> dict[str, Skeleton]:
     """Every candidate path by name on the lattice's face toward +x or, with `cut`, on its section.
 
     All of them run along one column of anchors, where they would cover each other: seen from +x each has its
-    true length and height, and a lane of its own, side by side. A ranking moves none of them.
+    true length and height, in a separate lane. A ranking moves none of them.
     """
     d = unit.dimensions
     at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0
@@ -215,7 +215,7 @@ def placed(part: Skeleton, rotation: ArrayLike, shift: ArrayLike) -> Skeleton:
 
 
 def free_path(points: Floats, name: str, cell: float) -> Skeleton:
-    """A path through any nodes of the lattice, points (h, 3) in mm, where it lies, and its name."""
+    """A path through any nodes of the lattice, points (h, 3) in mm, at its true position, and its name."""
     at = (float(points[0, 0]) + 0.3 * cell, float(points[0, 1]) + 0.15 * cell, float(points[0, 2]))
     return Skeleton(
         points,
@@ -290,7 +290,7 @@ def _facing_x(vertices: Floats, triangles: Integers) -> Integers:
 
 
 def write(mesh: Any, skeleton: Skeleton) -> None:
-    """Replace the geometry of a Blender mesh by a skeleton, materials kept."""
+    """Replace the geometry of a Blender mesh by a skeleton, keeping its materials."""
     mesh.clear_geometry()
     mesh.vertices.add(len(skeleton.vertices))
     mesh.attributes["position"].data.foreach_set("vector", skeleton.vertices.astype(np.float32).ravel())

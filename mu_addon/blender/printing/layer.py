@@ -1,4 +1,4 @@
-"""A layer of the print in the 3D view: a section of the solid, and what it encloses in another colour."""
+"""A layer of the print in the 3D view: a section of the solid, and its enclosed areas in another colour."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def facts(shown: Any) -> dict[str, float]:
 
 
 def put(root: Any) -> Any:
-    """Show the layer that is set, in place of one that is shown; raises MuError without a solid."""
+    """Show the set layer, replacing the shown one; raises MuError without a solid."""
     shown = layer_object(root)
     if shown is None:
         shown = displays.lock(displays.add(root, displays.LAYER, "1", bpy.data.meshes.new("Layer"), "Layer"))
@@ -47,14 +47,14 @@ def put(root: Any) -> Any:
 
 
 def follow(root: Any) -> None:
-    """Draw the layer that is shown again, after the height or the build direction changed."""
+    """Redraw the shown layer, after the height or the build direction changed."""
     shown = layer_object(root)
     if shown is not None and unit_object.solid_is_current(root):
         _draw(root, shown)
 
 
 def clear(root: Any) -> None:
-    """Take the layer off the scene."""
+    """Remove the layer from the scene."""
     shown = layer_object(root)
     if shown is not None:
         displays.remove(shown)

@@ -1,4 +1,4 @@
-"""Marks in the view of what a check found: a ball at every place, an arrow along the build direction."""
+"""Marks of a check's findings in the view: a ball at every location, an arrow along the build direction."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ MARK = displays.CHECK
 """Its value on a mark is the finding's number, and `UP` on the arrow along the build direction."""
 UP = "up"
 LARGER = 1.8
-"""How much larger the ball at the place that is looked at is."""
+"""Factor on the ball at the location in view."""
 OF = "mu_check_of"
-"""On that arrow: digest of the check that is marked."""
+"""On that arrow: digest of the marked check."""
 MATERIAL = {"error": "MU Flaws", "warning": "MU Doubt"}
 
 
 def mark_objects(root: Any) -> list[Any]:
-    """The objects that show where a check found something."""
+    """Objects that mark the findings of a check."""
     return [child for child in root.children if MARK in child]
 
 
 def marked(root: Any) -> str:
-    """Digest of the check whose places are marked, or nothing."""
+    """Digest of the check whose locations are marked, or ""."""
     return next((obj[OF] for obj in mark_objects(root) if obj[MARK] == UP), "")
 
 
@@ -42,7 +42,7 @@ def clear(root: Any) -> None:
 
 
 def mark(root: Any, found: Any) -> None:
-    """Put a ball at every place of every error and warning, in place of those that were there."""
+    """Put a ball at every location of every error and warning, replacing earlier ones."""
     clear(root)
     for number, finding in enumerate(found.findings):
         if finding["severity"] not in FAULTS or not len(finding["places"]):
@@ -71,7 +71,7 @@ def _mark_object(root: Any, name: str, data: Any, value: str) -> Any:
 
 
 def resize(root: Any) -> None:
-    """Give the marks the radius that is set, and the place that is looked at a larger one."""
+    """Give the marks the set radius, and the location in view a larger one."""
     settings = root.mu_print
     for obj in mark_objects(root):
         if obj.data is None:
@@ -84,7 +84,7 @@ def resize(root: Any) -> None:
 
 
 def frame(root: Any, place: Any, reach: float) -> None:
-    """Turn every 3D view to a place (3,) in mm of the unit's frame, so that `reach` mm around it are seen."""
+    """Turn every 3D view to a position (3,) in mm of the unit's frame, showing `reach` mm around it."""
     centre = root.matrix_world @ Vector(place)
     for area in viewports.areas():
         view = area.spaces.active.region_3d

@@ -1,4 +1,4 @@
-"""Check a unit for the printer, look at what was found, and write its files and specimens."""
+"""Check a unit for the printer, look at the findings, and write its files and specimens."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -18,7 +18,7 @@ NOT_CHECKED = "Check the print first"
 
 
 class _Job(ValidUnitOperator):
-    """An operator that starts one of the jobs for the printer; greyed, with the reason, where it cannot."""
+    """An operator that starts a job for the printer; greyed out, with the reason, where it cannot."""
 
     job = ""
 
@@ -56,7 +56,7 @@ class MU_OT_print_check(_Job, bpy.types.Operator):
 
 
 class MU_OT_print_check_file(_Job, bpy.types.Operator):
-    """Check the printability of an STL file, repaired before where that is asked"""
+    """Check the printability of an STL file, repaired first if asked"""
 
     bl_idname = "mu.print_check_file"
     bl_label = "Check File"
@@ -65,7 +65,7 @@ class MU_OT_print_check_file(_Job, bpy.types.Operator):
 
 
 class MU_OT_print_export(_Job, bpy.types.Operator):
-    """Write the chosen files of the unit with its path; asks first where the check found errors"""
+    """Write the chosen files of the unit with its path; asks first if the check found errors"""
 
     bl_idname = "mu.print_export"
     bl_label = "Export"
@@ -88,7 +88,7 @@ class MU_OT_print_export(_Job, bpy.types.Operator):
 
 
 class MU_OT_print_specimens(_Job, bpy.types.Operator):
-    """Write lattice cubes, coupons and a gauge to print, a sheet of what to measure, a folder for the data"""
+    """Write lattice cubes, coupons and a gauge to print, a sheet of measurements, a folder for the data"""
 
     bl_idname = "mu.print_specimens"
     bl_label = "Export Specimens"
@@ -97,7 +97,7 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
 
 
 def _path_of(root, what):
-    """The file or folder that `what` stands for; log and errors are of the latest job."""
+    """File or folder for `what`; log and errors are of the latest job."""
     if what in (printing.EXPORT, printing.SPECIMENS, printing.FILE_CHECK):
         return printing.folder_of(root, what)
     if what == "file_report":
@@ -107,7 +107,7 @@ def _path_of(root, what):
 
 
 class _OfCheck(UnitOperator):
-    """An operator on what a check found; greyed where there is none of the unit as it is."""
+    """An operator on a check's findings; greyed out without a check of the unit in its present state."""
 
     @classmethod
     def poll(cls, context):
@@ -155,7 +155,7 @@ class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_print_show(_OfCheck, bpy.types.Operator):
-    """Turn the view to a place of this finding; once more: to the next one"""
+    """Turn the view to a location of this finding; click again for the next one"""
 
     bl_idname = "mu.print_show"
     bl_label = "Show Finding"
@@ -227,7 +227,7 @@ class MU_OT_print_up(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
-    """Show a layer of the solid along the build direction Up: material in yellow, what it encloses in blue"""
+    """Show a layer of the solid along the build direction Up: material in yellow, enclosed areas in blue"""
 
     bl_idname = "mu.print_layer"
     bl_label = "Show Layer"
@@ -249,7 +249,7 @@ class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
 
 
 class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
-    """Take the layer off the scene, and show the whole solid again"""
+    """Remove the layer from the scene, and show the whole solid again"""
 
     bl_idname = "mu.print_layer_clear"
     bl_label = "Clear Layer"

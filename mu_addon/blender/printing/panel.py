@@ -18,9 +18,9 @@ from .properties import OWN_PRINTER
 JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
 DIRECTIONS = 3
-"""Build directions that are shown; the report has them all."""
+"""Number of build directions that are shown; the report has them all."""
 NOT_PRINTABLE = 6
-"""Exit status of a check that went well and found an error."""
+"""Exit status of a completed check that found an error."""
 
 
 class MU_PT_print(UnitPanel, bpy.types.Panel):
@@ -75,7 +75,7 @@ class _OfPrint(UnitPanel):
 
 
 class MU_PT_print_check(_OfPrint, bpy.types.Panel):
-    """Printability check: findings with their places, and the best build directions"""
+    """Printability check: findings with their locations, and the best build directions"""
 
     bl_idname = "MU_PT_print_check"
     bl_label = "Check"
@@ -110,7 +110,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
 
 
 def _findings(layout, settings, found) -> None:
-    """A line for every error and warning, the chosen one in full; then how many passed."""
+    """Draw a line for every error and warning, the chosen one in full; then how many passed."""
     passed = []
     for number, finding in enumerate(found.findings):
         if finding["severity"] == "pass":
@@ -161,7 +161,7 @@ def _measure(finding) -> str:
 
 
 def _directions(layout, settings, found) -> None:
-    """The best build directions of the check and the chosen one, with what each costs and a button."""
+    """Draw the best build directions of the check and the chosen one, with their costs and a button."""
     builds = found.found["orientation"]
     if not builds:
         return
@@ -233,7 +233,7 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
 
 
 class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
-    """Layers of the solid as they are built, one at a time in the 3D view"""
+    """Layers of the solid, one at a time in the 3D view"""
 
     bl_idname = "MU_PT_print_layers"
     bl_label = "Layers"

@@ -1,4 +1,4 @@
-"""How a unit is to be printed, kept on its root object beside its parameters."""
+"""Print settings of a unit, kept on its root object beside its parameters."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -26,11 +26,11 @@ FORMATS = (
     ("step", "STEP", "Cavity, membrane, envelope and waveguide for CAD, nominal size"),
     ("txt", "TXT", "Nodes of the lattice and the anchors"),
 )
-"""Kinds of files of an export: the core's name, the name here, and what they hold."""
+"""Formats of an export: the core's name, the name here, and their content."""
 
 
 class MU_PG_print(bpy.types.PropertyGroup):
-    """How a unit is to be printed, and what is written for it."""
+    """Print settings of a unit, and the files to write."""
 
     printer: EnumProperty(
         name="Printer",

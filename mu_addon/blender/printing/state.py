@@ -1,6 +1,6 @@
-"""What was checked and written for the printer of a unit: its job, folders, findings and files.
+"""Checks, exports and specimens of a unit: the job, folders, findings and files.
 
-A unit has one job for the printer at a time, a check, an export or its specimens, beside its simulation.
+A unit has one job for the printer at a time, beside its simulation.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 CHECK, FILE_CHECK, EXPORT, SPECIMENS = "check", "check-file", "export", "specimens"
-"""Jobs for the printer, and their folders in the unit's study folder; a file's check is one of a file."""
+"""Jobs for the printer, and their folders in the unit's study folder; the check of a file has its own."""
 NEEDED = ("scipy", "manifold3d", "matplotlib")
-"""Modules that these jobs cannot do without; STEP needs gmsh, too, and says so itself."""
+"""Modules that these jobs need; STEP also needs gmsh, and reports that itself."""
 MANIFEST = "manifest.json"
 OWN = "own.json"
-"""Says of which unit and body the STL is that was handed to a check."""
+"""Unit and body of the STL that a check was given."""
 
 
 @attrs.frozen(eq=False)
 class Checked:
-    """What a check found: check.json and its digest; stale: why it is not one of the unit as it is now."""
+    """Result of a check: check.json and its digest; stale: why it does not belong to the unit now."""
 
     folder: Path
     stale: str
@@ -55,13 +55,13 @@ class Checked:
 
     @property
     def findings(self) -> list[dict[str, Any]]:
-        """Every finding, as `Finding.plain` has it, the gravest first."""
+        """All findings, as of `Finding.plain`, the most severe first."""
         order = ("error", "warning", "info", "pass")
         return sorted(self.found["findings"], key=lambda f: order.index(f["severity"]))
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """The findings for which it must not be printed."""
+        """Findings that forbid printing."""
         return [f for f in self.findings if f["severity"] == "error"]
 
 
@@ -86,7 +86,7 @@ _exports: FileCache[dict[str, Any]] = FileCache()
 
 
 def printer_of(root: Any) -> Printer:
-    """The printer that is chosen, with the limits that were measured; raises InputError for bad files."""
+    """The chosen printer, with measured limits; raises InputError for bad files."""
     printer, measured = _printer(root), root.mu_print.limits_file
     if not measured:
         return printer
@@ -113,14 +113,14 @@ def _shipped(name: str) -> Printer:
 
 
 def path_of(root: Any, unit: Unit) -> str:
-    """Name of the window that the waveguide follows, or nothing; raises InputError for muted steps."""
+    """Name of the window that the waveguide follows, or ""; raises InputError for muted steps."""
     given = stack.given(root, unit)
     require_whole(given)
     return "" if "path" in given.muted else given.path
 
 
 def trouble(root: Any, command: str) -> str:
-    """Why a job for the printer cannot be started now, or nothing."""
+    """Why a job for the printer cannot be started now, or ""."""
     if absent := lacking(NEEDED):
         return absent
     settings = root.mu_print
@@ -152,12 +152,12 @@ def trouble(root: Any, command: str) -> str:
 
 
 def own_body(root: Any) -> bool:
-    """Whether the user's own body takes the place of the lattice's box."""
+    """Return True if the user's own body replaces the lattice's box."""
     return bool(bodies.fingerprint(root))
 
 
 def write_inputs(root: Any, command: str, folder: Path) -> None:
-    """Write what a job for the printer is asked to do into its folder; raises MuError."""
+    """Write the inputs of a job for the printer into its folder; raises MuError."""
     unit = to_unit(root.mu_unit)
     inputs = {CHECK: _check, FILE_CHECK: _check_file, EXPORT: _export, SPECIMENS: _specimens}[command]
     layout, job = inputs(root, unit, folder)
@@ -168,7 +168,7 @@ def write_inputs(root: Any, command: str, folder: Path) -> None:
 
 
 def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    """A check of the unit; one in a body of the user's own is checked by its STL, which is built first."""
+    """Check of the unit; one in the user's own body is checked by its STL, which is built first."""
     from ...usecases.check_print.job import LAYOUT, Job
 
     up = tuple(exact(x) for x in root.mu_print.up)
@@ -180,7 +180,7 @@ def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 
 def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    """A check of an STL file, repaired before where that was asked, and compared with the unit."""
+    """Check of an STL file, repaired first if asked, and compared with the unit."""
     from ...usecases.check_print.job import LAYOUT, Job, read_stl
 
     settings = root.mu_print
@@ -225,7 +225,7 @@ def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
-    """Write the solid of a unit in the user's own body, and of what it is."""
+    """Write the solid of a unit in the user's own body, and its origin."""
     solid = unit_object.solid_of(root, unit)
     content = stl_bytes(solid.vertices, solid.triangles)
     write_bytes(folder / "own.stl", content)
@@ -239,7 +239,7 @@ def _shape(root: Any, unit: Unit) -> list[str]:
 
 
 def checked(root: Any) -> Checked | None:
-    """What the check in the unit's folder found, or None where there is none."""
+    """Result of the check in the unit's folder, or None."""
     folder = folder_of(root, CHECK)
     found, inputs, unit, limits = (
         folder / name for name in ("check.json", "check.toml", "unit.toml", "printer.toml")
@@ -265,7 +265,7 @@ def checked(root: Any) -> Checked | None:
 
 
 def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
-    """Why a check is not one of the unit as it is, or nothing."""
+    """Why a check does not belong to the unit now, or ""."""
     try:
         if _shape(root, to_unit(root.mu_unit)) != shape:
             return "it belongs to other parameters"
@@ -278,7 +278,7 @@ def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
 
 
 def checked_file(root: Any) -> dict[str, Any] | None:
-    """check.json of the file that is chosen, as it was asked to be checked; None where there is none."""
+    """check.json of the chosen file with the present settings; None where there is none."""
     settings = root.mu_print
     folder = folder_of(root, FILE_CHECK)
     found, inputs = folder / "check.json", folder / "check.toml"
@@ -298,7 +298,7 @@ def checked_file(root: Any) -> dict[str, Any] | None:
 
 @attrs.frozen(eq=False)
 class Exported:
-    """The manifest of an export; stale: why it is not of the unit now."""
+    """Manifest of an export; stale: why it does not belong to the unit now."""
 
     folder: Path
     stale: str
@@ -306,7 +306,7 @@ class Exported:
 
 
 def exported(root: Any) -> Exported | None:
-    """What the unit's folder of exports holds, or None where there is nothing whole."""
+    """Content of the unit's folder of exports, or None if nothing there is complete."""
     path = folder_of(root, EXPORT) / MANIFEST
 
     def read() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Physical fields in colour: what each is called, and the material whose ramp shows it.
+"""Physical fields in colour: their names, and the material whose ramp shows them.
 
 The attribute keeps its values and its unit; the material scales it to its ramp, so that another range or
 other colours change no data.
@@ -16,22 +16,22 @@ from ...report.charts import MAP
 from ..preview import materials
 
 STOPS = 9
-"""Colours of the ramp when it is made; the user may change them, and the legend follows."""
+"""Initial colours of the ramp; the user may change them, and the legend follows."""
 TABLE = 128
-"""Colours that solid shading tells apart."""
+"""Number of distinct colours in solid shading."""
 COLOUR = "mu_field_colour"
-"""The colour attribute that solid shading shows; renders and material preview use the material."""
+"""Colour attribute of solid shading; renders and material preview use the material."""
 _PLAIN = "MU Solid"
 RARE = 0.2
-"""Percent of a field's values, at either end, that do not stretch the range: at edges stress has no bound."""
+"""Percent of a field's values, at either end, that the range ignores: at edges stress is unbounded."""
 
 
 @attrs.frozen
 class Field:
-    """A field: its attribute, what it is called, its unit and what it says.
+    """A field: its attribute, its name, its unit and its description.
 
-    amount: whether its colours begin at 0; rare: percent of its values, at either end, that stretch no
-    range; spots: whether it is 0 but for few places, which alone say how far the range goes.
+    amount: colours begin at 0; rare: percent of its values, at either end, that the range ignores; spots: 0
+    but for few locations, which alone set the range.
     """
 
     name: str
@@ -99,7 +99,7 @@ BY_NAME = {field.name: field for field in FIELDS}
 
 
 def material_of(root: Any) -> Any:
-    """The material that colours a unit's fields, made where it is missing."""
+    """Material that colours a unit's fields, made if it is missing."""
     name = f"MU Field {root.mu_unit.uuid[:8]}"
     return bpy.data.materials.get(name) or _make(name)
 
@@ -132,7 +132,7 @@ def _make(name: str) -> Any:
 
 
 def legend_material_of(root: Any) -> Any:
-    """The material of a unit's legend in the scene: the field's ramp as it is now, by `share`, unlit."""
+    """Material of a unit's legend in the scene: the field's present ramp, by `share`, unlit."""
     name = f"MU Legend {root.mu_unit.uuid[:8]}"
     made = bpy.data.materials.get(name) or bpy.data.materials.new(name)
     materials.shining(made)
@@ -156,7 +156,7 @@ def _copy_ramp(source: Any, target: Any) -> None:
 
 
 def of_map(share: float) -> tuple[float, float, float, float]:
-    """The colour, linear, at a share 0 .. 1 of the map that reports use, too."""
+    """Linear colour at a share 0 .. 1 of the map that reports use, too."""
     import matplotlib
 
     r, g, b, _ = matplotlib.colormaps[MAP](share)
@@ -194,7 +194,7 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
 
 
 def write_colours(root: Any, mesh: Any, values: Any | None) -> None:
-    """Write a field's values (v,) as the colours that solid shading shows; plain without one, and at NaN."""
+    """Write a field's values (v,) as colours for solid shading; plain without one, and at NaN."""
     attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
     plain = np.float32(materials.COLOURS[_PLAIN])
     if values is None:

@@ -18,9 +18,9 @@ from . import motion as motion_parts
 from .operators import MotionOperator, show_colours
 
 ROOM = 1.25
-"""How much wider than what is shown the view is that frames it."""
+"""Factor on the framed view's size, for a margin."""
 OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
-"""The view from +x, which a body that is cut open is turned to."""
+"""View from +x, for a body that is cut open."""
 
 
 class MU_OT_field_show(MotionOperator, bpy.types.Operator):
@@ -77,7 +77,7 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
 
 
 def lacking(root, field: str) -> str:
-    """Why the shown run has no such field; empty where it has."""
+    """Why the shown run does not have a field; empty if it has."""
     motion = motion_parts.motion_of(root)
     if motion is None:
         return "there is no motion yet"
@@ -89,7 +89,7 @@ def lacking(root, field: str) -> str:
 
 
 def whose(root, motion, field: str) -> str:
-    """Whose motion shows a field: Model A's or, of a deviation, that of the chosen or the best path.
+    """Owner of the motion that shows a field: Model A or, for a deviation, the chosen or the best path.
 
     Raises InputError where the run has no such field.
     """
@@ -121,7 +121,7 @@ def whose(root, motion, field: str) -> str:
 
 
 def frame_in_view(context, root) -> None:
-    """Bring what is seen of a unit's motion into every 3D view; what is cut open, from its open side."""
+    """Frame the visible parts of a unit's motion in every 3D view; a cut body from its open side."""
     shown = places.seen(root)
     if not shown or context.screen is None:
         return

@@ -1,7 +1,7 @@
-"""What the colours of a motion mean, drawn over the viewport: ramp, values, unit, time and pressure.
+"""Key to a motion's colours, drawn over the viewport: ramp, values, unit, time and pressure.
 
-Names stand above what is shown. It is drawn with the viewport and is not part of a render; where the legend
-stands in the scene (`legend_object`), names alone are drawn.
+Names stand above the shown objects. It is drawn with the viewport and is not part of a render; if the legend
+is in the scene (`legend_object`), only names are drawn.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from . import field_colours, places
 from . import motion as motion_parts
 
 PIECES = 48
-"""Flat pieces of the drawn ramp."""
+"""Number of flat pieces of the drawn ramp."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 60
 TEXT = (0.92, 0.92, 0.92, 1.0)
 
@@ -40,7 +40,7 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def lines(root: Any, motion: Any, scene: Any) -> list[str]:
-    """Lines of the legend: field, time and pressure, contact forces, and whether the results are stale.
+    """Lines of the legend: field, time and pressure, contact forces, and a note on stale results.
 
     A unit that is not the active one is named.
     """
@@ -86,14 +86,14 @@ def _draw() -> None:
 
 
 def subject(context: Any) -> Any | None:
-    """The unit whose colours a legend tells: the active one, or another one while that shows none."""
+    """Unit of the legend: the active one, or another if that shows none."""
     active = unit_object.active_root(context)
     every = [active, *(root for root in unit_object.roots() if root != active)]
     return next((root for root in every if root is not None and places.seen(root)), None)
 
 
 def beside_tools(area: Any) -> float:
-    """Width in pixels of the toolbar that lies over the viewport's left, 0 where there is none."""
+    """Width in pixels of the toolbar over the viewport's left, 0 where there is none."""
     tools = next((region for region in area.regions if region.type == "TOOLS"), None)
     return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
 
@@ -121,7 +121,7 @@ def ramp(colours: Any, marks: list[tuple[float, str]], scale: float, left: float
 
 
 def _display(linear: Any) -> Any:
-    """Colours (c, 4) as a screen takes them, of linear ones: sRGB, opaque."""
+    """Colours (c, 4) for a screen, sRGB and opaque, from linear ones."""
     linear = np.clip(linear, 0.0, 1.0)
     shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     shown[:, 3] = 1.0
@@ -151,15 +151,15 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
 
 
 def name_height(above: float, base: float, limit: float) -> float:
-    """Where a name stands that belongs `above` what has its foot at `base`: no higher than `limit`.
+    """Height of a name `above` an object whose foot is at `base`, at most `limit`.
 
-    All in pixels. Where the foot is out of sight above that limit, too, the name is with it.
+    All in pixels. If the foot is above the limit, too, the name stays with the object.
     """
     return min(above, limit) if base < limit else above
 
 
 def below_headers(area: Any, region: Any) -> float:
-    """Height in pixels of a viewport up to the headers that lie over its upper end."""
+    """Height in pixels of a viewport below the headers over its upper end."""
     middle = region.y + region.height / 2
     lowest = [
         other.y

@@ -1,7 +1,7 @@
 """The legend as objects in the scene, so that renders have it: a ramp, its values, unit, time and pressure.
 
-A bar beside the unit, a child of its root, with texts; it may be moved, turned or scaled, and keeps that. Its
-colours are the field material's ramp, unlit: they say the same whatever shines on the model.
+A bar beside the unit, a child of its root, with texts; a user may move, turn or scale it. Its colours are the
+field material's ramp, unlit, so that light does not change them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from . import field_colours, legend
 from . import motion as motion_parts
 
 BAR, HEAD, TICK = "bar", "head", "tick"
-"""What an object of the legend is: its bar, the text above it, or a value beside it."""
+"""Roles of the legend's objects: its bar, the text above it, or a value beside it."""
 WIDTH, TEXT = 0.08, 0.065
 """Width of the bar and height of its letters, in heights of the bar."""
 # Read from +x with z up: the side from which a unit that is cut open shows its inside.
@@ -35,7 +35,7 @@ def bar_of(root: Any) -> Any | None:
 
 
 def show(root: Any) -> Any:
-    """Stand a legend beside what is shown, or bring it up to date; raises InputError without a motion."""
+    """Put a legend beside the shown objects, or update it; raises InputError without a motion."""
     motion = motion_parts.motion_of(root)
     if motion is None or not motion_parts.parts(root):
         raise InputError("no motion is shown, so no colours", "On the Model", "show a motion first")
@@ -53,7 +53,7 @@ def show(root: Any) -> Any:
 
 
 def hide(root: Any) -> None:
-    """Take the legend out of the scene."""
+    """Remove the legend from the scene."""
     bar = bar_of(root)
     if bar is not None:
         for obj in (*bar.children, bar):
@@ -91,7 +91,7 @@ def update(root: Any) -> None:
 
 
 def update_text(root: Any, scene: Any) -> None:
-    """Write the field's name, the frame's time and pressure, and what else the legend remarks."""
+    """Write the field's name, the frame's time and pressure, and the legend's remarks."""
     bar, motion = bar_of(root), motion_parts.motion_of(root)
     if bar is not None and motion is not None:
         _put_text(bar, HEAD, "\n".join(legend.lines(root, motion, scene)), (0.0, 1.05))
@@ -121,12 +121,12 @@ _HANDLERS = {"frame_change_pre": _before_frame}
 
 
 def register() -> None:
-    """The handler that writes time and pressure, and the update when colours change."""
+    """Register the handler that writes time and pressure, and the update when colours change."""
     handlers.add(_HANDLERS)
     motion_parts.COLOURED.connect(update)
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     motion_parts.COLOURED.disconnect(update)
     handlers.remove(_HANDLERS)

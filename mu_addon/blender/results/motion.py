@@ -1,10 +1,9 @@
 """A study's motion in the scene: objects that deform on the timeline and carry its fields.
 
-The first one is seen in the unit's own place, in place of its design, the others beside it. Positions come
-from point caches in the study folder, which Blender plays by itself; the fields of the frame are written
-before it is drawn. An object is a child of the unit's root and knows what it shows by the custom property
-`mu_motion_part`: "NAME|BODY", NAME a path or model_a, BODY one of `REGIONS` or `PRINT`; and by `mu_run`, of
-which run.
+The first one replaces the unit's design in its own place, the others stand beside it. Positions come from
+point caches in the study folder, which Blender plays by itself; the fields of the frame are written before it
+is drawn. An object is a child of the unit's root and identified by the custom property `mu_motion_part`:
+"NAME|BODY", NAME a path or model_a, BODY one of `REGIONS` or `PRINT`; and by `mu_run`, of which run.
 """
 
 from __future__ import annotations
@@ -48,17 +47,17 @@ RUN = "mu_run"
 
 @attrs.frozen(eq=False)
 class Played:
-    """What one object plays: fields by name, (s, v) at every state or (v,) at all, and its motion."""
+    """Data of one played object: fields by name, (s, v) at every state or (v,) at all, and its motion."""
 
     motion: Motion
     fields: dict[str, Any]
 
 
 COLOURED = Signal()
-"""Sent with the root whose motion was coloured anew."""
+"""Sent with the root whose motion was recoloured."""
 
 _played: dict[tuple[Path, str, bool], Played] = {}
-"""By folder, what is shown and whether it is cut; not of the printed body, which has its own."""
+"""By folder, motion and cut, without the printed bodies, which have `_prints`."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -106,7 +105,7 @@ def show(root: Any, name: str, what: str) -> None:
 
 
 def hide(root: Any, name: str, what: str) -> None:
-    """Take a motion out of the scene; its files stay."""
+    """Remove a motion from the scene; its files stay."""
     for part in parts(root):
         if _pair(part) == (name, what):
             displays.remove(part)
@@ -114,15 +113,15 @@ def hide(root: Any, name: str, what: str) -> None:
 
 
 def rebuild(root: Any) -> None:
-    """Build again what is shown, from the files of the shown run as they are now. Raises MuError."""
+    """Rebuild the shown motions from the present files of the shown run. Raises MuError."""
     for name, what in shown(root):
         show(root, name, what)
 
 
 def follow(root: Any) -> None:
-    """Have what is shown be of the run that is shown: parameters, a new run or a choice have changed it.
+    """Update the shown motions to the shown run, after a change of parameters, run or choice.
 
-    A motion that this run has not is taken away, and the panel says so.
+    A motion that this run lacks is removed, and the panel reports it.
     """
     studies.remember(root)
     key, wrong = root.mu_unit.study.run, ""
@@ -138,7 +137,7 @@ def follow(root: Any) -> None:
 
 
 def arrange(root: Any) -> None:
-    """Stand the first motion in the unit's place, the others beside it, on the side that it bends away from.
+    """Put the first motion in the unit's place, the others beside it, opposite to the bending direction.
 
     With `on_unit` off, all of them stand beside the design.
     """
@@ -159,7 +158,7 @@ def arrange(root: Any) -> None:
 
 
 def _see(root: Any) -> None:
-    """Have a unit show its result where there is one in its place, else its design."""
+    """Let a unit show its result if there is one in its place, else its design."""
     there = bool(displays.on_unit(root))
     # Candidates lie on the unit at rest: while they are seen, so is that.
     if there and root.mu_unit.show != unit_object.RESULT and not root.mu_unit.candidates:
@@ -170,7 +169,7 @@ def _see(root: Any) -> None:
 
 
 def is_seen(root: Any, part: Any) -> bool:
-    """Whether a part is seen, by itself or in the unit's place."""
+    """Return True if a part is visible, by itself or in the unit's place."""
     if part.get(displays.ON_UNIT):
         return bool(unit_object.shows_result(root) and root.visible_get())
     return bool(part.visible_get())
@@ -188,7 +187,7 @@ def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
 
 
 def _show_print(root: Any, motion: Motion, name: str) -> None:
-    """The printable solid, built anew where the last one is of other parameters, carried by the mesh."""
+    """The printable solid, rebuilt if of other parameters, moved with the mesh."""
     found = studies.findings(root)
     if found is None or found.stale:
         raise InputError(
@@ -220,7 +219,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
 
 
 _prints: dict[tuple[str, str], Played] = {}
-"""The printed bodies' fields, by object and unit: they belong to a solid, which may change."""
+"""Fields of printed bodies, by object and unit: they belong to a solid, which may change."""
 
 
 def vertices_of(mesh: Any) -> Any:
@@ -248,12 +247,12 @@ def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> No
 
 
 def _play(part: Any, motion: Motion, file: Path) -> None:
-    """Have an object play a point cache of its vertices."""
+    """Let an object play a point cache of its vertices."""
     play(part, file, float(motion.time_s[1] - motion.time_s[0]))
 
 
 def play(part: Any, file: Path, step_s: float) -> None:
-    """Have an object play a point cache of its vertices, samples `step_s` apart, in its own time."""
+    """Let an object play a point cache of its vertices, samples `step_s` apart, in its own time."""
     modifier = part.modifiers.get("Motion") or part.modifiers.new("Motion", "MESH_CACHE")
     modifier.cache_format = "PC2"
     modifier.filepath = studies.relative(file)
@@ -269,7 +268,7 @@ def step_of(file: Path) -> float:
 
 
 def _keep_time(part: Any, step_s: float, scene: Any) -> None:
-    """Have a part play its cache in its own time at the scene's frame rate.
+    """Let a part play its cache in its own time at the scene's frame rate.
 
     Blender takes sample number `frame_scale` frame - `frame_start`; its mode in seconds divides by the rate
     twice.
@@ -283,7 +282,7 @@ def _keep_time(part: Any, step_s: float, scene: Any) -> None:
 
 
 def time_of(motion: Motion, scene: Any) -> float:
-    """The protocol's time in s at the scene's frame."""
+    """Time of the protocol in s at the scene's frame."""
     rate = scene.render.fps / scene.render.fps_base
     return float(motion.time_s[0] + (scene.frame_current_final - scene.frame_start) / rate)
 
@@ -319,7 +318,7 @@ def _fields_of(motion: Motion, name: str, region: str, skin: Skin) -> dict[str, 
 
 
 def played(root: Any, part: Any) -> Played | None:
-    """What a part plays, from memory or from the files; None where they are gone or of another mesh."""
+    """Data of a played part, from memory or from the files; None if they are gone or of another mesh."""
     motion = motion_of(root)
     if motion is None:
         return None
@@ -341,7 +340,7 @@ def played(root: Any, part: Any) -> Played | None:
 
 
 def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
-    """A printed body's fields; after a file was loaded, from its own vertices."""
+    """Fields of a printed body; after a file was loaded, from its own vertices."""
     key = part.name_full, root.mu_unit.uuid
     kept = _prints.get(key)
     if kept is None or kept.motion is not motion:
@@ -355,7 +354,7 @@ def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
 
 
 def refresh(root: Any) -> None:
-    """Write the fields of the scene's frame to what is shown, and colour it by the chosen one."""
+    """Write the fields of the scene's frame to the shown objects, and colour them by the chosen one."""
     motion = motion_of(root)
     if motion is None:
         return
@@ -368,7 +367,7 @@ def refresh(root: Any) -> None:
 
 
 def colour(root: Any) -> None:
-    """Write the fields of the scene's frame, and their colours by the range as it is."""
+    """Write the fields of the scene's frame, and their colours by the present range."""
     _write(root, bpy.context.scene)
     COLOURED.send(root)
     field = root.mu_motion.field
@@ -376,7 +375,7 @@ def colour(root: Any) -> None:
 
 
 def extent(root: Any, field: str) -> tuple[float, float]:
-    """Range of a field in what is shown, over the whole motion, without its rarest values; else (0, 1)."""
+    """Range of a field in the shown objects over the motion, without its rarest values; else (0, 1)."""
     found = [p.fields[field] for p in (played(root, part) for part in parts(root)) if p and field in p.fields]
     if not found:
         return 0.0, 1.0
@@ -389,9 +388,9 @@ def extent(root: Any, field: str) -> tuple[float, float]:
 
 
 def peak_frame(root: Any, scene: Any) -> int | None:
-    """The frame at which the chosen field is largest in what is shown, without its rarest values.
+    """Frame at which the chosen field is largest in the shown objects, without its rarest values.
 
-    None where it is not known, or the same at every time.
+    None if it is unknown, or constant.
     """
     field, best = root.mu_motion.field, None
     for part in parts(root):
@@ -407,7 +406,7 @@ def peak_frame(root: Any, scene: Any) -> int | None:
 
 
 def _write(root: Any, scene: Any) -> None:
-    """The fields of the scene's frame as point attributes, in their units."""
+    """Write the fields of the scene's frame as point attributes, in their units."""
     for part in parts(root):
         found = played(root, part)
         if found is None:
@@ -457,7 +456,7 @@ def _job_ended(_key: str) -> None:
 
 
 def _chosen(root: Any) -> None:
-    """The result is to be seen: where none is in the unit's place yet, that of Model A."""
+    """Show a result: if none is in the unit's place yet, that of Model A."""
     if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
         return
     # They lie on the unit at rest; shown again, they bring that back.
@@ -477,14 +476,14 @@ _CONNECTIONS = ((unit_object.REBUILT, follow), (JOB_ENDED, _job_ended), (VIEW_CH
 
 
 def register() -> None:
-    """Handlers that keep the fields at the scene's frame, and what is shown with its run."""
+    """Register handlers that keep the fields at the scene's frame, and the motions with the shown run."""
     handlers.add(_HANDLERS)
     for signal, function in _CONNECTIONS:
         signal.connect(function)
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     for signal, function in _CONNECTIONS:
         signal.disconnect(function)
     handlers.remove(_HANDLERS)

@@ -17,7 +17,7 @@ NO_MOTION = "No motion yet: simulate this unit first"
 
 
 def show_colours(context) -> None:
-    """Have 3D views in solid shading show colour attributes, which hold the field's colours."""
+    """Let 3D views in solid shading show colour attributes, which hold the field's colours."""
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
             area.spaces.active.shading.color_type = "VERTEX"
@@ -103,7 +103,7 @@ class MU_OT_motion_clear(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_motion_update(MotionOperator, bpy.types.Operator):
-    """Build what is shown again from the study's files, after another simulation"""
+    """Rebuild the shown motion from the study's files, after another simulation"""
 
     bl_idname = "mu.motion_update"
     bl_label = "Update Motion"

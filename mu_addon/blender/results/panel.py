@@ -22,15 +22,15 @@ BUTTONS = (
     ("displacement_mm", "Displacement"),
     ("contact_pressure_kPa", "Self-Contact"),
 )
-"""Fields that a click paints on the unit, and what the button says."""
+"""Fields with a button that paints them, and its label."""
 AS = {motion_parts.MESH: "Analysis mesh", motion_parts.PRINT: "Printable solid"}
-"""As what a motion is shown."""
+"""Ways to show a motion."""
 PICTURE = 13.0
 """Side of a picture, in heights of a button."""
 
 
 def _of(name: str) -> str:
-    """Whose motion it is, in words."""
+    """Owner of a motion, in words."""
     return "Without a sensor" if name == MODEL_A else f"Path {path_symbol(name)}"
 
 
@@ -93,7 +93,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
 
 
 def _look_buttons(layout, root, ranked: bool) -> None:
-    """What is looked at most, one click each; grey is what the shown run has not."""
+    """Draw buttons for the most used views; grey where the shown run lacks them."""
     grid = layout.grid_flow(columns=2, align=True, even_columns=True, row_major=True)
     settings = root.mu_motion
     for name, text in BUTTONS:
@@ -108,7 +108,7 @@ def _look_buttons(layout, root, ranked: bool) -> None:
 
 
 class MU_MT_motion(bpy.types.Menu):
-    """What of a run can be shown: the unit without a sensor and with each path, as mesh and as print"""
+    """Motions of the run: the unit without a sensor and with each path, as mesh and as print"""
 
     bl_idname = "MU_MT_motion"
     bl_label = "Show"
@@ -131,7 +131,7 @@ class MU_MT_motion(bpy.types.Menu):
 
 
 class _OfMotion(UnitPanel):
-    """A panel that is there once a motion is."""
+    """Base of panels that appear once there is a motion."""
 
     bl_parent_id = "MU_PT_results"
     bl_options: ClassVar[set[str]] = set()

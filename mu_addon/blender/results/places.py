@@ -1,4 +1,4 @@
-"""Where on the shown motion a field has which value: its largest at this frame, and that under a ray."""
+"""Positions and values of a field on the shown motion: its maximum at this frame, and under a ray."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from . import motion as motion_parts
 
 @attrs.frozen(eq=False)
 class Place:
-    """A point of what is shown: its part, the field's value there or None, and where it is.
+    """A point of the shown motion: its part, the field's value there or None, and its position.
 
-    world: in the scene; now_mm, rest_mm: in the unit's frame, (3,) each, as it has moved and before.
+    world: in the scene; now_mm, rest_mm: in the unit's frame, (3,) each, moved and at rest.
     """
 
     part: Any
@@ -28,7 +28,7 @@ class Place:
 
 
 def seen(root: Any) -> list[Any]:
-    """The parts of a unit's motion that are seen."""
+    """Visible parts of a unit's motion."""
     return [part for part in motion_parts.parts(root) if motion_parts.is_seen(root, part)]
 
 
@@ -49,7 +49,7 @@ def values_of(part: Any, field: str) -> Any | None:
 
 
 def largest(root: Any) -> Place | None:
-    """Where the chosen field is largest in what is seen at this frame; None where nothing carries it."""
+    """Position where the chosen field is largest in the visible parts at this frame, or None."""
     best: tuple[float, Any, int] | None = None
     for part in seen(root):
         values = values_of(part, root.mu_motion.field)
@@ -67,7 +67,7 @@ def largest(root: Any) -> Place | None:
 
 
 class Surfaces:
-    """The surfaces of what is seen at one frame, to be met by rays."""
+    """Surfaces of the visible parts at one frame, for ray casts."""
 
     def __init__(self, root: Any) -> None:
         self.field = root.mu_motion.field
@@ -83,7 +83,7 @@ class Surfaces:
             self._parts.append((part, tree, triangles, now, values_of(part, self.field)))
 
     def hit(self, origin: Any, direction: Any) -> Place | None:
-        """The first point that a ray meets, given in the scene's frame; None where it meets nothing."""
+        """First hit of a ray given in the scene's frame; None without one."""
         best: tuple[float, Place] | None = None
         for part, tree, triangles, now, values in self._parts:
             back = part.matrix_world.inverted()

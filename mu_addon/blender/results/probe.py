@@ -1,4 +1,4 @@
-"""The probe: under the mouse the field's value with its unit, where and when. And the mark at its maximum."""
+"""The probe: a field's value under the mouse, with unit, time and position, and its maximum's mark."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -33,7 +33,7 @@ def value_text(field: field_colours.Field, value: float | None) -> str:
 
 
 def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
-    """What the probe says of a place: value, whose, where at rest and now, time and pressure."""
+    """Lines of the probe: value, owner, position at rest and now, time and pressure."""
     motion = motion_parts.motion_of(root)
     name = place.part[motion_parts.MOTION].partition("|")[0]
     whose = "Model A" if name == MODEL_A else path_symbol(name)
@@ -56,7 +56,7 @@ class MU_OT_probe(MotionOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     running: ClassVar[Any] = None
-    """The probe that runs, which is one at a time."""
+    """The running probe; there is one at a time."""
 
     @classmethod
     def poll(cls, context):
@@ -93,7 +93,7 @@ class MU_OT_probe(MotionOperator, bpy.types.Operator):
         return {"PASS_THROUGH"}
 
     def look(self, context, root, event):
-        """Find what lies under the mouse."""
+        """Find the point under the mouse."""
         area = next(
             (a for a in context.window.screen.areas if _inside(a, event.mouse_x, event.mouse_y)), None
         )
@@ -114,7 +114,7 @@ class MU_OT_probe(MotionOperator, bpy.types.Operator):
         area.tag_redraw()
 
     def end(self, context):
-        """Take the text away."""
+        """Remove the text."""
         self.ended, self.found = True, None
         MU_OT_probe.running = None
         context.workspace.status_text_set(None)
@@ -144,7 +144,7 @@ def _draw() -> None:
 
 
 def _mark(context: Any, root: Any, size: int) -> None:
-    """A cross where the field is largest at this frame, and its value."""
+    """Draw a cross where the field is largest at this frame, and its value."""
     place = places.largest(root)
     at = place and location_3d_to_region_2d(context.region, context.region_data, place.world)
     if place is None or at is None:
@@ -162,13 +162,13 @@ _add, _remove = bpy.utils.register_classes_factory((MU_OT_probe,))
 
 
 def register() -> None:
-    """The operator and what it draws."""
+    """Register the operator and its drawing."""
     _add()
     _overlay.register()
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     MU_OT_probe.running = None
     _overlay.unregister()
     _remove()

@@ -1,4 +1,4 @@
-"""How a unit's motion is shown: kept on its root object, beside its parameters."""
+"""Display of a unit's motion, kept on its root object, beside its parameters."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -13,7 +13,7 @@ from . import motion as motion_parts
 
 
 def _again(settings, context):
-    """The field or its range changed: colours follow."""
+    """Recolour after a change of the field or its range."""
     motion_parts.refresh(settings.id_data)
     viewports.redraw()
 
@@ -49,7 +49,7 @@ def _apart(settings, context):
 
 
 class MU_PG_motion(bpy.types.PropertyGroup):
-    """How the motion in a unit's study is shown."""
+    """Display of the motion in a unit's study."""
 
     field: EnumProperty(
         name="Field",

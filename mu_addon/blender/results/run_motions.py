@@ -1,4 +1,4 @@
-"""The motions that a unit's runs hold, read from their files, and how far two of them are apart."""
+"""Motions of a unit's runs, read from their files, and their difference."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from ..simulate import study_folder as studies
 
 _motions: FileCache[Motion] = FileCache()
 _apart: dict[Any, tuple[Motion, Motion, Any, str]] = {}
-"""By both folders, what is shown and whether it is cut: both motions, the distances, and words on them."""
+"""By both folders, motion and cut: both motions, the distances, and words on them."""
 _words: dict[str, str] = {}
-"""By UUID of the unit: what there was to say of the last difference."""
+"""By UUID of the unit: words on the last difference."""
 
 
 def motion_of(root: Any) -> Motion | None:
-    """The motion of the run that is shown, or None where there is none; read again when it changes."""
+    """Motion of the shown run, or None; read again when it changes."""
     return motion_in(studies.results_folder(root))
 
 
 def motion_in(folder: Path) -> Motion | None:
-    """The motion in a run's folder, as above."""
+    """Motion in a run's folder, likewise."""
     return _motions.read([folder / FOLDER / f"{MODEL_A}.npz"], lambda: read_motion(folder))
 
 
 def apart(root: Any, motion: Motion, name: str, region: str, cut: bool) -> Any | None:
-    """Distance (s, v) in mm to the motion of the run that is compared with; None where there is none.
+    """Distance (s, v) in mm to the motion of the compared run; None without one.
 
-    Of a region's surface, cut open or not; `difference_words` says why it is not there.
+    Of a region's surface, cut open or not; `difference_words` has the reason if it is missing.
     """
     run = studies.run_by_key(root, root.mu_unit.study.against)
     other = None if run is None else motion_in(run.folder)
@@ -59,11 +59,11 @@ def apart(root: Any, motion: Motion, name: str, region: str, cut: bool) -> Any |
 
 
 def difference_words(root: Any) -> str:
-    """What there is to say of the difference to another run: why there is none, or of how much."""
+    """Words on the difference to another run: why there is none, or how much."""
     return _words.get(root.mu_unit.uuid, "")
 
 
 def clear() -> None:
-    """Forget everything."""
+    """Empty the caches."""
     for kept in (_motions, _apart, _words):
         kept.clear()

@@ -1,4 +1,4 @@
-"""Work on the list of runs: show one, compare two, take over the parameters of one, delete one."""
+"""Actions on the list of runs: show one, compare two, restore the parameters of one, delete one."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -17,7 +17,7 @@ from . import runs
 
 
 class RunOperator(UnitOperator):
-    """An operator on a run of the active unit: the one of its property `key`, else the one that is shown."""
+    """An operator on a run of the active unit: the one of its property `key`, else the shown one."""
 
     @classmethod
     def poll(cls, context):

@@ -18,7 +18,7 @@ from ..unit import object as unit_object
 from . import runs
 
 ROWS = 4
-"""Runs that the list shows at once."""
+"""Number of runs that the list shows at once."""
 COLUMN = 9
 """Letters in a line of a column of the comparison."""
 
@@ -48,7 +48,7 @@ class MU_UL_runs(bpy.types.UIList):
 
 
 def found_in(run) -> str:
-    """What a run has found, in a word: its best path and J, else its largest angle, else how far it came."""
+    """Result of a run in a word: its best path and J, else its largest angle, else its progress."""
     if run.ranking:
         name, j = run.ranking[0]
         return f"{path_symbol(name)} {j:.3f}"
@@ -58,7 +58,7 @@ def found_in(run) -> str:
 
 
 def draw_runs(layout, root) -> None:
-    """Every run of a unit, the latest first, and when the shown one ended; nothing without runs."""
+    """Draw every run of a unit, the latest first, and when the shown one ended; nothing without runs."""
     run, every = studies.shown_run(root), studies.runs_of(root)
     if not every:
         return
@@ -114,7 +114,7 @@ class MU_PT_comparison(UnitPanel, bpy.types.Panel):
 
 
 def _name_lines(run) -> list[str]:
-    """The name of a run in the lines that a column has room for."""
+    """Lines of a run's name that fit into a column."""
     return textwrap.wrap(run.title, COLUMN)
 
 

@@ -1,4 +1,4 @@
-"""The list of a unit's runs as Blender shows it: an entry a run, with the name and star in its folder."""
+"""The list of a unit's runs in Blender: an entry for each run, with the name and star in its folder."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -81,7 +81,7 @@ def _choose(listed, value: int) -> None:
 
 
 class MU_PG_runs(bpy.types.PropertyGroup):
-    """The list of the active unit's runs; what it lists is read from their folders."""
+    """The list of the active unit's runs, read from their folders."""
 
     entries: CollectionProperty(type=MU_PG_run, description="Runs, the latest first")
     index: IntProperty(
@@ -93,7 +93,7 @@ class MU_PG_runs(bpy.types.PropertyGroup):
 
 
 def show(root, key: str) -> bool:
-    """Show the results of the unit's run of that key, on the model, too; returns whether there is one."""
+    """Show the results of the unit's run of that key, also on the model; return True if there is one."""
     run = studies.run_by_key(root, key)
     if run is None:
         return False
@@ -106,7 +106,7 @@ def show(root, key: str) -> bool:
 
 
 def listed():
-    """The list, brought up to date soon where it is behind; for a panel, which may not write itself."""
+    """The list, scheduled for an update if it is behind; for a panel, which may not write itself."""
     found = bpy.context.window_manager.mu_runs
     if _behind() and not bpy.app.timers.is_registered(_later):
         bpy.app.timers.register(_later, first_interval=0.0)
@@ -143,7 +143,7 @@ _add, _remove = bpy.utils.register_classes_factory((MU_PG_run, MU_PG_runs))
 
 
 def register() -> None:
-    """The list, on the window manager: no file keeps it, and undo leaves it alone."""
+    """Register the list on the window manager: no file keeps it, and undo leaves it alone."""
     _add()
     bpy.types.WindowManager.mu_runs = PointerProperty(type=MU_PG_runs)
     handlers.add(_HANDLERS)
@@ -151,7 +151,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take it out."""
+    """Unregister it."""
     JOB_ENDED.disconnect(refresh)
     handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_later):

@@ -1,4 +1,4 @@
-"""Pictures of a study as previews that a panel can draw, loaded again when they change."""
+"""Pictures of a study as previews for panels, loaded again when they change."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _icons: FileCache[int] = FileCache()
 
 
 def icon_of(path: Path) -> int | None:
-    """Number of a picture's preview, to be drawn by `template_icon`; None where there is no such file."""
+    """Number of a picture's preview for `template_icon`; None where there is no such file."""
     return _icons.read([path], lambda: _load(str(path)))
 
 
@@ -24,13 +24,13 @@ def _load(name: str) -> int:
 
 
 def register() -> None:
-    """Room for the previews."""
+    """Create the collection of previews."""
     global _previews
     _previews = bpy.utils.previews.new()
 
 
 def unregister() -> None:
-    """Give it back."""
+    """Remove it."""
     global _previews
     bpy.utils.previews.remove(_previews)
     _previews = None

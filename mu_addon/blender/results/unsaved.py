@@ -1,8 +1,7 @@
-"""Where runs go when the file is saved: beside it, and found again from wherever it is saved to.
+"""Folders of runs when the file is saved: moved beside it, and found again from another place.
 
 A unit or a gripper of a file that was never saved keeps its runs in the user's own folder. Saving moves them
-beside the file, and what the file keeps of them is the way from there. A save elsewhere leaves them where
-they are, and changes that way.
+beside the file, which stores a relative path. Saving elsewhere leaves them in place and changes that path.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
 _homes: dict[str, Path] = {}
-"""By UUID: the folders that units and grippers named as the file was about to be saved."""
+"""By UUID: folders of units and grippers before the file was saved."""
 
 
 def _owners() -> list[tuple[Any, Any, Any, Path]]:
-    """Object, what has its UUID, what names its folder, and that folder, of every unit and gripper."""
+    """Object, owner of its UUID, owner of its folder's name, and that folder, of every unit and gripper."""
     units = [(r, r.mu_unit, r.mu_unit.study, studies.folder_of(r)) for r in unit_object.roots()]
     grippers = [(r, r.mu_gripper, r.mu_gripper, grasps.folder_of(r)) for r in gripper_object.roots()]
     return [owner for owner in (*units, *grippers) if owner[2].folder]
@@ -60,7 +59,7 @@ def _after_save(*_: Any) -> None:
 
 
 def _moved(root: Any, old: Path, blend: Path) -> Path:
-    """The folder beside the file, where it could be moved there; else where it is."""
+    """The folder beside the file, if it could be moved there; else its present place."""
     new = studies.beside(blend, old.name)
     try:
         if not history.move_home(old, new):
@@ -78,7 +77,7 @@ def _moved(root: Any, old: Path, blend: Path) -> Path:
 
 
 def _way(home: Path, blend: Path) -> str:
-    """A folder as a file keeps it: relative to the file where both are on one drive."""
+    """Path of a folder stored in a file: relative to the file if both are on one drive."""
     try:
         return str(bpy.path.relpath(str(home), start=str(blend.parent)))
     except ValueError:
@@ -87,7 +86,7 @@ def _way(home: Path, blend: Path) -> str:
 
 @persistent
 def _loaded(*_: Any) -> None:
-    """Point caches whose way has changed with the file are found again in the folder of their run."""
+    """Find point caches whose path has changed with the file, in the folder of their run."""
     for root in (*unit_object.roots(), *gripper_object.roots()):
         for part in root.children:
             modifier = _cache_of(part)
@@ -103,7 +102,7 @@ def _loaded(*_: Any) -> None:
 
 
 def _cache_of(part: Any) -> Any:
-    """The modifier that plays a part of a run's motion, or None."""
+    """Modifier that plays a part of a run's motion, or None."""
     found = part.modifiers.get("Motion")
     return found if found is not None and found.type == "MESH_CACHE" else None
 
@@ -112,11 +111,11 @@ _HANDLERS = {"save_pre": _before_save, "save_post": _after_save, "load_post": _l
 
 
 def register() -> None:
-    """Handlers of saving and loading."""
+    """Register handlers of saving and loading."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     handlers.remove(_HANDLERS)
     _homes.clear()

@@ -1,6 +1,6 @@
 """Files dropped into a view: a unit or a node tree as TOML, a closed surface as envelope or obstacle.
 
-Blender asks which where several of its own importers take a file, too.
+If several of Blender's own importers take a file, too, Blender asks which.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -116,7 +116,7 @@ class MU_OT_drop_envelope(_Surface, bpy.types.Operator):
     bl_label = "Envelope of the Unit"
 
     def use(self):
-        """As by its button."""
+        """Make the surface the envelope, like the button."""
         return bpy.ops.mu.body()
 
 
@@ -127,7 +127,7 @@ class MU_OT_drop_obstacle(_Surface, bpy.types.Operator):
     bl_label = "Obstacle of the Unit"
 
     def use(self):
-        """As by its button."""
+        """Make the surface an obstacle, like the button."""
         return bpy.ops.mu.obstacle()
 
 

@@ -1,8 +1,8 @@
-"""What Blender's own gestures leave behind, put right: duplicates, deletions, hiding, collections, units.
+"""Repair after Blender's own gestures: duplicates, deletions, hiding, collections, units.
 
-A gesture knows nothing of units. After each one this module looks at all of them, once, and mends what is not
-as it should be. It writes nothing where nothing is wrong, so that its own changes end in one further look.
-Undo and redo bring back states from before the mending; the same look follows them.
+Gestures ignore units. After each one this module checks all of them, once, and repairs what is wrong. It
+writes nothing if nothing is wrong, so that its own changes cause only one further check. Undo and redo
+restore states from before a repair; the same check follows them.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from ..unit import broken, drawing, live_update
 from ..unit import object as unit_object
 
 _holders: dict[str, int] = {}
-"""By UUID: the object, by the number that it keeps through undo, which had it before any duplicate did."""
+"""By UUID: number, kept through undo, of the object that had it before any duplicate."""
 _given: dict[tuple[str, int], str] = {}
-"""UUIDs that duplicates were given, by the original's and their own number: a redo gives them again."""
+"""UUIDs given to duplicates, by the original's and their own number: a redo gives them again."""
 _hidden: dict[str, bool] = {}
-"""By UUID: whether the unit was hidden at the last look."""
+"""By UUID: True if the unit was hidden at the last check."""
 _looking = False
 
 
 def look() -> None:
-    """Put right what the last gesture left behind."""
+    """Repair the effects of the last gesture."""
     global _looking
     if _looking:
         return
@@ -63,7 +63,7 @@ def look() -> None:
 
 
 def own(root: Any) -> None:
-    """Make a root another one than that which it is a copy of: a UUID of its own, a folder of its own."""
+    """Give a copied root an identity: a new UUID and a separate folder."""
     key = displays.uuid_of(root), root.session_uid
     fresh = _given.setdefault(key, uuid.uuid4().hex)
     with updates.paused():
@@ -74,7 +74,7 @@ def own(root: Any) -> None:
 
 
 def _separate(roots: list[Any]) -> list[Any]:
-    """Give every duplicate an identity and a mesh of its own; returns them."""
+    """Give every duplicate an identity and a separate mesh; return the duplicates."""
     copies = []
     by_uuid: dict[str, list[Any]] = {}
     for root in roots:
@@ -93,7 +93,7 @@ def _separate(roots: list[Any]) -> list[Any]:
 
 
 def _follow(shown: list[Any]) -> None:
-    """Displays follow their root; those without one, and copies under another one, go."""
+    """Let displays follow their root; remove those without one, and copies under another one."""
     layer = bpy.context.view_layer
     roots: dict[str, Any] = {}
     stray, own_displays = [], []
@@ -123,10 +123,10 @@ def _follow(shown: list[Any]) -> None:
 
 
 def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
-    """Keep true sizes and places when the scene's unit of length changes, of roots and of obstacles.
+    """Keep true sizes and positions of roots and obstacles when the scene's unit of length changes.
 
-    A root's scale says which unit its size is right for, an obstacle's own property does; both are undone
-    with the object. A scaled parent's is taken out of it. An unlocked root is the user's.
+    A root's scale records the unit that its size is right for, an obstacle's property does; both are undone
+    with the object. A scaled parent's factor is divided out. An unlocked root is left to the user.
     """
     wanted = scene_units.mm(bpy.context.scene)
     moved = set()
@@ -157,7 +157,7 @@ def _above(obj: Any) -> Iterator[Any]:
 
 
 def _damaged(root: Any) -> bool:
-    """Whether something of a unit or gripper was deleted by force, and can be built again."""
+    """Return True if a part of a unit or gripper was deleted by force, and can be rebuilt."""
     if root.mode == "EDIT" or root.data is None:
         return False
     if root.mu_gripper.uuid:
@@ -204,7 +204,7 @@ def _after_load(*_: Any) -> None:
 
 @persistent
 def _after_import(imported: Any) -> None:
-    """What is appended is another unit than the one in the file that it comes from."""
+    """Give appended units an identity other than in the file that they come from."""
     _size_instances({item.id for item in imported.import_items if isinstance(item.id, bpy.types.Collection)})
     objects = [item.id for item in imported.import_items if isinstance(item.id, bpy.types.Object)]
     if not any(displays.editable(obj) and displays.uuid_of(obj) for obj in objects):
@@ -220,7 +220,7 @@ def _after_import(imported: Any) -> None:
 
 
 def _size_instances(collections: set[Any]) -> None:
-    """Give the instances of linked collections that hold units the size that is theirs in this scene."""
+    """Give instances of linked collections with units their true size in this scene."""
     wanted = scene_units.mm(bpy.context.scene)
     for obj in bpy.context.scene.objects:
         if obj.instance_type != "COLLECTION" or obj.instance_collection not in collections:
@@ -240,12 +240,12 @@ _HANDLERS = {
 
 
 def register() -> None:
-    """Handlers that look after every gesture."""
+    """Register handlers that check after every gesture."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """Take them out."""
+    """Unregister them."""
     handlers.remove(_HANDLERS)
     for kept in (_holders, _given, _hidden):
         kept.clear()

@@ -1,4 +1,4 @@
-"""Where a new unit or gripper lands: at the 3D cursor or, where something stands there, beside it."""
+"""Position of a new unit or gripper: at the 3D cursor or, if something is there, beside it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from mathutils import Vector
 from ..shared import scene_units
 
 GAP_MM = 10.0
-"""Distance that is left to what is there."""
+"""Distance kept to other objects."""
 Box = tuple[Any, Any]
 
 
 def land(context: Any, root: Any) -> None:
-    """Move a new root along x until nothing that is seen stands in its place."""
+    """Move a new root along x until it overlaps no visible object."""
     context.view_layer.update()
     low, high = _box(root)
     gap = GAP_MM * scene_units.mm(context.scene)
@@ -27,7 +27,7 @@ def land(context: Any, root: Any) -> None:
 
 
 def clear(low: Any, high: Any, boxes: list[Box], gap: float) -> float:
-    """How far along +x a box (3,), (3,) is moved until it is `gap` away from every other."""
+    """Distance along +x by which a box (3,), (3,) is moved to be `gap` away from every other."""
     start = float(low[0])
     width = float(high[0] - low[0])
     x = start
@@ -46,6 +46,6 @@ def _has_body(obj: Any) -> bool:
 
 
 def _box(obj: Any) -> Box:
-    """Corners of an object's box along the axes of the world."""
+    """Corners of an object's bounding box along the axes of the world."""
     points = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
     return points.min(axis=0), points.max(axis=0)

@@ -96,7 +96,7 @@ class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
-    """End the session: the port is free, and the recording whole"""
+    """End the session: the port is free, and the recording complete"""
 
     bl_idname = "mu.sensor_disconnect"
     bl_label = "Disconnect"
@@ -146,7 +146,7 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
-    """Freeze the plot, or let it go on; recording goes on in any case"""
+    """Freeze the plot, or resume it; recording goes on in any case"""
 
     bl_idname = "mu.sensor_freeze"
     bl_label = "Freeze"
@@ -162,7 +162,7 @@ class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_channel(UnitOperator, bpy.types.Operator):
-    """Draw this channel, or leave it out of the plot"""
+    """Show or hide this channel in the plot"""
 
     bl_idname = "mu.sensor_channel"
     bl_label = "Draw Channel"
@@ -178,7 +178,7 @@ class MU_OT_sensor_channel(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
-    """Calibrate step by step: hold the unit at angles to and fro; the calibration is fitted after the last"""
+    """Calibrate step by step: hold the unit at a sequence of angles; the fit follows the last"""
 
     bl_idname = "mu.sensor_sweep"
     bl_label = "Guided Sweep"
@@ -209,7 +209,7 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
-    """The unit is at this angle: hold it there while it is read"""
+    """Confirm that the unit is at this angle, and hold it there while it is read"""
 
     bl_idname = "mu.sensor_hold"
     bl_label = "Angle Reached"
@@ -291,7 +291,7 @@ class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
-    """Show or hide the simulated unit beside the design, bent to the angle that the sensor reads"""
+    """Show or hide the simulated unit beside the design, bent to the sensor's angle"""
 
     bl_idname = "mu.sensor_twin"
     bl_label = "Show Twin"
@@ -307,7 +307,7 @@ class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
 
 
 def _path_of(root, what):
-    """The file or folder that `what` stands for."""
+    """File or folder for `what`."""
     session = sensor.of(root)
     if what == "recording":
         return session.watched.folder if session else studies.folder_of(root) / sensor.RECORDINGS

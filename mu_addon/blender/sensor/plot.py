@@ -1,7 +1,7 @@
 """The sensor's last seconds, drawn over the viewport: its angle with the 95 % band, and its channels.
 
-Every column of pixels shows the extremes of the samples that fall into it, see `usecases.sensor.traces`; what
-is drawn does not grow with the sensor's rate. It is drawn with the viewport and is not part of a render.
+Every column of pixels shows the extremes of its samples, see `usecases.sensor.traces`; the cost of drawing
+does not grow with the sensor's rate. It is drawn with the viewport and is not part of a render.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ COLOURS = (
     (0.95, 0.90, 0.40, 1.0),
     (0.60, 0.85, 0.90, 1.0),
 )
-"""Of channels, in turn."""
+"""Colours of channels, in turn."""
 ANGLE = (1.0, 1.0, 1.0, 1.0)
 BAND = (1.0, 1.0, 1.0, 0.22)
 PAPER, GRID = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.16)
 WARNING = (1.0, 0.35, 0.3, 1.0)
 HEIGHT, GAP, LEFT, RIGHT, BOTTOM, WIDEST = 92, 26, 110, 20, 24, 900
 GAP_S = 0.5
-"""A curve is not drawn across a pause that long, or five samples'."""
+"""Pause in s, or five samples', across which no curve is drawn."""
 
 
 def _draw() -> None:
@@ -131,7 +131,7 @@ def _paper(
     s: float,
     lowest: bool,
 ) -> None:
-    """Ground, grid, and values: of time below the lowest axes only."""
+    """Draw background, grid, and values: of time below the lowest axes only."""
     (left, right), (bottom, top) = across, up
     _shape("TRI_STRIP", [(left, bottom), (right, bottom), (left, top), (right, top)], PAPER)
     size = round(10 * s)
@@ -153,7 +153,7 @@ def _paper(
 
 
 def _between(kind: str, x: Any, low: Any, high: Any, runs: list[slice], colour: Any) -> None:
-    """From low to high and on to the next: a line that is a band where the two differ, or the area itself."""
+    """Draw lines between low and high of each column: a line, a band if they differ, or the area."""
     for run in runs:
         seen = np.isfinite(low[run]) & np.isfinite(high[run])
         if np.count_nonzero(seen) < 2:
@@ -176,7 +176,7 @@ def _shape(kind: str, points: Any, colour: Any) -> None:
 
 
 def _over_twin(context: Any, root: Any, scale: float) -> None:
-    """The twin's state above it: in red where the signal is out of range."""
+    """Draw the twin's state above it: in red where the signal is out of range."""
     part = twin.parts(root)[0]
     if not part.visible_get():
         return

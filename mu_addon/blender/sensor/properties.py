@@ -1,4 +1,4 @@
-"""How a unit's sensor is connected, calibrated and shown: kept on the unit's root object."""
+"""Connection, calibration and display of a unit's sensor, kept on the unit's root object."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -26,7 +26,7 @@ def _again(group, context):
 
 
 class MU_PG_sensor(bpy.types.PropertyGroup):
-    """How a unit's sensor is connected, calibrated and shown."""
+    """Connection, calibration and display of a unit's sensor."""
 
     source: EnumProperty(
         name="From",

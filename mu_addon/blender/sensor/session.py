@@ -1,4 +1,4 @@
-"""A session with the real sensor: its process, the samples that have come, and the reading of this moment."""
+"""A session with the real sensor: its process, its samples, and the present reading."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ...usecases.sensor.traces import Traces
 from ...usecases.sensor.watch import Watched
 
 BINS = 600
-"""Steps of time across the plot."""
+"""Number of time steps across the plot."""
 MEAN_S = 0.1
-"""The twin and the figures follow the mean of that long: noise goes, a bend of 2 Hz stays."""
+"""Averaging time of the twin and the figures: it removes noise and keeps bends of 2 Hz."""
 ANGLES = ("angle_deg", "angle_low_deg", "angle_high_deg")
 
 
 @attrs.define(eq=False)
 class Reading:
-    """The sensor's present values: means of the last moment, in V and degrees.
+    """Present values of the sensor: means of the last moment, in V and degrees.
 
-    light_V: without its dark level; possible: whether the calibration can give such a voltage.
+    light_V: without its dark level; possible: True if the calibration can give such a voltage.
     """
 
     light_V: float
@@ -37,7 +37,7 @@ class Reading:
 
 @attrs.define(eq=False)
 class Guide:
-    """A guided sweep: angles to hold in their order, how many were, and until when the present one is."""
+    """A guided sweep: angles in their order, the number already held, and the end of the present one."""
 
     angles: list[float]
     held: int = 0
@@ -45,25 +45,25 @@ class Guide:
 
     @property
     def holding(self) -> bool:
-        """Whether an angle is being held now."""
+        """True if an angle is being held now."""
         return time.monotonic() < self.until
 
     @property
     def finished(self) -> bool:
-        """Whether every angle was held."""
+        """True if every angle was held."""
         return self.held == len(self.angles) and not self.holding
 
 
 @attrs.define(eq=False)
 class Session:
-    """A unit's session, running or ended, and what of it is shown."""
+    """A unit's session, running or ended, and its display."""
 
     child: Child
     watched: Watched
     traces: Traces | None = None
-    """Channels and angles over the last seconds; None until the channels are known, or to begin anew."""
+    """Channels and angles over the last seconds; None until the channels are known, or to start anew."""
     frozen: Traces | None = None
-    """What the plot shows while it stands still."""
+    """Content of the frozen plot."""
     ranges: dict[str, tuple[float, float]] = attrs.field(factory=dict)
     reading: Reading | None = None
     guide: Guide | None = None
@@ -74,7 +74,7 @@ class Session:
 
     @property
     def running(self) -> bool:
-        """Whether its process is."""
+        """True if its process is running."""
         return self.child.state == RUNNING
 
     @property
@@ -84,16 +84,16 @@ class Session:
 
     @property
     def fresh(self) -> bool:
-        """Whether samples are coming."""
+        """True if samples are arriving."""
         return self.running and self.watched.starved_s < 1.0
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of what the sensor measures."""
+        """Names of the sensor's channels."""
         return self.watched.columns[len(FIXED) :]
 
     def update(self, calibration: Any, seconds: float) -> bool:
-        """Take in the samples that have come; returns whether there is a new status. Never waits."""
+        """Process new samples; return True if there is a new status. Never waits."""
         was_running = self.running
         self.child.poll()
         news = self.watched.look() or was_running != self.running
@@ -119,7 +119,7 @@ class Session:
         return np.full((len(values), len(ANGLES)), np.nan)
 
     def read(self, calibration: Any, channel: str, dark: str | float) -> None:
-        """Take the mean of the last moment as the reading, with a calibration's angle where there is one."""
+        """Set the reading to the mean of the last moment, with a calibration's angle if there is one."""
         rate = float(self.watched.status.get("rate_hz") or 0.0)
         rows = self.watched.latest(max(1, int(MEAN_S * rate)))
         self.reading = None

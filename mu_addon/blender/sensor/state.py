@@ -1,8 +1,8 @@
-"""The real sensor beside its unit: one session a unit in a process of its own, looked into by a timer.
+"""The real sensor of a unit: one session a unit in a separate process, polled by a timer.
 
-What runs is kept here, in Python, and never in the .blend file; recordings and calibrations are files in the
+Sessions are kept here, in Python, and never in the .blend file; recordings and calibrations are files in the
 unit's study folder. So undo, loading a file and a render leave the session alone. The process ends with
-Blender, whose end it notices at its standard input.
+Blender, when its standard input closes.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from . import twin
 from .session import Session
 
 NEEDED = ("serial", "scipy")
-"""Modules that a sensor cannot do without."""
+"""Modules that a sensor needs."""
 INTERVAL_S = 1 / 60
 TWIN_S = 1 / 30
 """Seconds between poses of the twin, each of which moves every vertex."""
 SILENT_S = 3.0
-"""A session without a new status for so long is shown as not answering."""
+"""Seconds without a new status after which a session is shown as not answering."""
 HOLD_S = 1.2
-"""How long each angle of a guided sweep is held: a little more than what calibration reads."""
+"""Seconds for which each angle of a guided sweep is held: a little more than calibration reads."""
 RECORDINGS, CALIBRATIONS, IN_USE = "recordings", "sensor", "calibration.toml"
 
 
 _sessions: dict[str, Session] = {}
 _calibrating: dict[str, Path] = {}
-"""Folders of the calibrations that run, by the key of the job."""
+"""Folders of the running calibrations, by the key of the job."""
 _calibrations: FileCache[tuple[Any, str]] = FileCache()
 _found_ports: list[tuple[str, str]] = []
 _rendering = False
 
 
 def missing() -> list[str]:
-    """Names of the modules that a sensor needs and this Blender does not find."""
+    """Names of the modules that a sensor needs and this Blender does not have."""
     return start_child.missing(NEEDED)
 
 
@@ -70,7 +70,7 @@ def find_ports() -> list[tuple[str, str]]:
 
 
 def known_ports() -> list[tuple[str, str]]:
-    """What `find_ports` found last."""
+    """Last result of `find_ports`."""
     return _found_ports
 
 
@@ -99,21 +99,21 @@ def connect(root: Any) -> Session:
 
 
 def _unused(folder: Path) -> Path:
-    """A folder of this second within `folder` that is not there yet."""
+    """A new folder named by the time within `folder`."""
     name = time.strftime("%Y-%m-%d_%H-%M-%S")
     tried = [folder / name, *(folder / f"{name}-{k}" for k in range(2, 100))]
     return next(path for path in tried if not path.exists())
 
 
 def disconnect(uuid: str) -> None:
-    """Have a session end; what it has is on disk."""
+    """Ask a session to end; its samples are on disk."""
     session = _sessions.get(uuid)
     if session is not None:
         session.child.send("stop")
 
 
 def chosen(root: Any) -> tuple[str, str | float]:
-    """Channel of the light, and that of the dark level or its volts: as the user says, or by their names."""
+    """Channel of the light, and that of the dark level or its volts: chosen by the user, or by name."""
     settings, session = root.mu_sensor, of(root)
     channels = session.channels if session else ()
     light = next((c for c in channels if c.startswith("light")), channels[0] if channels else "")
@@ -128,7 +128,7 @@ def chosen(root: Any) -> tuple[str, str | float]:
 
 
 def calibration_file(root: Any) -> Path:
-    """The calibration that is applied: the file the user chose, else the unit's own."""
+    """File of the applied calibration: the one the user chose, else the unit's own."""
     chosen_file = root.mu_sensor.calibration
     if chosen_file:
         return Path(bpy.path.abspath(chosen_file))
@@ -161,7 +161,7 @@ CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibr
 
 
 def calibrate(root: Any, data: Path) -> None:
-    """Calibrate from a folder in a process of its own, and then apply what it finds; raises MuError."""
+    """Calibrate from a folder in a separate process, and then apply the result; raises MuError."""
     # Only now: it brings in scipy, which a Blender without the wheels lacks.
     from ...usecases.sensor.calibrate import LAYOUT, input_texts
 
@@ -175,7 +175,7 @@ def calibrate(root: Any, data: Path) -> None:
 
 
 def zero(root: Any, angle_deg: float) -> None:
-    """Have the calibration read the present voltage as that angle; raises MuError."""
+    """Shift the calibration so that the present voltage reads as that angle; raises MuError."""
     from ...sensing.calibration import write_calibration
 
     found, trouble = calibration(root)
@@ -189,7 +189,7 @@ def zero(root: Any, angle_deg: float) -> None:
 
 
 def sweep_angles(settings: Any) -> list[float]:
-    """The angles of a guided sweep, to and fro, each end once between two ways."""
+    """Angles of a guided sweep, to and fro, each end once between two ways."""
     low, high, step = settings.sweep_from, settings.sweep_to, settings.sweep_step
     count = int(abs(high - low) / step + 1e-6)
     there = [low + step * k * (1 if high >= low else -1) for k in range(count + 1)]
@@ -200,7 +200,7 @@ def sweep_angles(settings: Any) -> list[float]:
 
 
 def hold(session: Session) -> None:
-    """Mark the guided sweep's next angle as being held from now on."""
+    """Mark the guided sweep's next angle as held from now on."""
     guide = session.guide
     if guide is not None and guide.held < len(guide.angles) and not guide.holding:
         session.child.send(f"mark angle {guide.angles[guide.held]:g}")
@@ -209,7 +209,7 @@ def hold(session: Session) -> None:
 
 
 def poll() -> tuple[bool, bool]:
-    """Update every session; returns whether samples came, and whether panels have to be drawn again."""
+    """Update every session; return True if samples came, and True if panels have to be redrawn."""
     sampled = news = False
     roots = {o.mu_unit.uuid: o for o in bpy.data.objects if o.mu_unit.uuid}
     for uuid, session in _sessions.items():
@@ -238,7 +238,7 @@ def poll() -> tuple[bool, bool]:
 
 
 def _finish(root: Any, session: Session) -> bool:
-    """After the last angle of a guided sweep: calibrate from what was recorded."""
+    """Calibrate from the recording after the last angle of a guided sweep."""
     session.guide = None
     try:
         calibrate(root, session.watched.folder)
@@ -300,12 +300,12 @@ _HANDLERS = {
 
 
 def register() -> None:
-    """The handlers."""
+    """Register the handlers."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """End every session, and take the handlers out."""
+    """End every session, and unregister the handlers."""
     for uuid in _sessions:
         disconnect(uuid)
     for session in _sessions.values():

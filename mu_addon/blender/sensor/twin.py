@@ -1,7 +1,7 @@
-"""The twin: the simulated unit, beside the design, bent to the angle that the real sensor reads.
+"""The twin: the simulated unit, beside the design, bent to the angle of the real sensor.
 
-It moves between Model A's states and never beyond them: a signal that cannot come from the calibration or
-from the simulated motion leaves the last pose, in red, with the reason above it.
+It moves between Model A's states and never beyond them. A signal outside the calibration or the simulated
+motion leaves the last pose, in red, with the reason above it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _COLOURS = {OUTSIDE: "MU Out of Range", WAITING: "MU Twin Waiting"}
 
 @attrs.frozen(eq=False)
 class _Shape:
-    """What the twin of one motion is made of: its poses, and vertices (s, v, 3) of each region by state."""
+    """Data of the twin of one motion: its poses, and vertices (s, v, 3) of each region by state."""
 
     motion: Motion
     poses: Poses
@@ -92,15 +92,15 @@ def show(root: Any) -> None:
 
 
 def hide(root: Any) -> None:
-    """Take the twin out of the scene."""
+    """Remove the twin from the scene."""
     for part in parts(root):
         displays.remove(part)
 
 
 def set_pose(root: Any, reading: Any, fresh: bool) -> bool:
-    """Bend the twin to the angle of a reading; returns whether its state has changed.
+    """Bend the twin to the angle of a reading; return True if its state has changed.
 
-    reading: angle_deg, low_deg, high_deg and possible, or None; fresh: whether samples are coming.
+    reading: angle_deg, low_deg, high_deg and possible, or None; fresh: True if samples are arriving.
     """
     if not parts(root):
         return False
@@ -151,7 +151,7 @@ def _colour(root: Any, state: str) -> None:
 
 @persistent
 def _loaded(*_: Any) -> None:
-    """A twin that was saved while it moved has no signal now, unless its session still runs."""
+    """Mark a twin loaded from a file as without signal, unless its session still runs."""
     _shapes.clear()
     _status.clear()
     for root in unit_object.roots():
@@ -162,12 +162,12 @@ _HANDLERS = {"load_post": _loaded}
 
 
 def register() -> None:
-    """The handler for loading."""
+    """Register the handler for loading."""
     handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    """Take it out."""
+    """Unregister it."""
     handlers.remove(_HANDLERS)
     _shapes.clear()
     _status.clear()

@@ -1,4 +1,4 @@
-"""What differs between the Blenders that the extension runs in, 4.5 to 5.2."""
+"""Differences between the Blenders that the extension runs in, 4.5 to 5.2."""
 
 from __future__ import annotations
 
@@ -90,9 +90,9 @@ def _identifier(modifier: Any, name: str) -> str:
 
 
 def set_curve(obj: Any, path: str, index: int, frames: Any, values: Any, constant: bool = False) -> None:
-    """Let one channel of an object's property (index -1: the only one) follow values (n,) at frames (n,).
+    """Animate one channel of an object's property (index -1: the only one) by values (n,) at frames (n,).
 
-    Between them it is linear, or stays with `constant`. Through the slot of a layered action, which every
+    Linear between them, or stepwise with `constant`. Through the slot of a layered action, which every
     version here has; actions lost their own curves with 5.0.
     """
     obj.keyframe_insert(path, index=index, frame=float(frames[0]))
@@ -108,7 +108,7 @@ def set_curve(obj: Any, path: str, index: int, frames: Any, values: Any, constan
 
 
 def stored(obj: Any, group: str, name: str) -> Any:
-    """What a file holds of a property of a group of an object, whatever the group says of it now, or None."""
+    """Value of a group's property stored in a file, whatever the group defines now, or None."""
     kept = obj.bl_system_properties_get() if hasattr(obj, "bl_system_properties_get") else obj
     found = kept.get(group) if kept is not None else None
     return None if found is None else found.get(name)

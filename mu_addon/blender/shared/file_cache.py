@@ -1,4 +1,4 @@
-"""What was read from files, kept until one of them changes: panels ask many times a second."""
+"""Results of reading files, cached until one of them changes: panels ask many times a second."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...errors import MuError
 
 T = TypeVar("T")
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, MuError)
-"""What reading a file of another kind, or one that is half there, may raise."""
+"""Errors that reading an incomplete file, or one of another kind, may raise."""
 
 
 class FileCache(Generic[T]):
@@ -20,7 +20,7 @@ class FileCache(Generic[T]):
         self._kept: dict[Path, tuple[tuple[Any, ...], T | None]] = {}
 
     def read(self, files: Sequence[Path], read: Callable[[], T]) -> T | None:
-        """What `read()` returns, from memory while no file changed its time or size.
+        """Return `read()`, from memory while no file has changed its time or size.
 
         None where the first file is not there, or where `read` raises one of `UNREADABLE`.
         """
@@ -37,7 +37,7 @@ class FileCache(Generic[T]):
         return kept[1]
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Empty the cache."""
         self._kept.clear()
 
 

@@ -9,13 +9,13 @@ import bpy
 
 
 def add(handlers: Mapping[str, Callable[..., Any]]) -> None:
-    """Let Blender call each handler of its list."""
+    """Append each handler to its list in Blender."""
     for name, handler in handlers.items():
         getattr(bpy.app.handlers, name).append(handler)
 
 
 def remove(handlers: Mapping[str, Callable[..., Any]]) -> None:
-    """Take them out, where they are still in: loading a file drops those that are not persistent."""
+    """Remove them, if still present: loading a file drops those that are not persistent."""
     for name, handler in handlers.items():
         listed = getattr(bpy.app.handlers, name)
         if handler in listed:

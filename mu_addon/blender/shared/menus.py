@@ -1,4 +1,4 @@
-"""Entries in Blender's menus, the menus of presets and of what is done with a unit."""
+"""Entries in Blender's menus, the menus of presets and of actions on a unit."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _add(self, context):
 
 
 class MU_MT_object(bpy.types.Menu):
-    """What is done with a unit or gripper as a whole"""
+    """Actions on a whole unit or gripper"""
 
     bl_idname = "MU_MT_object"
     bl_label = "Monolithic Unit"
@@ -65,7 +65,7 @@ def _object(self, context):
 
 
 class MU_MT_more(bpy.types.Menu):
-    """Sample scenes, gripper, node groups for curves of your own, and the asset browser"""
+    """Sample scenes, gripper, node groups for your own curves, and the asset browser"""
 
     bl_idname = "MU_MT_more"
     bl_label = "More"
@@ -88,14 +88,14 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 
 
 def register() -> None:
-    """Menus, and the entries in Add > Mesh and Object."""
+    """Register menus, and the entries in Add > Mesh and Object."""
     _register_classes()
     bpy.types.VIEW3D_MT_mesh_add.append(_add)
     bpy.types.VIEW3D_MT_object.append(_object)
 
 
 def unregister() -> None:
-    """Take them out again."""
+    """Unregister them."""
     bpy.types.VIEW3D_MT_object.remove(_object)
     bpy.types.VIEW3D_MT_mesh_add.remove(_add)
     _unregister_classes()

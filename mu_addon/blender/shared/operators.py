@@ -1,4 +1,4 @@
-"""Base classes of the operators: the unit they act on, errors as the core words them, and opening files."""
+"""Base classes of the operators: the unit they act on, the core's errors, and opening files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
 
 
 def linked(root) -> str:
-    """Why a unit cannot be changed in this file: where it is linked from, and what to do. Else nothing."""
+    """Why a unit cannot be changed in this file: the library it is linked from, and what to do; else ""."""
     if editable(root):
         return ""
     source = root if root.library is not None else root.override_library.reference
@@ -54,7 +54,7 @@ class ValidUnitOperator(UnitOperator):
 
 
 def reports_errors(execute):
-    """`execute` that reports a MuError, what, where and remedy, and cancels: no undo step, no traceback."""
+    """Wrap `execute` to report a MuError, what, where and remedy, and cancel: no undo step, no traceback."""
 
     @wraps(execute)
     def reported(self, context):
@@ -68,7 +68,7 @@ def reports_errors(execute):
 
 
 def open_file(context, path: Path) -> None:
-    """Open a page in the browser, a folder where folders are shown, anything else as a text in Blender."""
+    """Open a page in the browser, a folder in the file browser, anything else as a text in Blender."""
     if path.is_dir():
         bpy.ops.wm.path_open(filepath=str(path))
     elif path.suffix == ".html":
@@ -78,7 +78,7 @@ def open_file(context, path: Path) -> None:
 
 
 def _show_text(context, path: Path) -> None:
-    """Put a file into a text of Blender's, and show it where a text editor is open."""
+    """Load a file as a text of Blender's, and show it if a text editor is open."""
     name = f"MU {path.name}"
     text = bpy.data.texts.get(name) or bpy.data.texts.new(name)
     text.from_string(path.read_text(encoding="utf-8", errors="replace"))

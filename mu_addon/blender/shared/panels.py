@@ -1,4 +1,4 @@
-"""Base classes of the panels in the sidebar tab MU, and what several of them draw."""
+"""Base classes of the panels in the sidebar tab MU, and drawing shared by several of them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FIRST = {
     ),
     "waveguide": ("row", "well_pitch_mm"),
 }
-"""Parameters of a section that are always seen; its others are folded. One that is not named has none."""
+"""Parameters of a section that are always shown; others are folded. A section not named has none."""
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 
@@ -71,7 +71,7 @@ class UnitPanel(RootPanel):
     """Places of `PLACES` whose parameters the panel shows."""
 
     def draw_header(self, context):
-        """A mark where one of the panel's parameters breaks a rule, also while it is closed."""
+        """Draw a mark if one of the panel's parameters breaks a rule, also while it is closed."""
         root = active_root(context)
         if self.place and root is not None and _blamed(root, _sections(self.place)):
             self.layout.label(text="", icon="ERROR")
@@ -83,13 +83,13 @@ def _sections(places: Collection[str]) -> list[str]:
 
 
 def _blamed(root, sections: Collection[str]) -> bool:
-    """Whether a parameter of these sections breaks a rule."""
+    """Return True if a parameter of these sections breaks a rule."""
     found = broken(root)
     return found is not None and found.blames(sections)
 
 
 def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
-    """Labels that show a text in several lines."""
+    """Draw labels that show a text in several lines."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for paragraph in text.split("\n"):
@@ -99,7 +99,7 @@ def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> N
 
 
 def alert(layout, text: str, icon: str = "ERROR"):
-    """A box in red with a text; returns the box."""
+    """Draw a red box with a text; return the box."""
     box = layout.box()
     box.alert = True
     wrapped(box, text, icon)
@@ -107,16 +107,16 @@ def alert(layout, text: str, icon: str = "ERROR"):
 
 
 def large_button(layout, operator: str, icon: str, **settings) -> None:
-    """The main button of a panel."""
+    """Draw the main button of a panel."""
     row = layout.row()
     row.scale_y = 1.4
     row.operator(operator, icon=icon, **settings)
 
 
 def parameter(column, root, section: str, d: Description) -> None:
-    """The field of one parameter; where it breaks a rule red, with the nearest value that fits as a button.
+    """Draw the field of one parameter; if it breaks a rule red, with the nearest valid value as a button.
 
-    The button stands beside the field: nothing below it moves.
+    The button stands beside the field, so that nothing below it moves.
     """
     group = getattr(root.mu_unit, section)
     found = broken(root)
@@ -134,7 +134,7 @@ def parameter(column, root, section: str, d: Description) -> None:
 
 
 def fix_button(layout, root, section: str, name: str, value, why: str, text: str | None = None) -> None:
-    """A button that sets a parameter to a value that keeps the rules, and says so: "Neck Ø 24 mm"."""
+    """Draw a button that sets a parameter to a valid value, with that as its label: "Neck Ø 24 mm"."""
     d = description(section, name)
     shown = shown_value(getattr(root.mu_unit, section), d, value)
     button = layout.operator("mu.fit", text=f"{label(d)} {shown}" if text is None else text + shown)
@@ -142,7 +142,7 @@ def fix_button(layout, root, section: str, name: str, value, why: str, text: str
 
 
 def parameters(layout, root, place: str) -> None:
-    """Fields of every section that belongs to a place; those that are seldom changed folded below it."""
+    """Draw fields of every section that belongs to a place; seldom changed ones are folded below it."""
     props = root.mu_unit
     folded = []
     for section in SECTIONS:
@@ -161,7 +161,7 @@ def parameters(layout, root, place: str) -> None:
 
 
 def _fold(layout, name: str, title: str, wrong: bool):
-    """A fold whose head is red where something in it is wrong; its layout, or None while it is closed."""
+    """Draw a fold, with a red head if something in it is wrong; return its layout, None if closed."""
     header, body = layout.panel(name, default_closed=True)
     header.alert = wrong
     header.label(text=title, icon="ERROR" if wrong else "NONE")
@@ -169,14 +169,14 @@ def _fold(layout, name: str, title: str, wrong: bool):
 
 
 def folded_place(layout, root, place: str, title: str) -> None:
-    """A fold with the fields of every section that belongs to a place."""
+    """Draw a fold with the fields of every section that belongs to a place."""
     body = _fold(layout, f"MU_fold_{place}", title, _blamed(root, _sections([place])))
     if body:
         parameters(body, root, place)
 
 
 def folded_section(layout, root, section: str, title: str, hint: str):
-    """A fold with a section that has a place of its own; its head is red while one of its fields is.
+    """Draw a fold with a section that has a place of its own; its head is red while one of its fields is.
 
     Returns the fold's layout, or None while it is closed.
     """
@@ -188,7 +188,7 @@ def folded_section(layout, root, section: str, title: str, hint: str):
 
 
 def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
-    """A fold with fields; its head is red while one of them breaks a rule."""
+    """Draw a fold with fields; its head is red while one of them breaks a rule."""
     found = broken(root)
     wrong = found is not None and any((section, d.name) in found.fits for section, d in fields)
     body = _fold(layout, f"MU_more_{place}", "More", wrong)

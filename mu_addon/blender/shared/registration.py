@@ -1,4 +1,4 @@
-"""Registration of property groups: their classes, and the one property of Blender's type that holds them."""
+"""Registration of property groups: their classes, and the property of Blender's type that holds them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def property_group_factory(
     """Functions `register` and `unregister` of a property group, the last of `classes`.
 
     It becomes the property `name` of `owner`, such as bpy.types.Object; values stay in the file when the
-    extension goes and are found when it comes back. calls: application handlers, see `handlers.add`.
+    extension is removed and are found when it is installed again. calls: application handlers, see
+    `handlers.add`.
     """
     add_classes, remove_classes = bpy.utils.register_classes_factory(classes)
 

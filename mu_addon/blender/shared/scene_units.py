@@ -18,9 +18,9 @@ def mm(scene: Any) -> float:
 
 
 def true_scale(obj: Any, scene: Any) -> float | None:
-    """Scale of an object in mm with which it has its true size in a scene, whatever its parents' scale.
+    """Scale of an object in mm at which it has its true size in a scene, whatever its parents' scale.
 
-    None where a parent is scaled by other factors along other axes: no scale undoes that.
+    None if a parent is scaled differently along other axes: no scale undoes that.
     """
     if obj.parent is None:
         return mm(scene)
@@ -31,12 +31,12 @@ def true_scale(obj: Any, scene: Any) -> float | None:
 
 
 def shown_factor(obj: Any, scene: Any) -> float:
-    """How many times its true size an object in mm is seen in a scene, along its most wrong axis."""
+    """Ratio of an object's displayed size in a scene to its true one, along its worst axis."""
     factors = [float(f) / mm(scene) for f in obj.matrix_world.to_scale()]
     return max(factors, key=lambda f: abs(np.log(max(abs(f), 1e-12))))
 
 
 def use_millimetres(scene: Any) -> None:
-    """One Blender unit is a millimetre, shown as such."""
+    """Set one Blender unit to a millimetre, shown as such."""
     units = scene.unit_settings
     units.system, units.scale_length, units.length_unit = "METRIC", 0.001, "MILLIMETERS"

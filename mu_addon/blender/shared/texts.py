@@ -1,4 +1,4 @@
-"""How names of the core are written in panels."""
+"""Names of the core in panels."""
 
 from __future__ import annotations
 

@@ -20,11 +20,11 @@ class Signal:
         self._connected: list[Callable[[Any], Any]] = []
 
     def connect(self, function: Callable[[Any], Any]) -> None:
-        """Have a function called from now on."""
+        """Call a function from now on."""
         self._connected.append(function)
 
     def disconnect(self, function: Callable[[Any], Any]) -> None:
-        """Have it called no more."""
+        """Stop calling it."""
         if function in self._connected:
             self._connected.remove(function)
 
@@ -36,7 +36,7 @@ class Signal:
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """While the body sets properties, none of them starts a rebuild; the body does that itself."""
+    """Context in which setting properties starts no rebuild; the body does that itself."""
     global _pauses
     _pauses += 1
     try:
@@ -46,5 +46,5 @@ def paused() -> Iterator[None]:
 
 
 def are_paused() -> bool:
-    """Whether properties are being set that must start no rebuild."""
+    """Return True while properties are being set that must start no rebuild."""
     return _pauses > 0

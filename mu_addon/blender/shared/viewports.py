@@ -1,4 +1,4 @@
-"""The 3D views of every window, and having them drawn again."""
+"""The 3D views of every window, and their redraws."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Vector
 
 LOWER, SENSOR_MM = 0.6, 72.0
-"""Height of a 3D view by its width, as it mostly is, and the width in mm of its camera's sensor."""
+"""Usual ratio of a 3D view's height to its width, and the width in mm of its camera's sensor."""
 
 
 def areas() -> Iterator[Any]:
@@ -22,7 +22,7 @@ def areas() -> Iterator[Any]:
 
 
 def frame(objects: Iterable[Any]) -> None:
-    """Bring objects into every 3D view, each from its own side; in background too: so a file opens framed."""
+    """Frame objects in every 3D view, each from its own side; in background too, for saved files."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
     corners = np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
@@ -39,7 +39,7 @@ def frame(objects: Iterable[Any]) -> None:
 
 
 def scale(factor: float) -> None:
-    """Have every 3D view see places that many times as far from the scene's origin, and as large."""
+    """Scale every 3D view's distances from the scene's origin by a factor."""
     for area in areas():
         space = area.spaces.active
         view = space.region_3d
@@ -49,7 +49,7 @@ def scale(factor: float) -> None:
 
 
 def frame_selected(context: Any) -> None:
-    """Bring what is selected into the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
+    """Frame the selection in the 3D view: a scene may be metres wide, and a unit is 75 mm tall."""
     if bpy.app.background:
         return
     area = context.area if context.area and context.area.type == "VIEW_3D" else None
@@ -61,13 +61,13 @@ def frame_selected(context: Any) -> None:
 
 
 def redraw() -> None:
-    """Have every 3D view and its panels drawn again."""
+    """Redraw every 3D view and its panels."""
     for area in areas():
         area.tag_redraw()
 
 
 def redraw_views(panels: bool) -> None:
-    """Have every 3D view drawn again without its tool bars, with its sidebar only if `panels`."""
+    """Redraw every 3D view without its tool bars, with its sidebar only if `panels`."""
     for area in areas():
         for region in area.regions:
             if region.type == "WINDOW" or (panels and region.type == "UI"):
@@ -75,10 +75,10 @@ def redraw_views(panels: bool) -> None:
 
 
 def redraw_status() -> None:
-    """Have the status bar of every window drawn again, and the headers that stand in for a hidden one.
+    """Redraw the status bar of every window, and the headers that replace a hidden one.
 
-    The status bar is no area that Python can reach: Blender draws it again where its text is set, which is
-    the running tool's own while there is one.
+    The status bar is no area that Python can reach: Blender redraws it when its text is set, which belongs to
+    a running tool while there is one.
     """
     for window in bpy.context.window_manager.windows:
         if window.screen.show_statusbar and not len(window.modal_operators):

@@ -21,11 +21,11 @@ _PHRASES = {
     r"with --obstacle": "with Use as Obstacle",
     r"with a finer mesh, --refine": "with Detail: Homogenised or Printed Struts",
 }
-"""What is done otherwise here than on the command line."""
+"""Actions that differ here from the command line."""
 
 
 def in_panel(text: str) -> str:
-    """A text with its parameters and options by the labels of their fields.
+    """A text with its parameters and options replaced by the labels of their fields.
 
     "[chambers] wall_mm" becomes "Wall", "--known-deg" becomes "Known Deg".
     """
@@ -45,5 +45,5 @@ def _option(found: re.Match[str]) -> str:
 
 
 def error_text(error: MuError) -> str:
-    """What happened, where, and what to do, a line each."""
+    """The error, its location, and the remedy, a line each."""
     return "\n".join(in_panel(text) for text in (error.what, error.where, error.remedy) if text)

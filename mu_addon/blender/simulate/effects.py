@@ -1,8 +1,8 @@
-"""Effects that a diagnosis named beside a unit's parameters, kept with the unit for its next simulation.
+"""Effects named by a diagnosis beside a unit's parameters, kept with the unit for its next simulation.
 
-They stay what the diagnosis wrote, a model.toml of these effects alone, with what each parameter is known to:
-a text on the unit's root, so that undo, copies and the .blend file need no care. It is read without the
-simulator's packages, which a Blender may lack.
+They are stored as the diagnosis wrote them, a model.toml of these effects alone, with the interval of each
+parameter: a text on the unit's root, so that undo, copies and the .blend file need no handling. It is read
+without the simulator's packages, which a Blender may lack.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ WEIGHT = "gravity"
 
 
 def keep(root: Any, text: str) -> None:
-    """Give the unit's next simulation the effects of a model.toml's text, in place of what it had."""
+    """Give the unit's next simulation the effects of a model.toml's text, replacing earlier ones."""
     root.mu_unit.study.effects = text
 
 
@@ -35,7 +35,7 @@ def _tables(root: Any) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def has_gravity(root: Any) -> bool:
-    """Whether the direction of gravity matters to the unit's simulation."""
+    """Return True if the direction of gravity matters to the unit's simulation."""
     return WEIGHT in _tables(root)
 
 
@@ -56,7 +56,7 @@ def lines(root: Any) -> list[str]:
 
 
 def inputs(root: Any) -> dict[str, Any]:
-    """What a study of the unit would have in study.toml: effects and orientation_deg, or nothing."""
+    """Entries of study.toml for a study of the unit: effects and orientation_deg, or none."""
     effects = {
         name: {p: float(table["value"]) for p, table in parameters.items()}
         for name, parameters in _tables(root).items()
@@ -70,7 +70,7 @@ def _direction(root: Any) -> float:
 
 
 def named_effects(root: Any) -> NamedEffects:
-    """The effects as the simulation takes them; raises InputError."""
+    """The effects as inputs of the simulation; raises InputError."""
     from ...usecases.simulate_and_place.named_effects import NamedEffects
 
     found = inputs(root)

@@ -1,4 +1,4 @@
-"""The unit's simulation as a job: from the properties in Blender to the core's inputs of a study."""
+"""The unit's simulation as a job: the core's inputs of a study from the properties in Blender."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 def plan_of(root: Any) -> list[tuple[str, float]]:
-    """Stages that a unit's simulation is expected to go through, with the seconds that each takes."""
+    """Expected stages of a unit's simulation, with the seconds of each."""
     return _expected(root)[0]
 
 
 def announced(root: Any) -> tuple[float, bool]:
-    """Seconds that a unit's simulation is expected to take, and whether by what was measured here."""
+    """Expected seconds of a unit's simulation, and True if measured on this machine."""
     plan, known = _expected(root)
     return sum(seconds for _, seconds in plan), known
 
 
 def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
-    """The plan, and whether all that takes long in it was measured: of this unit, else of another one."""
+    """The plan, and True if all its long stages were measured: for this unit, else another one."""
     from ...usecases.simulate_and_place.expected import SOLVED, seconds_of, stage_names
 
     settings = root.mu_unit.study
@@ -59,7 +59,7 @@ SIMULATION = JobKind(
 
 
 def job_of(root: Any) -> Job:
-    """The study that a unit's properties ask for; raises InputError."""
+    """Study job from a unit's properties; raises InputError."""
     # Only now: they bring in the solver's packages, which a Blender may lack.
     try:
         from ...fem.solver import SolverChoice

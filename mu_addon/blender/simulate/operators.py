@@ -15,7 +15,7 @@ from .job import SIMULATION, job_of
 
 
 def _file_of(root, what):
-    """A file of the run that is shown; of one that is computed or has just been, what its process said."""
+    """A file of the shown run; of one that is running or has just ended, its process's output."""
     child = SIMULATION.child(root)
     if what in ("log", "errors") and child is not None:
         return child.folder.parent / FILES[what]

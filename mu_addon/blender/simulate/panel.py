@@ -1,4 +1,4 @@
-"""The panel Simulate: what is simulated, its progress, and the effects that a diagnosis added."""
+"""The panel Simulate: the job, its progress, and the effects that a diagnosis added."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
 
 
 def start_words(root) -> str:
-    """What the button says: the job, and what it takes by what was measured on this machine."""
+    """Label of the button: the job, and its expected duration from measurements on this machine."""
     seconds, measured = announced(root)
     return f"Simulate, {'about' if measured else 'perhaps'} {rounded(seconds)}"
 
@@ -80,7 +80,7 @@ def rounded(seconds: float) -> str:
 
 
 def _effects(layout, root) -> None:
-    """What a diagnosis named beside the unit's parameters, and the direction of gravity where it matters."""
+    """Draw the effects named by a diagnosis, and the direction of gravity if it matters."""
     lines = effects.lines(root)
     if not lines:
         return

@@ -1,4 +1,4 @@
-"""Where a unit's runs lie, which one is shown, and whether it is of the unit as it is now."""
+"""Folders of a unit's runs, the shown one, and whether it belongs to the unit's present design."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ CONTACT = "contact.csv"
 
 @attrs.frozen
 class Findings:
-    """What the shown run has found; `stale` where the unit was changed since it was computed."""
+    """Results of the shown run; `stale` if the unit was changed since it was computed."""
 
     run: Run
     stale: bool
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Its summary.json."""
+        """Content of its summary.json."""
         return self.run.summary
 
     @property
     def quick(self) -> bool:
-        """Whether it is a quick look: a homogenised lattice on a coarse mesh."""
+        """True for a quick look: a homogenised lattice on a coarse mesh."""
         return self.run.detail == "quick"
 
     @property
@@ -54,7 +54,7 @@ class Findings:
 
 @attrs.frozen(eq=False)
 class ContactForce:
-    """Force (k,) in N of a study's unit on one obstacle at times (k,) in s, friction and all."""
+    """Force (k,) in N of a study's unit on one obstacle at times (k,) in s, with friction."""
 
     name: str
     time_s: Any
@@ -62,7 +62,7 @@ class ContactForce:
 
 
 def folder_of(root: Any) -> Path:
-    """The unit's own folder, where its runs and what else is made of it lie.
+    """The unit's own folder, with its runs and everything else made of it.
 
     The one that it names, else one beside the .blend file, else one in the user's own folder.
     """
@@ -71,7 +71,7 @@ def folder_of(root: Any) -> Path:
 
 
 def default_folder(named: str, title: str, uuid: str) -> Path:
-    """The folder that is named, else one for a title beside the .blend file, else in the user's own."""
+    """The named folder, else one for a title beside the .blend file, else in the user's own."""
     if named:
         return Path(bpy.path.abspath(named))
     name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', title).strip('-.') or 'unit'}-{uuid[:8]}"
@@ -81,12 +81,12 @@ def default_folder(named: str, title: str, uuid: str) -> Path:
 
 
 def beside(blend: Path, name: str) -> Path:
-    """The folder of a unit, by its own name, beside a .blend file."""
+    """Folder of a unit, by its own name, beside a .blend file."""
     return blend.with_name(f"{blend.stem}.mu") / name
 
 
 def assign_folder(root: Any) -> Path:
-    """The unit's folder, stored with the unit from now on, relative to the .blend file if possible."""
+    """Store the unit's folder with the unit, relative to the .blend file if possible, and return it."""
     folder = folder_of(root)
     if not root.mu_unit.study.folder:
         root.mu_unit.study.folder = relative(folder)
@@ -107,12 +107,12 @@ def runs_of(root: Any) -> list[Run]:
 
 
 def run_by_key(root: Any, key: str) -> Run | None:
-    """The unit's run of that key, or None where there is none any more."""
+    """The unit's run of that key, or None if it no longer exists."""
     return next((run for run in runs_of(root) if run.key == key), None)
 
 
 def design_of(root: Any) -> str:
-    """Hash of what a simulation of the unit would be of, see `history.design_key`; nothing if of nothing."""
+    """Hash of the design that the unit's simulation would have (`history.design_key`); "" if invalid."""
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
@@ -123,10 +123,10 @@ def design_of(root: Any) -> str:
 
 
 def shown_run(root: Any) -> Run | None:
-    """The run whose results are shown: the one that was chosen, else the best one of the unit as it is now.
+    """The run whose results are shown: the chosen one, else the best one of the unit's present design.
 
-    A choice holds until the unit changes. Where no run is of the unit as it is now, it is the run that was
-    shown last, which is then stale.
+    A choice holds until the unit changes. If no run is of the present design, it is the run that was shown
+    last, which is then stale.
     """
     return _shown(root, runs_of(root), design_of(root))
 
@@ -149,27 +149,27 @@ def choose(root: Any, run: Run) -> None:
 
 
 def remember(root: Any) -> None:
-    """Keep which run is shown, so that it stays where the unit has none of its own."""
+    """Store which run is shown, so that it stays while the unit has none of its own."""
     run, study = shown_run(root), root.mu_unit.study
     if run is not None and study.run != run.key:
         study.run, study.run_design = run.key, ""
 
 
 def results_folder(root: Any) -> Path:
-    """Folder of the run that is shown; where there is none, the folder that runs will lie in."""
+    """Folder of the shown run; without one, the folder for the runs."""
     run = shown_run(root)
     return folder_of(root) if run is None else run.folder
 
 
 def findings(root: Any) -> Findings | None:
-    """What the shown run has found, or None where nothing was simulated yet."""
+    """Results of the shown run, or None if nothing was simulated yet."""
     design = design_of(root)
     run = _shown(root, runs_of(root), design)
     return Findings(run, run.design != design) if run is not None and run.summary else None
 
 
 def contact_forces(root: Any) -> list[ContactForce]:
-    """Force of the study's unit on every obstacle; empty where there is none."""
+    """Force of the study's unit on every obstacle; empty without one."""
     path = results_folder(root) / CONTACT
     return _forces.read([path], lambda: _read_forces(path)) or []
 
@@ -185,7 +185,7 @@ def _read_forces(path: Path) -> list[ContactForce]:
 
 
 def relative(path: Path) -> str:
-    """A path as Blender keeps it: relative to the .blend file where there is one on the same drive."""
+    """A path for Blender: relative to the .blend file if there is one on the same drive."""
     if not bpy.data.filepath:
         return str(path)
     try:

@@ -1,4 +1,4 @@
-"""How long the stages of simulations took on this machine: what a new one is announced with."""
+"""Durations of simulations' stages on this machine, used to announce a new one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
 
 LEAST_SHARE = 0.05
-"""A stage that took less than this share of what it took before was found in the cache, and tells nothing."""
+"""A stage that took less than this share of its earlier time was cached, and is no measurement."""
 
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
 
@@ -26,7 +26,7 @@ def _file() -> Path:
 
 
 def measured(detail: str) -> dict[str, float]:
-    """Seconds that each stage of a simulation of that detail took here last; empty before the first one."""
+    """Seconds of each stage of the last simulation of that detail here; empty before the first one."""
     path = _file()
     found: Any = (_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}).get(detail)
     if not isinstance(found, dict):
@@ -35,7 +35,7 @@ def measured(detail: str) -> dict[str, float]:
 
 
 def note(detail: str, seconds: dict[str, float]) -> None:
-    """Keep how long the stages of a simulation took that has ended well. Raises OutputError."""
+    """Store the seconds of a simulation's stages if it ended well. Raises OutputError."""
     before = measured(detail)
     real = {name: s for name, s in seconds.items() if s >= LEAST_SHARE * before.get(name, 0.0)}
     path = _file()
@@ -58,11 +58,11 @@ def _ended(key: str) -> None:
 
 
 def register() -> None:
-    """Listen for simulations that end."""
+    """Connect to the end of simulations."""
     start_child.JOB_ENDED.connect(_ended)
 
 
 def unregister() -> None:
-    """Listen no more."""
+    """Disconnect."""
     start_child.JOB_ENDED.disconnect(_ended)
     _kept.clear()

@@ -1,4 +1,4 @@
-"""The core's steps as operators, made from its list, each with its own parameters in the redo panel."""
+"""The core's steps as operators, made from its list, each with its parameters in the redo panel."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -19,11 +19,11 @@ from ..unit.properties import from_unit, to_unit
 from . import state as stack
 
 _OF_THEIR_OWN = ("path", "solid")
-"""Steps that have operators of their own."""
+"""Steps with separate operators."""
 
 
 def _annotations(step: Step) -> dict:
-    """Properties of a step's operator: its own parameters, and whether it is muted."""
+    """Properties of a step's operator: its parameters, and True if it is muted."""
     found = {}
     for section in SECTIONS:
         for d in describe(section):
@@ -42,7 +42,7 @@ def _annotations(step: Step) -> dict:
 
 
 class _OfStep(UnitOperator):
-    """Sets a step's own parameters, as far as they are given, and makes the step again."""
+    """Sets a step's own parameters, as far as they are given, and runs the step again."""
 
     bl_options = {"REGISTER", "UNDO"}
     step: Step
@@ -99,7 +99,7 @@ class _OfStep(UnitOperator):
             layout.prop(self, "muted")
 
     def _take(self, props) -> None:
-        """Take over what the unit has, for the redo panel."""
+        """Take the unit's values, for the redo panel."""
         for section, name in stack.own_parameters(self.step):
             value = getattr(getattr(props, section), name)
             setattr(self, name, value)

@@ -1,4 +1,4 @@
-"""The design's steps as a list: what is shown, what is muted, and the chosen one's parameters."""
+"""The design's steps as a list: shown ones, muted ones, and the chosen one's parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from . import state as stack
 
 
 class MU_UL_steps(bpy.types.UIList):
-    """Steps of the design, in the order in which they are made"""
+    """Steps of the design, in order"""
 
     bl_idname = "MU_UL_steps"
 

@@ -11,14 +11,14 @@ from ...design.steps import STEPS, Stack, Step, StepInputs
 from ..body import state as bodies
 
 STACK = Stack()
-"""Values of every unit's steps: units of one shape, and the states before and after an undo, share them."""
+"""Values of every unit's steps, shared by units of one shape and by states before and after an undo."""
 
 SHOWN = ("membranes", "struts", "anchors", "wells")
-"""Steps that are shown until the user says otherwise."""
+"""Steps that are shown by default."""
 
 
 def fill(props: Any) -> None:
-    """Give a unit's properties an entry for every step of the core, in its order."""
+    """Add an entry for every step of the core to a unit's properties, in its order."""
     if [entry.name for entry in props.stack] == list(STEPS):
         return
     kept = {entry.name: (entry.muted, entry.shown) for entry in props.stack}
@@ -35,12 +35,12 @@ def muted(props: Any) -> frozenset[str]:
 
 
 def can_be_muted(name: str) -> bool:
-    """Whether the core knows what to do without that step."""
+    """Return True if the core can do without that step."""
     return name in STEPS and bool(STEPS[name].muting)
 
 
 def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
-    """What the steps of a unit in the scene are made from; raises InputError for a body that does not fit."""
+    """Inputs of the steps of a unit in the scene; raises InputError for a body that does not fit."""
     # A unit of fewer chambers has fewer paths: the chosen one waits until it is there again.
     path = root.mu_unit.path
     known = path in {window.name for window in windows(unit.chambers.count)}
@@ -54,6 +54,6 @@ def own_parameters(step: Step) -> list[tuple[str, str]]:
 
 
 def description(section: str, name: str) -> Description:
-    """What the core says of a parameter."""
+    """The core's description of a parameter."""
     (core,) = (s for s in SECTIONS if s.section == section)
     return next(d for d in describe(core) if d.name == name)

@@ -57,7 +57,7 @@ class MU_OT_track(bpy.types.Operator):
 
 
 class MU_OT_track_write(bpy.types.Operator):
-    """Write angle, places and pressure over time into a folder of measured data"""
+    """Write angle, positions and pressure over time into a folder of measured data"""
 
     bl_idname = "mu.track_write"
     bl_label = "Write Measured Data"

@@ -1,4 +1,4 @@
-"""How a clip was filmed, kept on the clip itself, and the core's description that it stands for."""
+"""Setup of a clip, kept on the clip itself, and the core's description from it."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -37,7 +37,7 @@ def _place(name: str):
 
 
 class MU_PG_bench(bpy.types.PropertyGroup):
-    """What was filmed, from where, and by which markers it is measured."""
+    """Setup of a video: the object, the view, and the markers."""
 
     camera: EnumProperty(
         name="Camera at",
@@ -136,7 +136,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
 
 
 def missing(clip: Any) -> str:
-    """What a clip still lacks before it can be measured, in words; nothing where all is there."""
+    """Missing settings of a clip before it can be measured, in words; "" if it is complete."""
     bench, names = clip.mu_bench, {track.name for track in clip.tracking.tracks}
     if len(names) < 2:
         return "Place markers first: Ctrl-click them in the clip, two on the base and two on the tip"
@@ -163,7 +163,7 @@ def missing(clip: Any) -> str:
 
 
 def bench_of(clip: Any) -> Bench:
-    """The core's description of a clip; raises InputError for what is missing."""
+    """The core's description of a clip; raises InputError for missing settings."""
     lacks = missing(clip)
     if lacks:
         raise InputError(lacks, clip.name, "sidebar of the clip editor, tab MU")
@@ -189,7 +189,7 @@ def _pair(values: Any) -> tuple[float, float]:
 
 
 def title(clip: Any) -> str:
-    """Name of the experiment that a clip becomes."""
+    """Name of the experiment made from a clip."""
     return clip.mu_bench.title or Path(clip.name).stem
 
 

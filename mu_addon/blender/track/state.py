@@ -20,9 +20,9 @@ CORRELATION = 0.75
 
 
 def track_markers(path: Path, markers: MarkerSettings) -> Tracks:
-    """Track markers through a clip from where they are in its first frame; raises InputError.
+    """Track markers through a clip from their positions in its first frame; raises InputError.
 
-    The clip is gone from Blender's data afterwards.
+    The clip is removed from Blender's data afterwards.
     """
     try:
         clip = bpy.data.movieclips.load(str(Path(path).resolve()))
@@ -63,7 +63,7 @@ def tracks_of(clip: Any) -> Tracks:
 
 
 def prepare(tracks: Iterable[Any], kind: str) -> None:
-    """Set tracks up for markers of a kind: compared with the first frame, so that nothing creeps."""
+    """Set up tracks for markers of a kind: compared with the first frame, so that they do not drift."""
     for track in tracks:
         track.motion_model = MODELS[kind]
         track.pattern_match = "KEYFRAME"
@@ -92,7 +92,7 @@ def _place(clip: Any, name: str, at: tuple[float, float], markers: MarkerSetting
 
 @contextmanager
 def _editor(clip: Any) -> Iterator[Any]:
-    """A clip editor that shows the clip, for operators; yields the scene, and puts everything back.
+    """Context with a clip editor that shows the clip, for operators; yields the scene, restores everything.
 
     Even without a window on the screen Blender has the window of its start-up file.
     """

@@ -1,4 +1,4 @@
-"""A broken rule in the words of the panel: what is wrong, in which fields, and what fits there."""
+"""A broken rule in the words of the panel: the fault, its fields, and valid values."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ for _section in SECTIONS:
 
 @attrs.frozen
 class Broken:
-    """What rule is broken, and what to do, a line each; fits: what fits in each field, or None, by place.
+    """A broken rule and its remedy, a line each; fits: the valid value of each field, or None.
 
-    repairs: every rule that is broken, in order, with the value that mends it.
+    repairs: every broken rule, in order, with the value that repairs it.
     """
 
     text: str
@@ -35,31 +35,31 @@ class Broken:
     repairs: list[Repair] = attrs.field(factory=list)
 
     def blames(self, sections: Collection[str]) -> bool:
-        """Whether a parameter of one of these sections breaks a rule."""
+        """Return True if a parameter of one of these sections breaks a rule."""
         places = (*self.fits, *((repair.section, "") for repair in self.repairs))
         return any(section in sections for section, _ in places)
 
 
 _good: dict[str, Unit] = {}
-"""By UUID: the last design that kept every rule in this session."""
+"""By UUID: the last valid design in this session."""
 _found: dict[str, tuple[Any, Broken]] = {}
-"""By UUID: what was found last, with the parameters that it is of."""
+"""By UUID: the last result, with its parameters."""
 
 
 def keep(root: Any, unit: Unit) -> None:
-    """Remember a design that keeps every rule: what differs from it is to blame for a broken one."""
+    """Store a valid design: a later difference from it is blamed for a broken rule."""
     _good[root.mu_unit.uuid] = unit
 
 
 def words(error: MuError) -> str:
-    """What an error says, with parameters by the names of their fields, and true lengths."""
+    """Text of an error, with parameters by the names of their fields, and true lengths."""
     true = getattr(error, "true_size", None) or error
     lines = [true.what] if isinstance(error, InputError) and _places(error.where) else [true.what, true.where]
     return "\n".join(in_panel(text) for text in (*lines, true.remedy) if text)
 
 
 def _places(where: str) -> list[Place]:
-    """The parameters that the `where` of a rule names: "[chambers] wall_mm"."""
+    """Parameters named by the `where` of a rule: "[chambers] wall_mm"."""
     section = re.match(r"\[(\w+)\] (.+)", where)
     if section is None:
         return []
@@ -68,7 +68,7 @@ def _places(where: str) -> list[Place]:
 
 
 def broken(root: Any) -> Broken | None:
-    """The rule that a unit's parameters break, or None; looked for anew only where they changed."""
+    """Rule that a unit's parameters break, or None; evaluated again only where they changed."""
     props = root.mu_unit
     if not props.trouble:
         return None
@@ -113,6 +113,6 @@ def description(section: str, name: str) -> Description:
 
 
 def forget() -> None:
-    """Forget every design: another file is open."""
+    """Drop every design, as another file is open."""
     _good.clear()
     _found.clear()

@@ -1,7 +1,7 @@
-"""What a root object looks like: values of the design's steps as one mesh, and candidate paths beside it.
+"""Drawing of a root object: values of the design's steps as one mesh, and candidate paths beside it.
 
-The mesh carries, at its points, what part they are of (`mu_part`, a number of `PARTS`), how they are skinned
-(`mu_skin`, see `preview.nodes.unit`) and the radius of struts and anchors in mm.
+The mesh carries, at its points, their part (`mu_part`, a number of `PARTS`), their skin (`mu_skin`, see
+`preview.nodes.unit`) and the radius of struts and anchors in mm.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ..steps import state as stack
 
 CANDIDATE = "candidate:"
 FREE = "free"
-"""The best path of the whole lattice, where a study has looked for it."""
+"""The whole lattice's best path, if a study has searched it."""
 FLAWS = "flaws"
-"""Balls where a body's check found something."""
+"""Balls where a body's check found a flaw."""
 
 DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], Skeleton | None]]] = {
     "profile": ("profile", lambda value, given, cut: skeletons.outline(value)),
@@ -42,7 +42,7 @@ DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], Skeleton | None]]] = {
     "path": ("path", lambda value, given, cut: skeletons.line_through(value)),
     "wells": ("waveguide", lambda value, given, cut: skeletons.bar(value)),
 }
-"""The part that a step's value becomes, and how it is drawn: from the value, what was given, the cut."""
+"""Part for a step's value, and its drawing: from the value, the inputs, the cut."""
 
 PLATE = "plate"
 PARTS = (*(name for name, _ in DRAWN.values()), PLATE)
@@ -85,7 +85,7 @@ def _part(name: str, part: Skeleton) -> Skeleton:
 
 
 def write(root: Any, mesh: Any, drawn: Mapping[str, Skeleton]) -> None:
-    """Write parts into a root's mesh, which the group "MU Unit" skins; colours of the user's are kept."""
+    """Write parts into a root's mesh, which the group "MU Unit" skins; the user's colours are kept."""
     skeletons.write(mesh, whole(drawn))
     mesh["mu_points"] = len(mesh.vertices)
     for name in SLOTS[len(mesh.materials) :]:
@@ -97,7 +97,7 @@ def write(root: Any, mesh: Any, drawn: Mapping[str, Skeleton]) -> None:
 
 
 def own_mesh(root: Any, mesh: Any | None, others: list[Any]) -> Any:
-    """`mesh` where only this root can write into it, else a copy; a new one for None.
+    """`mesh` if only this root can write into it, else a copy; a new one for None.
 
     others: meshes of the other roots, which a duplicate shares with its original.
     """
@@ -132,7 +132,7 @@ def put_candidates(root: Any, unit: Unit, shown: bool) -> None:
 
 
 def put_flaws(root: Any, places: list[Any], radius: float) -> None:
-    """Put a red ball at every place (3,) in mm of the unit's frame, in place of those that were there."""
+    """Put a red ball at every position (3,) in mm of the unit's frame, replacing earlier ones."""
     old = beside(root, FLAWS)
     if old is not None:
         displays.remove(old)
@@ -142,7 +142,7 @@ def put_flaws(root: Any, places: list[Any], radius: float) -> None:
 
 
 def beside(root: Any, name: str) -> Any | None:
-    """The display of that name: a candidate path, the free path, or flaws; None where it is not shown."""
+    """Display of that name: a candidate path, the free path, or flaws; None if it is not shown."""
     return next((child for child in root.children if child.get(displays.PART) == name), None)
 
 

@@ -1,8 +1,8 @@
-"""Blender properties of the core's parameters, and what a panel shows of a length: its true one, in mm.
+"""Blender properties of the core's parameters; panels show the true length in mm.
 
 Blender shows and drags a field of the subtype DISTANCE in the unit of the scene, in steps of a hundredth of
-that: 0.0009 m in its start-up scene. Lengths of lenses it has in millimetres in every scene, and reads other
-metric units where they are typed; fields of lengths here are of that subtype.
+that: 0.0009 m in its start-up scene. Lengths of lenses are in millimetres in every scene, and accept other
+metric units when typed; fields of lengths here use that subtype.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -26,7 +26,7 @@ MOST_INT = 2**31 - 1
 
 
 def exact(value: float) -> float:
-    """The shortest decimal number that Blender's single precision stands for: 0.9 for 0.8999999762."""
+    """Shortest decimal number for a value in Blender's single precision: 0.9 for 0.8999999762."""
     return float(str(np.float32(value)))
 
 
@@ -45,7 +45,7 @@ _NAMES = {
     "plus_y": "+Y Side",
     "beside_x": "X Sides",
 }
-"""Parameters whose own names say too little beside a field, or are too long for it."""
+"""Parameters whose own names are too vague beside a field, or too long for it."""
 
 
 def label(d: Description) -> str:
@@ -59,7 +59,7 @@ def label(d: Description) -> str:
 
 
 def tooltip(d: Description) -> str:
-    """What a parameter is, its bounds and where its value comes from; Blender adds the last full stop."""
+    """Description, bounds and source of a parameter; Blender adds the last full stop."""
     allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
     fixed = ". The same at every scale" if d.fixed else ""
     source = f".\nSource: {d.source}" if d.source else ""
@@ -67,7 +67,7 @@ def tooltip(d: Description) -> str:
 
 
 def blender_property(d: Description, update=None, options=frozenset(), name="", **more):
-    """The Blender property of one parameter or setting; name and more: in place of what follows from it."""
+    """The Blender property of one parameter or setting; name and more: replace derived values."""
     shared = {
         "name": name or label(d),
         "description": tooltip(d),
@@ -97,7 +97,7 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
 
 
 def step_of(high_mm: float) -> int:
-    """Hundredths of a millimetre by which a drag of one pixel changes a length of up to so many mm."""
+    """Change in hundredths of a millimetre by a drag of one pixel, of a length of up to so many mm."""
     return 10 if high_mm > 20 else 1
 
 
@@ -118,7 +118,7 @@ def true_length(name: str, title: str, text: str, step: float) -> dict[str, Any]
 
 
 def millimetres(step: float, **shared):
-    """A property in true millimetres; step: hundredths of one by which a drag of a pixel changes it."""
+    """A property in true millimetres; step: change in hundredths of one by a drag of a pixel."""
     return FloatProperty(subtype=MILLIMETRES, precision=3, step=step, **shared)
 
 
@@ -128,24 +128,24 @@ def true_scale(unit, d: Description) -> float:
 
 
 def shown_value(group, d: Description, value: float) -> str:
-    """A value of a parameter in words: a length as it is at the unit's scale."""
+    """A value of a parameter in words: a length at the unit's scale."""
     if d.unit != "mm":
         return f"{value:.6g}"
     return f"{value * true_scale(group.id_data.mu_unit, d):.6g} mm"
 
 
 TRUE = "_true"
-"""What the name of the field of `true_length` ends with."""
+"""Suffix of the name of the field of `true_length`."""
 
 
 def field(group, d: Description) -> str:
-    """Name of the property that a panel shows of a parameter: itself, or its true length where it differs."""
+    """Name of the property that a panel shows of a parameter: itself, or its true length if different."""
     scaled = d.unit == "mm" and true_scale(group.id_data.mu_unit, d) != 1.0
     return d.name + TRUE if scaled else d.name
 
 
 def tied_update(name: str, changed):
-    """The update of a parameter: one that is tied to another one changes that, too."""
+    """The update of a parameter, which also changes a parameter tied to it."""
     if len(tied({name: 0.0})) == 1:
         return changed
 
@@ -161,7 +161,7 @@ def tied_update(name: str, changed):
 
 
 def generated_fields(section: type, changed) -> dict[str, Any]:
-    """Blender properties of every parameter of a section, and of every length as it is."""
+    """Blender properties of every parameter of a section, and of every true length."""
     annotations = {}
     for d in describe(section):
         annotations[d.name] = blender_property(d, tied_update(d.name, changed))

@@ -1,4 +1,4 @@
-"""What a unit comes to, for the head of its panel: true size, resin, time to print; so many lines."""
+"""Figures of a unit, for the head of its panel: true size, resin, time to print; a fixed number of lines."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .broken import broken
 from .properties import to_unit
 
 LINES = 5
-"""Lines of the box at the head of the panel, whatever it says: what is below does not move."""
+"""Fixed number of lines of the box at the head of the panel, so that nothing below it moves."""
 
 _kept: dict[str, tuple[Any, list[str]]] = {}
 
 
 def lines(root: Any, width: int) -> tuple[list[str], bool]:
-    """What the box says, LINES lines of at most `width` letters, and whether it is a broken rule."""
+    """LINES lines of the box of at most `width` letters, and True if they are a broken rule."""
     found = broken(root)
     if found is not None:
         return _rule(found.text.split("\n"), width), True
@@ -34,7 +34,7 @@ def lines(root: Any, width: int) -> tuple[list[str], bool]:
 
 
 def _rule(paragraphs: list[str], width: int) -> list[str]:
-    """A broken rule and, whole, its remedy: where both are too long, it is the rule that is cut."""
+    """A broken rule and its full remedy: where both are too long, the rule is cut."""
     # The rule's name helps nobody here; the tooltip has it.
     what = textwrap.wrap(sentence(re.sub(r" \(rule: [^)]*\)", "", paragraphs[0])), width)
     remedy = textwrap.wrap(sentence(paragraphs[-1]), width)[: LINES - 1] if len(paragraphs) > 1 else []

@@ -1,7 +1,7 @@
 """Previews that follow their parameters: at most one rebuild every few hundredths of a second.
 
-Undo, redo and loading can bring back parameters whose preview was rebuilt later than the undo step was
-taken; handlers look for such units and rebuild them.
+Undo, redo and loading can restore parameters whose preview was rebuilt after the undo step was taken;
+handlers find such units and rebuild them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _pending: set[str] = set()
 
 
 def schedule(root) -> None:
-    """Have the preview of a unit rebuilt soon; at once in background, where timers never fire."""
+    """Schedule a rebuild of a unit's preview; at once in background, where timers never fire."""
     if updates.are_paused() or not root.mu_unit.uuid:
         return
     if bpy.app.background:
@@ -51,7 +51,7 @@ def _rebuild_pending():
 
 
 def _show(root) -> None:
-    """Show the parts that belong to what the user wants to see, preview or solid."""
+    """Show the parts that the user wants to see, preview or solid."""
     if not updates.are_paused() and root.mu_unit.uuid:
         unit_object.show(root)
 
@@ -62,7 +62,7 @@ def _after_undo_or_load(*_):
 
 
 def catch_up() -> None:
-    """Have every preview rebuilt that is behind its parameters or its study."""
+    """Rebuild every preview that is behind its parameters or its study."""
     for root in unit_object.roots():
         if unit_object.behind(root):
             schedule(root)
@@ -75,7 +75,7 @@ def _job_ended(_key) -> None:
 
 @persistent
 def _played(*_):
-    """Keyframes and drivers set parameters without a property's update."""
+    """Rebuild after keyframes and drivers, which set parameters without a property's update."""
     for root in unit_object.roots():
         data = root.animation_data
         if data is not None and (data.action or data.drivers) and unit_object.behind(root):
@@ -90,14 +90,14 @@ _CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show), (JOB_ENDE
 
 
 def register():
-    """Handlers for undo, redo and load, and the signals that start a rebuild."""
+    """Register handlers for undo, redo and load, and the signals that start a rebuild."""
     handlers.add(_HANDLERS)
     for signal, function in _CONNECTIONS:
         signal.connect(function)
 
 
 def unregister():
-    """Take out handlers, signals and a waiting rebuild."""
+    """Unregister handlers, signals and a waiting rebuild."""
     for signal, function in _CONNECTIONS:
         signal.disconnect(function)
     handlers.remove(_HANDLERS)

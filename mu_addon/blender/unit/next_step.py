@@ -1,4 +1,4 @@
-"""The one thing to do next with a unit, for the head of its panel."""
+"""The next action on a unit, for the head of its panel."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..simulate.panel import start_words
 from . import object as unit_object
 
 LETTERS = 14
-"""Of the name of a stage that runs; a longer one is numbered."""
+"""Letters of a running stage's name; a longer one is numbered."""
 
 
 def draw(row, root) -> None:
-    """One button, or how the simulation stands that runs; as high either way."""
+    """Draw one button, or the running simulation's progress, of the same height."""
     if SIMULATION.is_running(root):
         fraction, text = whole(SIMULATION.child(root), LETTERS)
         row.progress(factor=fraction, text=text)

@@ -35,7 +35,7 @@ REBUILT = updates.Signal()
 
 
 def roots() -> list[Any]:
-    """All units of this file; those of linked libraries are none of them."""
+    """All units of this file, without those of linked libraries."""
     return [o for o in bpy.data.objects if o.mu_unit.uuid and displays.editable(o)]
 
 
@@ -49,12 +49,12 @@ def root_of(obj: Any) -> Any | None:
 
 
 def active_object(context: Any) -> Any | None:
-    """The active object, or None, also where there is no window to ask: while a file loads."""
+    """Active object, or None, also without a window: while a file loads."""
     return getattr(context, "object", None)
 
 
 def active_root(context: Any) -> Any | None:
-    """The unit to work on: that of the active object, or the only one there is if no gripper is active."""
+    """Unit to work on: that of the active object, or the only one if no gripper is active."""
     obj = active_object(context)
     found = root_of(obj)
     if found is None and not _of_gripper(obj):
@@ -64,7 +64,7 @@ def active_root(context: Any) -> Any | None:
 
 
 def _of_gripper(obj: Any | None) -> bool:
-    """Whether an object is a gripper or a part of one."""
+    """Return True if an object is a gripper or a part of one."""
     while obj is not None and not obj.mu_gripper.uuid:
         obj = obj.parent
     return obj is not None
@@ -112,7 +112,7 @@ def make_active(context: Any, obj: Any) -> None:
 
 
 def delete(root: Any) -> None:
-    """Remove a unit with all that shows it; children of the user's own stay."""
+    """Remove a unit with its displays; the user's own children stay."""
     meshes = [root.data, root.mu_unit.preview, root.mu_unit.solid, root.mu_unit.envelope]
     for child in root.children_recursive:
         if child.get(displays.OWNER) == root.mu_unit.uuid:
@@ -124,19 +124,19 @@ def delete(root: Any) -> None:
 
 
 def chosen_window(root: Any, unit: Unit) -> Window | None:
-    """The window of the chosen sensor path; None without one, where it is muted, or unknown to the unit."""
+    """Window of the chosen sensor path; None without one, if it is muted, or unknown to the unit."""
     if "path" in stack.muted(root.mu_unit):
         return None
     return next((w for w in windows(unit.dimensions.count) if w.name == root.mu_unit.path), None)
 
 
 def behind(root: Any) -> bool:
-    """Whether the preview was built from other parameters than the unit now has."""
+    """Return True if the preview was built from other parameters than the unit now has."""
     return bool(root.mu_unit.built != _fingerprint(root))
 
 
 def rebuild(root: Any) -> bool:
-    """Build the preview from the parameters; where they break a rule the last good one stays."""
+    """Build the preview from the parameters; if they break a rule the last valid one stays."""
     props = root.mu_unit
     if root.mode == "EDIT":
         return not props.trouble
@@ -180,7 +180,7 @@ def _draw(root: Any, unit: Unit) -> None:
 
 
 def separate(root: Any) -> None:
-    """Give a unit a preview of its own, which no duplicate shares."""
+    """Give a unit a separate preview, which no duplicate shares."""
     props = root.mu_unit
     if props.preview is None and props.solid != root.data:
         props.preview = root.data
@@ -192,7 +192,7 @@ def separate(root: Any) -> None:
 
 
 def show(root: Any) -> None:
-    """Show preview, solid or result, as the unit's properties say; where that is not there, the preview."""
+    """Show preview, solid or result, as the unit's properties say; if that is missing, the preview."""
     props = root.mu_unit
     if root.mode == "EDIT" or props.preview is None:
         return
@@ -214,12 +214,12 @@ def show(root: Any) -> None:
 
 
 def shows_result(root: Any) -> bool:
-    """Whether the motion of a study is seen in the unit's own place."""
+    """Return True if the motion of a study is seen in the unit's own place."""
     return root.mu_unit.show == RESULT and bool(displays.on_unit(root))
 
 
 def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
-    """Keep the core's printable solid as a mesh of the unit, with its gates and what it was built from."""
+    """Store the core's printable solid as a mesh of the unit, with its gates and its inputs."""
     old = root.mu_unit.solid
     mesh = bpy.data.meshes.new(f"{root.name} solid")
     skeletons.write(mesh, skeletons.Skeleton(solid.vertices, faces=(solid.triangles,)))
@@ -240,7 +240,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
 
 
 def solid_is_current(root: Any) -> bool:
-    """Whether there is a solid, built from the parameters, the path and the body that the unit has now."""
+    """Return True if there is a solid of the unit's present parameters, path and body."""
     mesh = root.mu_unit.solid
     if mesh is None:
         return False
@@ -260,7 +260,7 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
 
 
 def put_envelope(root: Any, body: Body) -> Any:
-    """Keep a body of the user's as the unit's envelope; it is not drawn, since the lattice shows it."""
+    """Store the user's body as the unit's envelope; it is not drawn, since the lattice shows it."""
     mesh = bpy.data.meshes.new(body.name)
     skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
     remove_envelope(root)
@@ -269,12 +269,12 @@ def put_envelope(root: Any, body: Body) -> Any:
 
 
 def remove_envelope(root: Any) -> None:
-    """Take the user's envelope out of the unit."""
+    """Remove the user's envelope from the unit."""
     old, root.mu_unit.envelope = root.mu_unit.envelope, None
     if old is not None and not old.users:
         bpy.data.meshes.remove(old)
 
 
 def mark(root: Any, places: list[Any]) -> None:
-    """Put a red ball at every place (3,) in mm of the unit's frame, in place of those that were there."""
+    """Put a red ball at every position (3,) in mm of the unit's frame, replacing earlier ones."""
     drawing.put_flaws(root, places, 0.08 * to_unit(root.mu_unit).dimensions.cell)

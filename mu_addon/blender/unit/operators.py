@@ -22,7 +22,7 @@ _SCALE = next(d for d in describe(Unit) if d.name == "scale")
 
 
 def _use_millimetres(context) -> None:
-    """Give the scene millimetres; what is ours, the cursor and the views keep their true sizes and places."""
+    """Give the scene millimetres; our objects, cursor and views keep their true sizes and positions."""
     before = scene_units.mm(context.scene)
     scene_units.use_millimetres(context.scene)
     factor = scene_units.mm(context.scene) / before
@@ -112,7 +112,7 @@ class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_fit(UnitOperator, bpy.types.Operator):
-    """Set a parameter to the value nearest to its present one that keeps every design rule"""
+    """Set a parameter to the nearest value that keeps every design rule"""
 
     bl_idname = "mu.fit"
     bl_label = "Use the Value That Fits"
@@ -124,7 +124,7 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """The rule in full, which the head of the panel may have no room for."""
+        """The full rule, for which the head of the panel may have no room."""
         return f"{properties.why}\n\nSet the nearest value that fits" if properties.why else cls.__doc__
 
     @reports_errors
@@ -155,7 +155,7 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """Which parameters become what."""
+        """Parameters and their new values."""
         root = unit_object.active_root(context)
         found = None if root is None else broken(root)
         return "\n".join([cls.__doc__, *_repairs_in_words(root, found)]) if found else cls.__doc__
@@ -214,7 +214,7 @@ class MU_OT_millimetres(bpy.types.Operator):
 
 
 class MU_OT_select(UnitOperator, bpy.types.Operator):
-    """Select the unit itself, alone, where something that shows its results is the active object"""
+    """Select the unit itself, alone, if a display of it is the active object"""
 
     bl_idname = "mu.select"
     bl_label = "Select Unit"

@@ -28,7 +28,7 @@ GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts a
 
 
 class MU_PT_unit(TabPanel, bpy.types.Panel):
-    """The unit that is worked on"""
+    """The active unit"""
 
     bl_idname = "MU_PT_unit"
     bl_label = "Monolithic Unit"
@@ -68,7 +68,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
 
 
 def _tree(layout, root) -> None:
-    """The tree whose values the panel edits, where the unit follows one, and which of them the tree keeps."""
+    """Draw the tree whose values the panel edits, if the unit follows one, and those that the tree sets."""
     node = following.followed(root)
     if node is None:
         return
@@ -78,7 +78,7 @@ def _tree(layout, root) -> None:
 
 
 def _untrue_size(root, scene) -> str:
-    """That a unit is seen in another than its true size, and what helps; else nothing."""
+    """Note that a unit is not seen in its true size, with the remedy; else ""."""
     factor = scene_units.shown_factor(root, scene)
     if abs(factor - 1.0) < 1e-3:
         return ""
@@ -93,9 +93,9 @@ def _untrue_size(root, scene) -> str:
 
 
 def _head(layout, root) -> None:
-    """What the unit comes to or, in red, the rule that it breaks and buttons that mend it.
+    """Draw the unit's figures or, in red, the rule that it breaks with buttons that repair it.
 
-    It is as high either way, but for rows of buttons where more than two rules are broken.
+    Both are of the same height, except when more than two rules are broken.
     """
     lines, wrong = figures.lines(root, CHARACTERS)
     found = broken(root) if wrong else None

@@ -1,4 +1,4 @@
-"""Take a preset, keep one's own, remove it."""
+"""Load a preset, save the user's own, remove it."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 

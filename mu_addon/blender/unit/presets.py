@@ -1,4 +1,4 @@
-"""Presets: units that come with the extension, and the user's own as TOML files in the user's folder."""
+"""Presets: units shipped with the extension, and the user's own as TOML files in the user's folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def names() -> list[str]:
 
 
 def is_named_after_one(name: str) -> bool:
-    """Whether an object has a preset's name, with the number that Blender gives to the second of a name."""
+    """Return True if an object has a preset's name, also with the number of a duplicate name."""
     return re.sub(r"\.\d{3,}$", "", name) in {known.removeprefix(USER) for known in names()}
 
 
@@ -28,7 +28,7 @@ def load(name: str) -> Unit:
 
 
 def save(unit: Unit, title: str) -> str:
-    """Keep a unit as the user's preset and return its name; raises InputError and OutputError."""
+    """Save a unit as the user's preset and return its name; raises InputError and OutputError."""
     title = title.strip()
     if not re.fullmatch(r"[\w][\w .+-]{0,59}", title):
         raise InputError(
@@ -41,7 +41,7 @@ def save(unit: Unit, title: str) -> str:
 
 
 def remove(name: str) -> None:
-    """Delete a preset of the user's; raises InputError for one that comes with the extension."""
+    """Delete a user's preset; raises InputError for one shipped with the extension."""
     if not name.startswith(USER):
         raise InputError(f"{name} comes with the extension", "preset", "only your own presets can be removed")
     try:

@@ -1,6 +1,6 @@
-"""Parameters of the core as Blender properties: one group a section, generated from its descriptions.
+"""Parameters of the core as Blender properties: one group for each section, from its descriptions.
 
-A parameter that the core gains appears here, with its bounds, meaning and source, without a line of code.
+A parameter added to the core appears here, with its bounds, meaning and source, without a line of code.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -28,7 +28,7 @@ from ..shared.updates import Signal
 from .fields import blender_property, exact, generated_fields, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
-"""Sent with the root whose parameters changed, and with one of which other parts are to be seen."""
+"""Sent with the root whose parameters changed, and with the root whose displayed parts changed."""
 BESIDE_BLEND_FILE = {"PATH_SUPPORTS_BLEND_RELATIVE"}
 
 
@@ -56,7 +56,7 @@ _HEAD = {d.name: d for d in describe(Unit)}
 
 
 class MU_PG_study(bpy.types.PropertyGroup):
-    """What the next simulation is asked to do."""
+    """Settings of the next simulation."""
 
     command: EnumProperty(
         name="Job",
@@ -156,7 +156,7 @@ class MU_PG_step(bpy.types.PropertyGroup):
 
 
 def title_property(noun: str):
-    """The name of an object that is a unit or gripper, as the core may have it: one line, 80 characters."""
+    """Name of a unit or gripper object, as the core accepts it: one line, 80 characters."""
 
     def read(group) -> str:
         name = "".join(c if c.isprintable() else " " for c in group.id_data.name)
@@ -236,13 +236,13 @@ def section_of(props, section: str) -> dict:
 
 
 def to_unit(props) -> Unit:
-    """The core's unit that Blender's properties stand for; raises InputError where a rule is broken."""
+    """The core's unit from Blender's properties; raises InputError where a rule is broken."""
     sections = {s.section: s(**section_of(props, s.section)) for s in SECTIONS}
     return Unit(name=props.title, scale=exact(props.scale), **sections)
 
 
 def shape_hash(unit: Unit) -> str:
-    """Hash of a unit but for its name: a new name makes no result old."""
+    """Hash of a unit without its name, so that a new name makes no result stale."""
     return attrs.evolve(unit, name="unit").hash()
 
 

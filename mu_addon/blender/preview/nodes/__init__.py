@@ -16,7 +16,7 @@ GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls
 _ALL = {**GROUPS, unit.NAME: unit}
 
 CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
-"""Identifier of the catalogue that the groups are listed under in the asset browser."""
+"""Identifier of the groups' catalogue in the asset browser."""
 
 
 def group(name: str):
@@ -35,7 +35,7 @@ def group(name: str):
 
 @contextmanager
 def no_assets() -> Iterator[None]:
-    """Take the marks of assets off this file's groups for a while, as to write a file of other assets."""
+    """Clear the asset marks of this file's groups temporarily, to write a file of other assets."""
     marked = [g for g in map(bpy.data.node_groups.get, GROUPS) if g is not None and g.asset_data is not None]
     kept = [(tree, tree.asset_data.description, tree.asset_data.catalog_id) for tree in marked]
     for tree in marked:
@@ -49,7 +49,7 @@ def no_assets() -> Iterator[None]:
 
 
 def _build(tree, module: ModuleType) -> None:
-    """Build a group anew; modifiers that use it keep what was set on them, by the name of the input."""
+    """Build a group anew; modifiers that use it keep their values, by the name of the input."""
     users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
     kept = [modifier_inputs(modifier) for modifier in users]
     tree.nodes.clear()
@@ -65,7 +65,7 @@ def _build(tree, module: ModuleType) -> None:
 
 
 def skin(obj, name: str):
-    """The modifier with that group on an object, added where it is missing."""
+    """Modifier with that group on an object, added if it is missing."""
     tree = group(name)
     for modifier in obj.modifiers:
         if modifier.type == "NODES" and modifier.node_group == tree:

@@ -1,4 +1,4 @@
-"""Tubes along edges and curves, their radius from an attribute: struts, paths, curves of a user's."""
+"""Tubes along edges and curves, their radius from an attribute: struts, paths, users' curves."""
 
 from __future__ import annotations
 

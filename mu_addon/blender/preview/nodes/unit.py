@@ -1,7 +1,7 @@
-"""A unit's one mesh, skinned: struts as tubes, anchors as balls, everything else as it is.
+"""A unit's one mesh, skinned: struts as tubes, anchors as balls, everything else unchanged.
 
-Or in its place, on the unit itself, the objects that play a study's motion: so a click on what is shown
-selects the unit, and what moves the unit moves it.
+Or, on the unit itself, the objects that play a study's motion in its place, so that a click on them selects
+the unit, and moving the unit moves them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ VERSION = 2
 TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
 USES = (tubes.NAME, balls.NAME)
 RESULTS = ("Result 1", "Result 2")
-"""Inputs for the objects to show in place of the mesh, where any is given."""
+"""Inputs for the objects shown in place of the mesh, if any is given."""
 SHOW_RESULT = "Show Result"
 PLAIN, TUBE, BALL = 0, 1, 2
 """Values of the point attribute `mu_skin`."""

@@ -17,7 +17,7 @@ TEXT = (
 def build(tree) -> None:
     """A square swept along the curve; boxes at every pitch, cut out of it or shown in it.
 
-    The wells turn with the curve's normal; their number follows its length.
+    The wells rotate with the curve's normal; their number follows its length.
     """
     w = Wiring(tree)
     w.socket("Geometry", "Geometry")

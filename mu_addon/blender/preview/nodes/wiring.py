@@ -1,4 +1,4 @@
-"""Few words to write a node group in: sockets, nodes side by side, links."""
+"""A short notation for node groups: sockets, nodes side by side, links."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 class Wiring:
-    """Builds one group: `socket` and `output` for its interface, `node` for what is between."""
+    """Builds one group: `socket` and `output` for its interface, `node` for the nodes between."""
 
     def __init__(self, tree: Any) -> None:
         self.tree = tree
