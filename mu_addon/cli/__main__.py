@@ -1,4 +1,4 @@
-"""A run as another's child, which ends with its parent: `python -m mu_addon.cli resume FOLDER --json`."""
+"""Entry point of a child run, which ends with its parent: `python -m mu_addon.cli resume FOLDER --json`."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ complete -o bashdefault -o default -F _mu_addon run.py python python3
 
 
 def script(parser: argparse.ArgumentParser) -> str:
-    """The script for bash; files complete wherever it knows nothing better."""
+    """The script for bash; it completes file names wherever no choices are known."""
     from ..design.gripper import gripper_names
     from ..design.parameters import preset_names
 
@@ -79,6 +79,6 @@ class Complete(argparse.Action):
         values: object,
         option_string: str | None = None,
     ) -> None:
-        """Print it."""
+        """Print the script."""
         sys.stdout.write(script(parser))
         parser.exit(0)

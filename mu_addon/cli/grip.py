@@ -58,7 +58,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Design the gripper and let it grasp."""
+    """Design the gripper and simulate its grasp."""
     from ..design.gripper import load_gripper, read_gripper
     from ..usecases.grip.grasp import Cube
     from ..usecases.grip.job import Job, detailed

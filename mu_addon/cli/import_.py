@@ -48,7 +48,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Import the files; in a terminal, ask what they leave open."""
+    """Import the files; in a terminal, ask the open questions."""
     from ..errors import InputError
     from ..usecases.import_data.run import import_files
 
@@ -72,14 +72,14 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 
 def _show(lines: list[str]) -> None:
-    """Lines to the terminal, before what is asked."""
+    """Print lines to the terminal, before the questions."""
     from ..run.progress import printable
 
     sys.stderr.write(printable("\n".join(lines), sys.stderr) + "\n")
 
 
 def _asked_in_terminal(proposal: Proposal, question: Question) -> str:
-    """The answer that is typed; an empty line takes the proposed one."""
+    """Read the answer to a question; an empty line takes the proposed one."""
     proposed = f" [{question.proposed}]" if question.proposed else ""
     while True:
         sys.stderr.write(f"{proposal.name}: {question.text}{proposed} ")

@@ -40,7 +40,7 @@ class _Commands(argparse._SubParsersAction):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, what may have been meant, and where help is."""
+    """Reports an error in one line, with the closest valid word, and where help is."""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
@@ -81,9 +81,9 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _require_usable(options: argparse.Namespace) -> None:
-    """Raise InputError for what no option can mean: nan, and names that are empty or no text.
+    """Raise InputError for values that no option can have: nan, and names that are empty or no text.
 
-    An empty --out has words of its own.
+    An empty --out has a separate message.
     """
     from ..errors import InputError
 
@@ -110,7 +110,7 @@ def _short_report(folder: Path, why: str) -> None:
 
 
 def sink_of(options: argparse.Namespace) -> Sink:
-    """Where messages go by --json and --quiet: a terminal's lines, or JSON; all, or how the run ended."""
+    """Sink of messages by --json and --quiet: lines on a terminal, or JSON; all, or only the outcome."""
     from ..run.progress import json_lines, outcome, terminal
 
     sink = json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr)

@@ -1,4 +1,4 @@
-"""`optimize`: targets and freedoms in, units that meet them out."""
+"""`optimize`: units that meet targets within given freedoms."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Search, check what is found, and report."""
+    """Search, check the proposals, and report."""
     from ..usecases.optimize.job import job_from
     from ..usecases.optimize.run import USE_CASE
 

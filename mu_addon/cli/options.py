@@ -42,7 +42,7 @@ def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str |
 
 
 def help_of(d: Description, default: str = "") -> str:
-    """Help of a setting's option; default: in words, where it is not the setting's own."""
+    """Help of a setting's option; default: in words, if different from the setting's own."""
     own = {True: "yes", False: "no"}.get(d.default, d.default) if d.type is bool else d.default
     text, _, empty = d.text.partition("; empty: ")
     shown = default or empty or f"{f'{own:g}' if d.type is float else own} {d.unit}".rstrip()
@@ -70,7 +70,7 @@ def add_report(command: argparse.ArgumentParser) -> None:
 
 
 def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
-    """--preset or --unit, and where the results go."""
+    """--preset or --unit, and --out."""
     which = command.add_mutually_exclusive_group(required=required)
     which.add_argument("--preset", metavar="NAME", help="Unit preset: mu-0.75x, mu-1.0x or mu-1.5x.")
     which.add_argument("--unit", metavar="FILE", help="Unit parameters, a TOML file.")
@@ -87,7 +87,7 @@ def add_scheduler(command: argparse.ArgumentParser) -> None:
 
 
 def add_model(command: argparse.ArgumentParser) -> None:
-    """--model, what a diagnosis found."""
+    """--model, the result of a diagnosis."""
     command.add_argument(
         "--model",
         metavar="FILE",
@@ -107,7 +107,7 @@ def add_orientation(command: argparse.ArgumentParser) -> None:
 
 
 def add_resin(command: argparse.ArgumentParser) -> None:
-    """--resin, what the wall is made of."""
+    """--resin, the material of the wall."""
     command.add_argument(
         "--resin",
         dest="wall_resin",
@@ -137,7 +137,7 @@ def add_solver(command: argparse.ArgumentParser) -> None:
 
 
 def solver_of(options: argparse.Namespace) -> SolverChoice:
-    """The choice of --solver and --device; raises InputError, also for a device that is not there."""
+    """The choice of --solver and --device; raises InputError, also for a missing device."""
     from ..fem.solver import SolverChoice
 
     found = SolverChoice(options.solver, options.device)
@@ -159,7 +159,7 @@ def add_solid(command: argparse.ArgumentParser) -> None:
 
 
 def add_body(command: argparse.ArgumentParser) -> None:
-    """A body of the user's own around the chambers."""
+    """The user's own body around the chambers."""
     command.add_argument(
         "--body",
         metavar="FILE",
@@ -191,14 +191,14 @@ def add_obstacles(command: argparse.ArgumentParser) -> None:
 
 
 class _Obstacle(argparse.Action):
-    """Adds a file of an obstacle, its friction still unsaid."""
+    """Adds an obstacle's file, without its friction yet."""
 
     def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
         namespace.obstacles = [*namespace.obstacles, (value, None)]
 
 
 class _Friction(argparse.Action):
-    """Says the friction of the obstacle before it."""
+    """Sets the friction of the obstacle before it."""
 
     def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
         if not namespace.obstacles or namespace.obstacles[-1][1] is not None:
@@ -234,7 +234,7 @@ def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
 
 
 def fidelity_of(options: argparse.Namespace) -> str:
-    """The fidelity that a study's options ask for, by `--fidelity` or by what only one of them has."""
+    """The fidelity by a study's options: by `--fidelity` or by options that only one of them has."""
     from ..meshing.settings import HOMOGENISED, RESOLVED
 
     if options.fidelity is not None:
@@ -296,9 +296,9 @@ def unit_if_named(options: argparse.Namespace) -> Unit | None:
 
 
 def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, NamedEffects]:
-    """The unit with what the extended model of --model adds to it, and effects beyond a unit's parameters.
+    """The unit with the extended model of --model applied, and its effects beyond a unit's parameters.
 
-    What no simulation of a unit can take is warned of.
+    Warns of effects that no simulation of a unit supports.
     """
     import attrs
 
@@ -320,7 +320,7 @@ def modelled(options: argparse.Namespace, context: RunContext) -> tuple[Unit, Na
 
 
 def modelled_unit(options: argparse.Namespace, context: RunContext) -> Unit:
-    """The unit, with what the model of --model adds to its parameters; what else that has is warned of."""
+    """The unit with the parameters of --model applied; warns of its other effects."""
     unit = unit_of(options)
     if options.model is None:
         return unit

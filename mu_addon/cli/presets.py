@@ -1,4 +1,4 @@
-"""`presets`: the units and grippers that come with the package."""
+"""`presets`: the units and grippers shipped with the package."""
 
 from __future__ import annotations
 

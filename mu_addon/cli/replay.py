@@ -1,4 +1,4 @@
-"""`replay`: a recording as if it came from the sensor."""
+"""`replay`: a recording played as if by the sensor."""
 
 from __future__ import annotations
 

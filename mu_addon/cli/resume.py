@@ -32,7 +32,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Run what the folder's inputs say; what is finished is taken from the cache."""
+    """Run a folder's inputs, taking finished stages from the cache."""
     from ..fem.solver import SolverChoice
     from ..usecases.resume import resume
     from .options import solver_of

@@ -1,4 +1,4 @@
-"""`stream`: the real sensor, recorded and shown as it comes."""
+"""`stream`: the real sensor, recorded and shown live."""
 
 from __future__ import annotations
 

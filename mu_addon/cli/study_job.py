@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Run the stages that `options.stages` names, and report what they found."""
+    """Run the stages named by `options.stages`, and report their results."""
     from ..usecases.simulate_and_place.run import USE_CASE
 
     USE_CASE.start(job_of(options, context), Path(options.out), context)
 
 
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
-    """The study that the options ask for; raises InputError."""
+    """Study job from the options; raises InputError."""
     from ..homogenize.effective import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits

@@ -49,7 +49,7 @@ def add(commands: Commands[Any]) -> None:
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
-    """Follow the markers and put the experiment into the folder."""
+    """Track the markers and put the experiment into the folder."""
     import attrs
 
     from ..usecases.track_video.run import read_bench, track_into
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 
 def _tracker() -> Tracker:
-    """Blender's tracker, where there is a Blender."""
+    """Blender's tracker, if there is a Blender."""
 
     def follow(clip: Path, markers: Any) -> Any:
         from ..errors import InputError

@@ -1,4 +1,4 @@
-"""A command in a process that is watched, and what is said where that process crashes."""
+"""Commands in a watched process, and the message when that process crashes."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..errors import MuError
 from ..run.supervisor import CRASHED, Crash, supervised
 
 _UNWATCHED = ("presets", "ports", "stream", "record", "replay")
-"""Commands that solve nothing: what a recording has been sent is on disk before anything else is done."""
+"""Commands without a solver: a recording writes its data to disk before anything else."""
 _LIMITS = (("RLIMIT_AS", "addresses"), ("RLIMIT_DATA", "memory"))
 
 
 class _Crashed(MuError):
-    """The end of a process that could not say it itself."""
+    """End of a process that could not report it itself."""
 
     status = CRASHED
 
 
 def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: bool = False) -> int:
-    """Exit status of `work`, which runs that command line: in a process of its own where that may crash.
+    """Run `work` of a command line, in a separate process if it may crash; return its exit status.
 
     ends_with_input: end it once standard input ends, see `run.processes.end_with_input`.
     """
@@ -40,7 +40,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 
 
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
-    """Say how the process of a command line ended, where it stood and what to do, in its folder as well."""
+    """Report how the process of a command line ended, its stage and what to do, also in its folder."""
     # Only now: as long as all goes well, this process needs none of it.
     from ..run.context import asked_to_stop, has_ended, last_stage, record_crash
     from ..run.progress import Progress
@@ -99,7 +99,7 @@ def _how(crash: Crash) -> str:
 
 
 def _limit() -> str:
-    """The limits that the system sets to this process's memory, in words."""
+    """Limits by the system on this process's memory, in words."""
     try:
         import resource
     except ImportError:

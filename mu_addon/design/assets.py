@@ -58,5 +58,5 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
 
 
 def _kind(path: Path) -> str:
-    """The `kind = ...` of a TOML file; empty without one."""
+    """The value of `kind = ...` in a TOML file; empty without one."""
     return str(parse_toml(file_text(path), str(path)).get("kind", ""))

@@ -14,7 +14,7 @@ from .threemf import Beams, Part
 from .waveguide import Bar, strut_radii
 
 PIECES = 8
-"""Frusta a strut is cut into: between them its sin^2 swell is straight, 0.6 % of its volume less."""
+"""Number of frusta in a strut: between them its sin^2 swell is straight, which loses 0.6 % of its volume."""
 
 
 def lattice_beams(d: Dimensions, bar: Bar | None = None, pieces: int = PIECES) -> Beams:

@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from .parameters import Unit
 
 MOST_TRIANGLES = 60_000
-"""A finer body would take minutes to examine and to mesh, and say no more: the mesh is coarser by far."""
+"""Limit on a body's triangles: a finer body would take minutes to examine, and the mesh is coarser by far."""
 MOST_BYTES = 1 << 25
-"""Of a body's file: twice what so many triangles take as text. What is read of it takes 1.3 GB at most."""
+"""Limit on a body's file: twice that many triangles as text. Reading it takes 1.3 GB at most."""
 MOST_MM = 1_000_000.0
-"""Of a coordinate: what lies farther away has other units, or is damaged."""
+"""Limit on a coordinate: anything farther away has other units, or is damaged."""
 QUANTUM_MM = 1e-5
 """Vertices closer than that are one: files repeat them for every triangle."""
 AROUND = 96
-"""Flat pieces around the actuator where it is asked whether a body holds it."""
+"""Number of flat pieces around the actuator in the test of whether a body contains it."""
 SLACK_MM = 1e-3
-"""A body may miss an end plane by so much."""
+"""Distance by which a body may miss an end plane."""
 _UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
 
 
@@ -239,7 +239,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
 
 
 def _spans(bounds: NDArray[np.float64], d: Dimensions) -> bool:
-    """Whether a box (2, 3) in mm reaches past both end planes of a unit and around its chambers."""
+    """Return True if a box (2, 3) in mm reaches past both end planes of a unit and around its chambers."""
     low, high = bounds
     aside = (low[:2] <= -d.R).all() and (high[:2] >= d.R).all()
     return bool(aside and low[2] <= SLACK_MM and high[2] >= d.height - SLACK_MM)
@@ -286,7 +286,7 @@ def section(body: Body) -> list[NDArray[np.float64]]:
 def require_sound(body: Body, found: list[Flaw], role: str = "an envelope") -> None:
     """Raise InputError for the first of these flaws and its first place; do nothing for an empty list.
 
-    role: what the body was meant to be, for the message.
+    role: the body's intended use, for the message.
     """
     if found:
         flaw = found[0]

@@ -17,7 +17,7 @@ from .steps import Struts
 class Figures:
     """Size (x, y, z) in mm with the inlet, volume in mm3, mass in g, and time in s to print, upright.
 
-    approximate: whether the volume is `estimated_volume` and not that of the printable solid.
+    approximate: True if the volume is `estimated_volume` and not that of the printable solid.
     """
 
     size_mm: tuple[float, float, float]

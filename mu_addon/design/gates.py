@@ -14,7 +14,7 @@ CAVITY_TOLERANCE = 0.01
 """Relative difference allowed between the cavity found in the solid and its analytic volume."""
 
 STRAYED_MM3 = 1e-6
-"""Volume that the waveguide's cuts may take from anything else: what roundoff may make of nothing."""
+"""Volume that the waveguide's cuts may take from anything else: an allowance for roundoff."""
 
 
 class GateError(MuError):

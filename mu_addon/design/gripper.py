@@ -134,7 +134,7 @@ class Gripper:
 
     @property
     def placements(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """For each finger the rotation (3, 3) and then the shift (3,) in mm that move a unit to its place."""
+        """Rotation (3, 3) and then shift (3,) in mm of each finger that move a unit to its place."""
         shift = np.array([0.0, self.axis_mm, 0.0])
         return (np.eye(3), -shift), (np.diag([-1.0, -1.0, 1.0]), shift)
 
@@ -251,7 +251,7 @@ def _plate(gripper: Gripper, n: int) -> Any:
 
 
 def _require_open_seats(gripper: Gripper, bar: Bar) -> None:
-    """Raise InputError where the plate is in the way of a part into its seat."""
+    """Raise InputError where the plate blocks the way of a part into its seat."""
     more = gripper.unit.dimensions.part_height + ROOM
     for seat in bar.seats:
         if seat.pocket.longer(0, more).corners[:, 2].min() < ROOT:

@@ -133,7 +133,7 @@ def graph_of(d: Dimensions) -> Graph:
 
 @lru_cache(maxsize=8)
 def _graph(kind: LatticeKind, half_x: int, y_minus: int, y_plus: int, count: int, cell: float) -> Graph:
-    """The rules of each unit near to another ask for the same graph."""
+    """Return the graph, cached, since the rules of similar units ask for the same."""
     i, j, k = np.arange(-half_x, half_x + 1), np.arange(-y_minus, y_plus + 1), np.arange(count)
     whole, half = kind.divisions, kind.divisions // 2
     found = joined(kind, grid_points(whole * i - half, whole * j - half, whole * k), cell)

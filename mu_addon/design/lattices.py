@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 RadiusLaw = Callable[[Array, float, float], Array]
 
 _FINEST = 64
-"""Largest denominator of a node's coordinates: nodes that cells share are then found exactly."""
+"""Largest denominator of a node's coordinates, so that shared nodes are found exactly."""
 
 
 def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Array:

@@ -1,4 +1,4 @@
-"""The value nearest to a parameter's present one that keeps every rule, and parameters that rules tie."""
+"""The valid value nearest to a parameter's present one, and parameters tied by rules."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .quantity import describe
 from .rules import RuleError
 
 STEPS = 240
-"""Places between a parameter's bounds at which a value that fits is looked for."""
+"""Number of values between a parameter's bounds that are tried."""
 MOST_REPAIRS = 12
 DIGITS = 3
-"""Decimals of the value that is found: whole micrometres."""
+"""Decimals of the value found: whole micrometres."""
 
 
 def tied(given: dict[str, Any]) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def tied(given: dict[str, Any]) -> dict[str, Any]:
 
 @attrs.frozen
 class Repair:
-    """A broken rule, and the value of a parameter that mends it; None where that is for a person to find."""
+    """A broken rule, and the value of a parameter that repairs it; None where a person must decide."""
 
     error: InputError
     section: str = ""
@@ -45,10 +45,9 @@ class Repair:
 
 
 def repairs(sections: Mapping[str, Any], scale: float) -> list[Repair]:
-    """Every rule that a unit's sections break together, in order, each with a value that mends it.
+    """Every broken rule of a unit's sections, in order, each with a value that repairs it.
 
-    Each value is the nearest one in round numbers with those before it set; the list ends at the first rule
-    for which there is none.
+    Each value is the nearest round one with those before it set; the list ends at the first rule without one.
     """
     found: list[Repair] = []
     now = dict(sections)
@@ -94,7 +93,7 @@ def _later(left: RuleError, error: RuleError) -> bool:
 
 
 def _rounded(value: float, present: float, fits: Callable[[float], bool]) -> float:
-    """A value that fits, up to a twentieth further from the present one, in as few decimals as can be."""
+    """A valid value, up to a twentieth further from the present one, in as few decimals as possible."""
     for digits in range(DIGITS):
         step = 10.0**-digits
         away = math.ceil(value / step - 1e-9) if value > present else math.floor(value / step + 1e-9)
@@ -115,10 +114,10 @@ def nearest_fit(
     name: str,
     enough: Callable[[Mapping[str, Any]], bool] | None = None,
 ) -> float | int | None:
-    """The value of `section.name` nearest to its present one that makes a unit; None where none does.
+    """Valid value of `section.name` nearest to its present one; None where none makes a unit.
 
     sections: the unit's sections by name, which break a rule together; scale: the unit's. All other
-    parameters stay as they are. enough: whether sections are good enough, in place of making a unit.
+    parameters stay. enough: test of the sections in place of making a unit.
     """
     present = getattr(sections[section], name)
     every: tuple[Any, ...] = SECTIONS
@@ -144,7 +143,7 @@ def nearest_fit(
 
 
 def _toward(bound: float, present: float, fits: Callable[[float], bool]) -> float | None:
-    """The value nearest to `present` on the way to a bound that fits, in whole micrometres."""
+    """Valid value nearest to `present` on the way to a valid bound, in whole micrometres."""
     # Ever further apart: the first that fits is near, if any is.
     way = (bound - present) * np.linspace(0.0, 1.0, STEPS + 1) ** 2
     bad = present

@@ -274,7 +274,7 @@ class Waveguide:
 
 @attrs.frozen
 class Printing:
-    """Section [print]: how the printed part differs from the nominal one; in mm, the same at every scale."""
+    """Section [print]: difference of the printed part from the nominal one; in mm, equal at every scale."""
 
     section: ClassVar[str] = "print"
 
@@ -391,9 +391,9 @@ def _printable(unit: Any, field: Any, value: Any) -> None:
 class Unit:
     """All parameters of one Monolithic Unit, at scale 1; `dimensions` are the lengths at its scale.
 
-    Each section is an attrs class whose fields carry unit, bounds, meaning and source
-    (`quantity.describe`). A value out of bounds, or one that breaks a co-design rule (`rules`), raises
-    InputError with what would fit. Units are immutable: `evolve` makes another.
+    Each section is an attrs class whose fields carry unit, bounds, meaning and source (`quantity.describe`).
+    A value out of bounds, or one that breaks a co-design rule (`rules`), raises InputError with a valid
+    value. Units are immutable: `evolve` makes another.
 
     >>> thicker = Unit(scale=0.75).evolve(wall_mm=1.2, midspan_diameter_mm=2.0)
     >>> round(thicker.dimensions.wall, 3)

@@ -1,8 +1,8 @@
-"""A unit as it is printed: nominal dimensions with every surface moved outward by the printer's offsets.
+"""A unit as printed: nominal dimensions with every surface moved outward by the printer's offsets.
 
-What does not grow: pitch, envelope, end planes and anchors, which lattice cells and build plate hold, and
-the virtual inclusion, which is a choice of the model. A surface facing n moves by |D n| with
-D = diag(offset_xy, offset_xy, offset_z), see `shapes.offset_along`.
+Unchanged are pitch, envelope, end planes and anchors, which lattice cells and build plate hold, and the
+virtual inclusion, which is a choice of the model. A surface facing n moves by |D n| with D = diag(offset_xy,
+offset_xy, offset_z), see `shapes.offset_along`.
 """
 
 from __future__ import annotations

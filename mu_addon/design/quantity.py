@@ -1,4 +1,4 @@
-"""Parameters that carry their unit, bounds, meaning and source, for panels, files and reports alike."""
+"""Parameters with their unit, bounds, meaning and source, for panels, files and reports."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def in_kPa(value_MPa: Number) -> Number:
 class Description(NamedTuple):
     """Description of one parameter: type, default, unit, closed bounds in that unit, meaning and source.
 
-    fixed: whether it is a length that is the same at every scale. A choice among names has `choices` and no
-    bounds, a text (of type str) neither.
+    fixed: it is a length that is the same at every scale. A choice among names has `choices` and no bounds, a
+    text (of type str) neither.
     """
 
     name: str
@@ -107,7 +107,7 @@ def described(
     high: float = math.nan,
     choices: tuple[str, ...] = (),
 ) -> Description:
-    """A setting of a job, stated once: its field, option, property and node's setting are made from this."""
+    """A setting of a job, stated once: its field, option, property and node setting are made from this."""
     return Description(name, type(default), default, unit, low, high, text, "", False, choices)
 
 
@@ -153,10 +153,10 @@ def choice(default: str, names: Callable[[], Sequence[str]], text: str, source: 
 
 
 def text_quantity(default: str, canonical: Callable[[str], str], text: str, source: str) -> Any:
-    """attrs field of a parameter that is a text of a form of its own, such as a list of entries.
+    """attrs field of a parameter that is a text in a given form, such as a list of entries.
 
-    canonical: the one text of all that mean the same; raises InputError for what means nothing. Setting
-    anything but a text raises InputError.
+    canonical: one text for all with the same meaning; raises InputError for an invalid one. Setting anything
+    but a text raises InputError.
     """
     metadata = {
         "type": str,
@@ -204,7 +204,7 @@ def where(instance: Any, name: str) -> str:
 
 
 def _real(value: Any) -> Any:
-    """Accept 12 and numpy's numbers as floats; anything else is left for the validator to refuse."""
+    """Convert 12 and numpy's numbers to floats; anything else is left for the validator to refuse."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return value
     try:

@@ -1,4 +1,4 @@
-"""The co-design rules of a Monolithic Unit; a broken one is reported by name with a value that fits."""
+"""Co-design rules of a Monolithic Unit; a broken one is reported by name with a valid value."""
 
 from __future__ import annotations
 

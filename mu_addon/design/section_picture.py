@@ -1,4 +1,4 @@
-"""A small picture of a unit's half section, by numpy alone: Blender's window waits for it."""
+"""A small picture of a unit's half section, by numpy alone, since it blocks Blender's window."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
 
 
 def _within(polygon: Array, r: Array, z: Array) -> Array:
-    """Mask of the points in a closed polygon (n, 2), by how often a line along r crosses it."""
+    """Mask of the points in a closed polygon (n, 2), by the crossings of a line along r."""
     inside = np.zeros(r.shape, bool)
     for (r0, z0), (r1, z1) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         if z0 != z1:

@@ -1,4 +1,4 @@
-"""Settings that many jobs share, stated once: facets of a solid, friction, the resin where none is named."""
+"""Settings shared by many jobs: facets of a solid, friction, the default resin."""
 
 from __future__ import annotations
 

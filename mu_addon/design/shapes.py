@@ -1,4 +1,4 @@
-"""Elementary solids for manifold3d, with facets enlarged to the area or volume of what they stand for."""
+"""Elementary solids for manifold3d, with facets enlarged to the area or volume of the exact shape."""
 
 from __future__ import annotations
 

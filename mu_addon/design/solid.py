@@ -22,7 +22,7 @@ from .surface import Triangles, Vertices, bad_edges, weld
 from .waveguide import Bar, strut_radii, waveguide
 
 QUANTA = (1e-4, 2e-5, 5e-4)
-"""Steps in mm that vertices are rounded to; the first that leaves every edge to two triangles is kept."""
+"""Steps in mm that vertices are rounded to; the first that leaves two triangles at every edge is kept."""
 
 
 @attrs.frozen
@@ -42,8 +42,9 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 class Solid:
     """A printable surface: vertices (n, 3) in mm, triangles (m, 3) facing outward, and the gates it passed.
 
-    window: that of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off: by
-    how much in mm, in the plane and along z, every surface was drawn inward to compensate the print offset.
+    window: that of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off:
+    length in mm, in the plane and along z, by which every surface was drawn inward to compensate the print
+    offset.
     """
 
     vertices: Vertices
@@ -73,14 +74,13 @@ def build_solid(
 ) -> Solid:
     """The printable solid of a unit: actuator, lattice, inlet and, if a path is given, the waveguide.
 
-    path: a `Window` of anchors, or lattice nodes (n, 3) in mm. quality: "interactive" or "export", the
-    number of facets. body: a closed surface that the lattice is cut to in place of its box; ends of struts
-    that nothing holds any more are left out. take_off: how far in mm, in the plane and along z, the printer
-    moves every surface outward: the drawing is made smaller by that (Minkowski), so that the print has the
-    nominal size.
+    path: a `Window` of anchors, or lattice nodes (n, 3) in mm. quality: "interactive" or "export", the number
+    of facets. body: a closed surface that the lattice is cut to in place of its box; loose ends of struts are
+    left out. take_off: print offset in mm, in the plane and along z: the drawing is made smaller by it
+    (Minkowski), so that the print has the nominal size.
 
-    Takes some seconds. Raises GateError where a check of the solid fails (genus, components,
-    watertightness), and InputError for a path or an offset that does not fit.
+    Takes some seconds. Raises GateError where a check of the solid fails (genus, components, watertightness),
+    and InputError for a path or an offset that does not fit.
     """
     from manifold3d import Manifold, OpType
 
@@ -268,7 +268,7 @@ def _graded_solid(
     offset: NDArray[np.float64] | None,
     without: NDArray[np.bool_] | None,
 ) -> Any:
-    """`lattice_solid` of struts that differ: a half, strut by strut, and its mirror image across x = 0."""
+    """`lattice_solid` of graded struts: a half, strut by strut, and its mirror image across x = 0."""
     from manifold3d import Manifold, OpType
 
     nodes, t = lattice.nodes, np.linspace(0.0, 1.0, facets.along_strut + 1)

@@ -35,13 +35,13 @@ from .waveguide import Bar, waveguide
 Array = NDArray[np.float64]
 
 ALONG = 4
-"""Flat pieces along a quarter of a chamber in the polygons of `profile` and `chambers`."""
+"""Number of flat pieces along a quarter of a chamber in the polygons of `profile` and `chambers`."""
 FINE = np.linspace(0.0, 1.0, 33)
-"""Places along a strut where `trim` asks whether it is still outside the actuator."""
+"""Number of positions along a strut at which `trim` tests whether it is still outside the actuator."""
 CLEARANCE = 0.018
-"""Distance, in cells, that `trim` keeps between a strut's axis and the actuator: none shows inside then."""
+"""Distance, in cells, that `trim` keeps between a strut's axis and the actuator: none shows inside."""
 KEPT = 12
-"""Values of a step that are kept: enough for an undo, a slider that goes back, and a few units."""
+"""Number of cached values of a step: enough for an undo, a slider that goes back, and a few units."""
 
 
 @attrs.frozen
@@ -84,7 +84,7 @@ class Section:
 class TrimmedStruts:
     """Visible struts: ends (e, 2, 3) in mm of each whole strut, and fractions (e,) of its visible part.
 
-    rows (e,): their numbers among the graph's; is_graded: whether their diameters follow the unit's grading.
+    rows (e,): their numbers among the graph's; is_graded: their diameters follow the unit's grading.
     """
 
     graph: Graph
@@ -113,12 +113,12 @@ class Path:
 
 @attrs.frozen
 class Step:
-    """One step: what it is made from, which parameters are its own, and what muting it does.
+    """One step: its inputs, its own parameters, and its value when muted.
 
-    gives: what its value is: profile, surface, lattice, points, path or solid; after: steps before it, whose
-    values `make` is given in this order; own and reads: parameters of the unit as `section.name`; chosen:
-    fields of StepInputs it depends on besides; muting: what muting does, in words, or nothing where it cannot
-    be; mute: its value then, from the same arguments as `make`.
+    gives: kind of its value: profile, surface, lattice, points, path or solid; after: steps before it, whose
+    values `make` gets in this order; own and reads: parameters of the unit as `section.name`; chosen: fields
+    of StepInputs it also depends on; muting: effect of muting, in words, or "" if it cannot be muted; mute:
+    its value then, from the same arguments as `make`.
     """
 
     name: str
@@ -135,7 +135,7 @@ class Step:
 
 @attrs.define
 class Stack:
-    """Cached values of the steps, at most KEPT for each, under a hash of all that they depend on.
+    """Cached values of the steps, at most KEPT for each, under a hash of their inputs.
 
     counts: how often each step was evaluated; a value found in the cache is not counted.
     """
@@ -181,7 +181,7 @@ class Stack:
 
 
 def keys(given: StepInputs) -> dict[str, str]:
-    """For each step the SHA-256, in hexadecimal, of everything that its value depends on."""
+    """SHA-256, in hexadecimal, of all inputs of each step's value."""
     found: dict[str, str] = {}
     for step in STEPS.values():
         content = [
@@ -359,7 +359,7 @@ _ROW = ("waveguide.row",)
 
 
 def _rest(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
-    """The section's parameters that no other step owns: a new one gets its step by itself."""
+    """The section's parameters that no other step owns, so that a new one has a step automatically."""
     owned = {*_PROFILE, *_CHAMBERS, *_STRUTS, *_WELLS, *_ROW}
     return tuple(p for p in _all_of(section) if p not in owned)
 

@@ -1,4 +1,4 @@
-"""One cell of the lattice as it is printed: an eighth of its struts, the blocks it builds, its density."""
+"""One printed cell of the lattice: an eighth of its struts, blocks made of it, its density."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def depth_below_surface(cell: StrutCell, points: ArrayLike) -> Array:
     """Depths (n,) in mm of points (n, 3) in mm below the printed surface of the periodic lattice; 0 outside.
 
     The largest of the depths within each strut alone: the distance to its surface, square to its axis, with
-    the radius of that place. So it is exact in straight struts and a lower bound at junctions, where struts
+    the radius of that place. It is exact in straight struts and a lower bound at junctions, where struts
     merge; the taper's slope (below 0.1) and the facets are left out.
     """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
@@ -255,7 +255,7 @@ def _shape(cell: StrutCell) -> _Shape:
 
 
 def _struts(cell: StrutCell) -> Array:
-    """Both ends (e, 2, 3), in cells, of the endless lattice's struts that come near the octant."""
+    """Both ends (e, 2, 3), in cells, of the infinite lattice's struts near the octant."""
     shape = _shape(cell)
     widest = float(cell.radius(np.linspace(0.0, 1.0, 33)).max()) / cell.size_mm
     return _near(shape, widest + max(0.0, shape.offset_xy, shape.offset_z))

@@ -1,4 +1,4 @@
-"""Closed triangle surfaces as arrays: welding, measures, and the binary STL they become."""
+"""Closed triangle surfaces as arrays: welding, measures, and binary STL."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _cancelled(faces: Triangles) -> Triangles:
 
 
 def _unique_rows(rows: NDArray[_Number]) -> tuple[NDArray[_Number], NDArray[np.int64]]:
-    """Distinct rows in lexicographic order and each row's place among them: np.unique(axis=0), but fast."""
+    """Distinct rows in lexicographic order and each row's index among them: a fast np.unique(axis=0)."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     new = np.ones(len(rows), bool)

@@ -39,7 +39,7 @@ def read_surface(content: bytes, name: str, most_triangles: int | None = None) -
 
 
 def _text(content: bytes) -> str:
-    """Text of any line ends, with what is no ASCII, in names, left as it is."""
+    """Text with any line ends; bytes that are not ASCII, in names, stay as they are."""
     return content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
 
 

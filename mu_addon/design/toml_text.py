@@ -41,7 +41,7 @@ def compose(
 ) -> str:
     """TOML text of top-level values and of tables of described values, by name of the table.
 
-    comments: whether meaning, unit and source are written above each value.
+    comments: write meaning, unit and source above each value.
     """
     return toml_text(
         {

@@ -59,7 +59,7 @@ def text_of(factors: Mapping[int, float]) -> str:
 
 
 def canonical_text(text: str) -> str:
-    """The one text of all that mean the same; raises InputError."""
+    """Canonical text of all with the same meaning; raises InputError."""
     return text_of(parsed(text))
 
 

@@ -34,7 +34,7 @@ STRUT_GAP = 0.1
 """Least distance in mm between a well or a seat's pocket and a strut's surface."""
 
 ROOM = 1.0
-"""Length in mm, beyond the part's own, that is kept clear before a seat: to put the part in."""
+"""Length in mm, beyond the part's own, that is kept clear before a seat to insert the part."""
 
 _STEP = 0.15  # of the points by which boxes are told from struts
 _LONGER = 0.25  # steps in mm by which an end is made longer, until its seat has room
@@ -67,9 +67,9 @@ class Bar:
     """A waveguide; lengths in mm.
 
     points (n, 3): its axis, both ends included; normals (n - 1, 3): outward normal of each leg's outer face;
-    half: half its section; wells: boxes that are cut out of it; seats: one an end, or none; met (E, 2):
-    whether the lattice's struts meet it with their first and second end; replaced (E,): whether the bar takes
-    a strut's place; loops: how many steps of the path no strut makes, each a loop more in the lattice's
+    half: half its section; wells: boxes that are cut out of it; seats: one an end, or none; met (E, 2): mask
+    of the lattice's struts that meet it with their first and second end; replaced (E,): mask of struts that
+    the bar replaces; loops: number of steps of the path without a strut, each a loop more in the lattice's
     graph; path_mm: length between its end nodes.
     """
 
@@ -235,8 +235,8 @@ def strut_radii(
 ) -> Array:
     """Radii (e, n) in mm of the struts `rows`, by default of all, at fractions t (n,), thickened at a bar.
 
-    met (e, 2): whether a strut's first and second end meet it. From that end to mid-span a strut's radius is
-    at least `least` mm; from there to the other end what was added fades as sin^2(pi t).
+    met (e, 2): mask of the first and second ends that meet it. From that end to mid-span a strut's radius is
+    at least `least` mm; from there to the other end the added thickness fades as sin^2(pi t).
     """
     t = np.asarray(t, float)
     law = lattice.radii(t, rows)
@@ -247,7 +247,7 @@ def strut_radii(
 
 
 class _Struts:
-    """Struts as they stand beside a bar: where they are and how far points are from them."""
+    """Struts beside a bar: their positions, and distances of points from them."""
 
     def __init__(
         self, lattice: Lattice, met: NDArray[np.bool_], replaced: NDArray[np.bool_], half: float
@@ -378,7 +378,7 @@ class _End:
 
 
 def _end(d: Dimensions, struts: _Struts, node: Array, onward: Array, name: str) -> _End:
-    """The end beyond a node: with the least bend, then the least length that has room for a seat."""
+    """The end beyond a node with the least bend, then the least length with room for a seat."""
     if not d.seats:
         return _End(node + d.waveguide_end * onward, None)
     limit = np.cos(np.radians(SHARPEST_DEG)) + 1e-9
@@ -402,7 +402,7 @@ def _end(d: Dimensions, struts: _Struts, node: Array, onward: Array, name: str) 
 
 
 def _notches(face: Array, direction: Array) -> Array:
-    """Ways (k, 3) for a seat's wires, square to its axis: the one away from the actuator first."""
+    """Directions (k, 3) for a seat's wires, square to its axis: the one away from the actuator first."""
     outward = _normals(np.stack([face - direction, face]))[0]
     if np.abs(direction).max() < 1.0 - 1e-9:
         return outward[None]
@@ -430,7 +430,7 @@ def _seat(d: Dimensions, face: Array, outward: Array, normal: Array, length: flo
 
 
 def _obstacle(d: Dimensions, struts: _Struts, seat: Seat) -> str | None:
-    """Obstacle to a seat, to the part on its way in, or to its wires; None without one."""
+    """Obstacle to a seat, to inserting its part, or to its wires; None without one."""
     low, high = np.array(d.bounds).T
     if ((seat.body.corners < low - 1e-6) | (seat.body.corners > high + 1e-6)).any():
         return "the envelope ends"

@@ -1,4 +1,4 @@
-"""Reports: what any report is made of: HTML, charts, pictures of meshes, VTK and point-cache files."""
+"""Parts of reports: HTML, charts, pictures of meshes, VTK and point-cache files."""
 
 from typing import TYPE_CHECKING
 

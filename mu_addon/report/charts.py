@@ -192,7 +192,7 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     """SVG of one path's deviation delta (k, j) in mm at k times and j stations, coloured from 0 to `top` mm.
 
     Arc length is to the right, time upward, both in percent; the colour goes by square root, as in
-    `color_bar`. chosen: whether its frame is drawn in colour.
+    `color_bar`. chosen: draw its frame in colour.
     """
     from matplotlib.colors import PowerNorm
 

@@ -1,4 +1,4 @@
-"""The frame of every report and its parts: one HTML page that brings all it needs and runs no script."""
+"""The frame of every report and its parts: one self-contained HTML page without scripts."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def table(
 ) -> str:
     """HTML of a table that scrolls sideways by itself; texts are escaped.
 
-    head: title and CSS class of each column; rows: cells, and whether the row is the best; groups: titles
-    over so many columns each; css: "stack" shows each row as a block on a phone. A cell "FAILED" is marked.
+    head: title and CSS class of each column; rows: cells, and True for the best row; groups: titles over so
+    many columns each; css: "stack" shows each row as a block on a phone. A cell "FAILED" is marked.
     """
 
     def cell(tag: str, text: Any, kind: str, scope: str = "") -> str:

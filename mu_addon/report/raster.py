@@ -128,7 +128,7 @@ def surface(
     normal: wp.array2d(dtype=wp.vec3),
     color: wp.array2d(dtype=wp.vec3),
 ):
-    """Position in mm, unit normal toward the viewer and colour of what every pixel (h, w) sees.
+    """Position in mm, unit normal toward the viewer and colour at every pixel (h, w).
 
     Where the nearest face shows its back behind a cutting plane, the section is filled. To be launched with
     dim (h, w).

@@ -71,7 +71,7 @@ class Camera:
 
 @attrs.frozen(eq=False)
 class Cut:
-    """A cutting plane through `point` (3,) in mm: what lies on the side of its `normal` (3,) is not drawn.
+    """A cutting plane through `point` (3,) in mm: the side of its `normal` (3,) is not drawn.
 
     color: sRGB of the sections, 0 .. 1, or None for that of their part.
     """
@@ -110,7 +110,7 @@ def render(
     """Picture (height, width, 4) of `parts` in pixels: 8-bit sRGB with straight alpha.
 
     background: sRGB, 0 .. 1, None for transparent; samples: squared, the number of values averaged for a
-    pixel; layers: number of translucent surfaces shown behind each other; ambient: whether parts shade each
+    pixel; layers: number of translucent surfaces shown behind each other; ambient: let parts shade each
     other.
     """
     scene = _Scene(parts, cut)
@@ -134,7 +134,7 @@ def _band(
     samples: int,
     layers: int,
 ) -> Image:
-    """The rows of a picture that `shot` is of; see `render`."""
+    """Rows of a picture covered by `shot`; see `render`."""
     scene = shot.scene
     solid = shot.draw(opaque)
     shot.shade(solid, sky, samples)
@@ -173,7 +173,7 @@ def png(image: Image) -> bytes:
 
 
 class _Scene:
-    """All parts as one mesh, with what the kernels need of it."""
+    """All parts as one mesh, with the arrays that the kernels need."""
 
     def __init__(self, parts: Sequence[Part], cut: Cut | None) -> None:
         offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
@@ -209,7 +209,7 @@ class _Scene:
 
 @attrs.frozen(eq=False)
 class _Layer:
-    """First face that every pixel sees; the colour is lit only after `_Shot.shade`."""
+    """First face seen by every pixel; the colour is lit only after `_Shot.shade`."""
 
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]
@@ -365,13 +365,13 @@ class _Sky:
 
     @classmethod
     def clear(cls) -> _Sky:
-        """A sky that nothing hides."""
+        """A sky without any occlusion."""
         empty = np.zeros((0, 3, 3), np.float32)
         return cls(empty, empty[:, 0, 0], empty, np.zeros(3), 1.0)
 
     @classmethod
     def around(cls, scene: _Scene, opaque: NDArray[np.bool_], camera: Camera) -> _Sky:
-        """The sky as the opaque faces hide it; it is brighter above and behind the viewer."""
+        """The sky occluded by the opaque faces; it is brighter above and behind the viewer."""
         import warp as wp
 
         from .raster import draw

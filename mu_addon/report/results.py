@@ -30,7 +30,7 @@ class Parameter:
 
 @attrs.frozen
 class Gate:
-    """A geometry check: the value found, the limit as text, and whether it passed."""
+    """A geometry check: the value found, the limit as text, and True if it passed."""
 
     name: str
     value: Any
@@ -101,7 +101,7 @@ STRETCH_COLUMNS = (
     "z_mm",
     "exceeded_by_1_percent_of_volume",
 )
-"""Of stretch.csv: the largest principal stretch of each part, and where at rest."""
+"""Columns of stretch.csv: the largest principal stretch of each part, and its position at rest."""
 
 
 SELF_CONTACT_COLUMNS = (
@@ -113,7 +113,7 @@ SELF_CONTACT_COLUMNS = (
     "y_mm",
     "z_mm",
 )
-"""Of self_contact.csv: what a unit presses on itself with, how near it comes, and where hardest at rest."""
+"""Columns of self_contact.csv: contact force with itself, least gap, and the peak's position at rest."""
 
 
 @attrs.frozen(eq=False)
@@ -211,7 +211,7 @@ class Signals:
 
     errors_per_deg: error of a response's slope, per degree, from the law's own; at_rest: share of the light
     that arrives at rest; j_hat: mean deviations in mm; checks: of the law, by rays, for the path with the
-    least deviation; front: whether a path is Pareto-optimal in deviation and signal. sets: pairs, then
+    least deviation; front: True for a path that is Pareto-optimal in deviation and signal. sets: pairs, then
     triples, of paths that together resolve the distribution of bending along the unit best, with the
     logarithm of their information, best first; differential: pairs read against each other, with the slope of
     their difference per degree, best first.
@@ -250,7 +250,7 @@ class SideView:
 
 @attrs.frozen(eq=False)
 class ReportData:
-    """Everything that a report shows of one run; what was not reached is empty and left out.
+    """Everything that a report shows of one run; unfinished parts are empty and left out.
 
     pressure_kPa and angle_deg (k,): of the converged states; protocol_s and protocol_kPa (n,): the pressure
     protocol.

@@ -1,4 +1,4 @@
-"""The report of a run that was asked to stop: written at once, of whatever its folder holds by then."""
+"""The report of a run that was asked to stop, written at once from the files in its folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_ROWS = 20
 
 
 def write_stopped_report(folder: Path, why: str) -> None:
-    """Write report.html of a run that stopped early: what its summary, tables and other files hold.
+    """Write report.html of a run that stopped early, from its summary, tables and other files.
 
     why: in words. The run's next start removes it. Raises InputError, OSError and OutputError.
     """

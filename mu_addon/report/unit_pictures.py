@@ -1,4 +1,4 @@
-"""The pictures of a unit that a report shows: cut open along its sagittal plane, at rest and in motion."""
+"""Pictures of a unit in a report: cut open along its sagittal plane, at rest and in motion."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def portrait(
 
 
 def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple[Camera, float]:
-    """The camera that shows what the sagittal cut leaves of `parts`, and the aspect they fill."""
+    """Camera that frames `parts` after the sagittal cut, and the aspect they fill."""
     behind = np.array([0.0, np.inf, np.inf])
     left = [part if part.whole else Part(np.minimum(part.vertices, behind), part.faces) for part in parts]
     axes = Camera((0, 0, 0), towards, (0, 0, 1), 1.0).axes
@@ -86,7 +86,7 @@ def motion(
 ) -> list[Picture]:
     """One picture for each state, all to one scale, of the mesh cut open along its sagittal plane.
 
-    outside: whether the half is seen from the other side, whole.
+    outside: show the half from the other side, uncut.
 
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
     part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
@@ -147,7 +147,7 @@ def _behind(bodies: Sequence[RigidBody]) -> list[Part]:
 def region_skin(mesh: Mesh, region: int) -> NDArray[np.int64]:
     """Outward triangles (f, 3) on the boundary of a region of a mesh, four for a face with mid nodes.
 
-    Struts of a resolved mesh end where they are tied: what of them lies within the wall is left out.
+    Struts of a resolved mesh end where they are tied: their parts within the wall are left out.
     """
     triangles = skin(mesh.tets[mesh.region == region])
     return triangles[~np.isin(triangles, mesh.tied).all(axis=1)]

@@ -46,27 +46,27 @@ class Cache:
         self.folder = folder
 
     def path(self, kind: str, name: str) -> Path:
-        """Where the entry lies, or would."""
+        """Path of an entry, existing or not."""
         return self.folder / f"{kind}-{name}.npz"
 
     def get(self, kind: str, name: str) -> dict[str, Array] | None:
-        """The arrays of an entry, or None where there is none that can be read whole."""
+        """Arrays of an entry, or None where there is none that can be read completely."""
         found = read_npz(self.path(kind, name))
         if found is None or not np.array_equal(found.pop(SEAL, None), _seal(kind, name, found)):
             return None
         return found
 
     def has(self, kind: str, name: str) -> bool:
-        """Whether `get` would find an entry."""
+        """Return True if `get` would find an entry."""
         return self.path(kind, name).exists() and self.get(kind, name) is not None
 
     def put(self, kind: str, name: str, arrays: dict[str, Any]) -> None:
-        """Store an entry whole. Raises OutputError."""
+        """Store an entry, completely or not at all. Raises OutputError."""
         kept = {key: np.asarray(value) for key, value in arrays.items()}
         write_npz(self.path(kind, name), {**kept, SEAL: _seal(kind, name, kept)})
 
 
 def _seal(kind: str, name: str, arrays: dict[str, Array]) -> Array:
-    """Digest (32,) of an entry: its place, its arrays and their names."""
+    """Digest (32,) of an entry: its kind and name, its arrays and their names."""
     parts = [part for key in sorted(arrays) for part in (key, arrays[key])]
     return np.frombuffer(bytes.fromhex(_digest((kind, name, *parts)).hexdigest()), np.uint8)

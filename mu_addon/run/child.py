@@ -1,7 +1,7 @@
-"""A run in a process of its own, which tells one JSON message a line; no thread, no bpy.
+"""A run in a separate process that writes one JSON message a line; no thread, no bpy.
 
-The child writes to files and `poll` reads what has been added since: nothing blocks, nothing fills up, and
-what the child said is still there when its parent is not. Blender's panels and sweeps watch their runs by it.
+The child writes to files and `poll` reads new lines: nothing blocks, no pipe fills up, and the messages
+outlive the parent. Blender's panels and sweeps watch their runs this way.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ..files import make_folder, output_error
 from .progress_estimate import Plan, ProgressEstimate
 
 PATIENCE_S = 20.0
-"""Seconds that a child which was asked to stop may take to write what it has, before it is killed."""
+"""Seconds that a child may take to save its work after it was asked to stop, before it is killed."""
 MESSAGES, ERRORS = "messages.ndjson", "stderr.txt"
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
 
 class Child:
-    """One process and what it has said; `state` is waiting, running, done, failed or cancelled.
+    """One process and its messages; `state` is waiting, running, done, failed or cancelled.
 
-    progress: its latest such message; estimate: the whole of the run; warnings: texts; result, error: its
-    last message, whichever.
+    progress: its latest such message; estimate: of the whole run; warnings: texts; result, error: its last
+    message, one of them.
     """
 
     def __init__(
@@ -41,11 +41,10 @@ class Child:
         plan: Plan = (),
         waits: bool = False,
     ) -> None:
-        """Start `command`, its words kept in `folder`: messages.ndjson and stderr.txt. Raises MuError.
+        """Start `command`, with its output in `folder`: messages.ndjson and stderr.txt. Raises MuError.
 
-        plan: its stages as they are expected; waits: `begin` starts it, and not this.
-        ends_with_parent: hold the child's standard input open, by whose end `processes.end_with_input` knows
-        that this process is gone.
+        plan: its expected stages; waits: leave the start to `begin`. ends_with_parent: hold the child's
+        standard input open, by whose end `processes.end_with_input` detects that this process has ended.
         """
         self.folder = folder
         self.state = WAITING
@@ -64,7 +63,7 @@ class Child:
             self.begin()
 
     def begin(self) -> None:
-        """Start the process of a child that waits. Raises MuError."""
+        """Start the process of a waiting child. Raises MuError."""
         command, environment, ends_with_parent = self._line
         folder = self.folder
         make_folder(folder)
@@ -100,11 +99,11 @@ class Child:
 
     @property
     def stopping(self) -> bool:
-        """Whether it was asked to stop and has not stopped yet."""
+        """True if it was asked to stop and has not stopped yet."""
         return self.state == RUNNING and self._asked is not None
 
     def poll(self) -> bool:
-        """Read what is new; returns whether there was anything. Never waits."""
+        """Read new messages; return True if there were any. Never waits."""
         if self.state != RUNNING:
             return False
         self.seconds = time.monotonic() - self.started
@@ -119,7 +118,7 @@ class Child:
         return new
 
     def cancel(self) -> None:
-        """Ask it to stop; it keeps what it has finished. One that does not answer is killed later."""
+        """Ask it to stop; it keeps what it has finished. It is killed later if it does not respond."""
         if self.state == WAITING:
             self.state = CANCELLED
         if self.state == RUNNING and self._asked is None:
@@ -127,7 +126,7 @@ class Child:
             self._process.terminate()
 
     def send(self, words: str) -> None:
-        """Write a line to its standard input, which `ends_with_parent` holds open; the ended hear nothing."""
+        """Write a line to its standard input, held open by `ends_with_parent`; no effect after its end."""
         if self.state == RUNNING and self._process.stdin is not None:
             # It ended this moment: the next poll says so.
             with suppress(OSError):
@@ -135,7 +134,7 @@ class Child:
                 self._process.stdin.flush()
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill it at once."""
         if self.state == WAITING:
             self.state = CANCELLED
         if self.state == RUNNING:

@@ -1,4 +1,4 @@
-"""How a run ends: well, in part or interrupted; always with a message, an exit status and a summary.json."""
+"""End of a run: complete, partial or interrupted, with a message, an exit status and a summary.json."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .supervisor import INTERRUPTED, TERMINATED
 DONE, UNEXPECTED = 0, 70
 SUMMARY = "summary.json"
 STOPPED = "<!-- of a run that stopped early -->"
-"""Last line of a report that says so at once, and which the run's next start therefore removes."""
+"""Last line of a report written on a stop, which the run's next start therefore removes."""
 # What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
 # What a disk refuses to whoever writes.
@@ -58,13 +58,12 @@ class _Unexpected(MuError):
 
 @attrs.define
 class RunContext:
-    """What a run leaves: its exit status, and the `summary` that its body fills and its folder keeps.
+    """Outcome of a run: its exit status, and the `summary` that its body fills and its folder keeps.
 
-    report: writes the report of what was found so far; its argument says why the run stops early, and is
-    empty where it does not. short_report: writes a report of a folder at once that says why its run was asked
-    to stop. wants_report: whether any is written. hurried: whether who asked the run to stop waits for its
-    end, and so for its report. console_summary: the lines that end the run at a terminal, of
-    its summary.
+    report: writes the report of the results so far; its argument says why the run stops early, else "".
+    short_report: writes a report from a folder at once, with the reason of a requested stop. wants_report:
+    write one at all. hurried: whoever asked the run to stop waits for its end, and so for its report.
+    console_summary: the lines that end the run at a terminal, from its summary.
     """
 
     progress: Progress
@@ -80,7 +79,7 @@ class RunContext:
     _kept_s: float = 0.0
 
     def write_report(self, stopped: str = "") -> None:
-        """Write the report, where there is one and it is wanted."""
+        """Write the report, if there is one and it is wanted."""
         if self.report is not None and self.wants_report:
             self.report(stopped)
 
@@ -105,7 +104,7 @@ class RunContext:
             )
 
     def unlock(self) -> None:
-        """Give the folder free."""
+        """Release the folder."""
         if self._lock is not None:
             self._lock.release()
             self._lock = None
@@ -113,8 +112,8 @@ class RunContext:
     def open_folder(self, folder: Path) -> Path:
         """Make `folder` the run's: locked, with log.ndjson, and "running" in summary.json until the end.
 
-        So a run that was killed, or overtaken by a new one, never passes for complete. The summary is filled
-        up with blanks to RESERVED bytes, which a last summary gets. Raises InUseError and OutputError.
+        So a run that was killed, or replaced by a new one, never passes for complete. The summary is padded
+        with blanks to RESERVED bytes, which the last summary may use. Raises InUseError and OutputError.
         """
         self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))
@@ -141,7 +140,7 @@ class RunContext:
         write_text(self.folder / SUMMARY, text.ljust(RESERVED) + "\n")  # type: ignore[operator]
 
     def _keep_found(self, message: Message) -> None:
-        """What was found goes to summary.json between stages and every few seconds: a kill takes nothing."""
+        """Write results to summary.json between stages and every few seconds, so that a kill loses none."""
         if message.get("type") != "progress" or message.get("beat"):
             return
         now = time.monotonic()
@@ -154,7 +153,7 @@ class RunContext:
 
 
 def _says_running(path: Path) -> bool:
-    """Whether a summary is that of a run which has not ended."""
+    """Return True if a summary is that of a run which has not ended."""
     return _read_summary(path).get("status") == "running"
 
 
@@ -167,10 +166,10 @@ def _read_summary(path: Path) -> dict[str, Any]:
 
 
 def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
-    """Have a folder say how its run ended, whose process was lost: in summary.json and log.ndjson.
+    """Record in a folder, in summary.json and log.ndjson, how its run ended whose process was lost.
 
-    What its stages had found stays in the summary. stack: Python's, where it crashed. Nothing is written
-    where no run of the folder was going on, or another one has the folder.
+    Results of its stages stay in the summary. stack: Python's, at the crash. Nothing is written if no run of
+    the folder was in progress, or another one owns the folder.
     """
     found = _read_summary(folder / SUMMARY)
     if found.get("status") != "running":
@@ -191,7 +190,7 @@ def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
 
 
 def last_stage(folder: Path) -> tuple[str, list[str]]:
-    """Stage in which the folder's run that goes on is, and what its stages made: of its log; else nothing."""
+    """Stage of the folder's unfinished run, and sizes from its stages, by its log; else empty."""
     stage = ""
     made: dict[str, str] = {}
     if not _says_running(folder / SUMMARY):
@@ -219,12 +218,12 @@ def last_stage(folder: Path) -> tuple[str, list[str]]:
 
 @contextmanager
 def run_to_end(progress: Progress) -> Iterator[RunContext]:
-    """Run the body; whatever stops it becomes a message and `RunContext.status`, never a traceback.
+    """Run the body; anything that stops it becomes a message and `RunContext.status`, never a traceback.
 
-    A body that ends well leaves summary.json with "status": "complete". Any other leaves what it has
-    written, and summary.json with the reason and "status": "partial", after SIGTERM "cancelled". Exit
-    status: 0, a MuError's own, 130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose
-    traceback goes to log.ndjson.
+    A body that ends well leaves summary.json with "status": "complete". Any other leaves the files it has
+    written, and summary.json with the reason and "status": "partial", after SIGTERM "cancelled". Exit status:
+    0, a MuError's own, 130 after Ctrl-C, 143 after SIGTERM, 70 for a fault of this program, whose traceback
+    goes to log.ndjson.
     """
     context = RunContext(progress)
     # Blender replaces Python's handler of Ctrl-C, and leaves SIGTERM to kill the process where it stands.
@@ -245,7 +244,7 @@ def run_to_end(progress: Progress) -> Iterator[RunContext]:
 
 
 def asked_to_stop(number: int, folder: Path | None) -> MuError:
-    """The end of a run that was asked to stop by a signal, SIGINT or SIGTERM."""
+    """Error for a run that was asked to stop by a signal, SIGINT or SIGTERM."""
     where = f"finished results are in {folder}" if folder else ""
     if number == signal.SIGTERM:
         return _Terminated("cancelled", where, "run it again: it goes on from there")
@@ -253,12 +252,12 @@ def asked_to_stop(number: int, folder: Path | None) -> MuError:
 
 
 def has_ended(folder: Path) -> bool:
-    """Whether the last run of a folder has said how it ended."""
+    """Return True if the last run of a folder has recorded its end."""
     return _read_summary(folder / SUMMARY).get("status", "running") != "running"
 
 
 def _failure(context: RunContext, error: Exception) -> MuError:
-    """What stopped a run, in words; the stack of a fault of this program goes to log.ndjson."""
+    """Error that stopped a run, as a MuError; the stack of a fault of this program goes to log.ndjson."""
     if isinstance(error, _Terminated):
         return asked_to_stop(signal.SIGTERM, context.folder)
     if isinstance(error, MuError):
@@ -290,7 +289,7 @@ def _where_results_are(context: RunContext) -> str:
 
 
 def _stop(context: RunContext, error: MuError) -> None:
-    """End a run early: summary.json, a report of what there is, and the error message."""
+    """End a run early: summary.json, a report of the results so far, and the error message."""
     _set_signals(signal.SIG_IGN)
     context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
@@ -339,10 +338,10 @@ def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
 
 
 def _replace_summary(path: Path, wanted: Sequence[dict[str, Any]]) -> None:
-    """Write the first summary that there is room for; raises OutputError where there is none for any.
+    """Write the first summary that fits on the disk; raises OutputError if none does.
 
-    On a full disk the one that is there gives way first: a folder without a summary does not pass for one
-    whose run goes on.
+    On a full disk the existing one is removed first: a folder without a summary does not pass for one with a
+    run in progress.
     """
     try:
         write_json(path, wanted[0])
@@ -367,7 +366,7 @@ def _log_traceback(context: RunContext, error: Exception) -> None:
 
 @contextmanager
 def _signals_raise() -> Iterator[list[int]]:
-    """While the body runs, Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated; yields each Ctrl-C."""
+    """Context in which Ctrl-C raises KeyboardInterrupt and SIGTERM _Terminated; yields each Ctrl-C."""
     asked: list[int] = []
     if not _may_set_signals():
         yield asked
@@ -390,7 +389,7 @@ def _signals_raise() -> Iterator[list[int]]:
 
 
 def _set_signals(handler: Any) -> None:
-    """`handler` for Ctrl-C and SIGTERM, until `_signals_raise` puts back what was there before."""
+    """Set `handler` for Ctrl-C and SIGTERM, until `_signals_raise` restores the former one."""
     if _may_set_signals():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, handler)

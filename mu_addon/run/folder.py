@@ -30,10 +30,10 @@ RUN = "run"
 
 @attrs.frozen
 class FolderLayout:
-    """What a folder of one kind of run holds.
+    """Layout of a folder of one kind of run.
 
-    inputs: its first file of inputs; header: the first line of that, by which the folder is known; results:
-    files and folders by name or pattern; optional: further inputs that a run may do without.
+    inputs: its first file of inputs; header: the first line of that, which identifies the folder; results:
+    files and folders by name or pattern; optional: further inputs that a run may lack.
     """
 
     inputs: str
@@ -42,12 +42,12 @@ class FolderLayout:
     optional: tuple[str, ...] = ()
 
     def is_of(self, folder: Path) -> bool:
-        """Whether a folder is of such a run."""
+        """Return True if a folder is of such a run."""
         return _read(folder / self.inputs).startswith(self.header)
 
 
 def begin(context: RunContext, folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
-    """Make a folder that of a run, alone in it until it ends: locked, claimed, its log open, its inputs kept.
+    """Make a folder a run's until it ends: locked, claimed, its log open, its inputs written.
 
     See `claim`. Raises InputError, also where another process works in the folder, and OutputError.
     """
@@ -57,11 +57,11 @@ def begin(context: RunContext, folder: Path, layout: FolderLayout, inputs: Mappi
 
 
 def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None:
-    """Make a folder that of a run with these inputs, text by file name, and write them.
+    """Make a folder a run's with these inputs, text by file name, and write them.
 
-    Results of other inputs are moved to stale/, never shown as current. Inputs are the same where they say
-    the same, the table `RUN` of a TOML file left aside. Raises InputError where the folder holds somebody
-    else's files under these names or a link among them, and OutputError.
+    Results of other inputs are moved to stale/, never shown as current. Inputs are compared without the table
+    `RUN` of a TOML file. Raises InputError where the folder holds other files under these names or a link
+    among them, and OutputError.
     """
     make_folder(folder)
     may = tuple(dict.fromkeys((*inputs, *layout.optional)))
@@ -95,14 +95,14 @@ def write_run(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> 
 
 
 def same_inputs(folder: Path, inputs: Mapping[str, str]) -> bool:
-    """Whether a folder holds these inputs, whole."""
+    """Return True if a folder holds all of these inputs."""
     return all(
         (folder / name).is_file() and _same(name, _read(folder / name), text) for name, text in inputs.items()
     )
 
 
 def _same(name: str, before: str, now: str | None) -> bool:
-    """Whether a file of inputs says the same as before."""
+    """Return True if a file of inputs has the same meaning as before."""
     if now is None or before == now or not name.endswith(".toml"):
         return before == now
     return _document(before) == _document(now) is not None
@@ -117,7 +117,7 @@ def _document(text: str) -> dict[str, Any] | None:
 
 
 def keep_inputs(folder: Path, inputs: Mapping[str, str], known_by: str = "") -> None:
-    """Write a run's inputs into its folder, last the file that it is known by. Raises OutputError.
+    """Write a run's inputs into its folder, last the file that identifies it. Raises OutputError.
 
     So a run that was stopped between two of them has not begun, and starts anew.
     """
@@ -146,7 +146,7 @@ def _size(count: int) -> str:
 
 
 def _refuse_links(folder: Path, patterns: Iterable[str]) -> None:
-    """A link under a name that a run writes would send its words into a file elsewhere."""
+    """Raise InputError for a link under a name that a run writes, as it would write to a file elsewhere."""
     for pattern in patterns:
         for path in [folder / pattern, *folder.glob(pattern)]:
             if path.exists() and not path.is_file() and not path.is_dir():
@@ -171,7 +171,7 @@ def _read(path: Path) -> str:
 
 
 def _set_aside(folder: Path, patterns: Iterable[str]) -> None:
-    """Move an earlier run's inputs and results to stale/, in place of what was set aside before."""
+    """Move an earlier run's inputs and results to stale/, replacing what was set aside before."""
     stale = folder / "stale"
     try:
         if stale.is_dir():

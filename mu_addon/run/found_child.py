@@ -1,6 +1,6 @@
-"""A run that another session of Blender started and that goes on without it, watched by its folder.
+"""A run that another session of Blender started and that outlives it, watched by its folder.
 
-Its words are in files, its lock says which process it is; there is nothing else to hold on to.
+Its messages are in files, and its lock names its process.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from .lock import holder
 from .progress_estimate import Plan
 
 STARTS_S = 60.0
-"""Seconds from its start in which a run may not have locked its folder yet: it loads the solver."""
+"""Seconds from its start in which a run may not have locked its folder yet, as it loads the solver."""
 
 
 class FoundChild(Child):
-    """As `Child`, of a process that is not this one's."""
+    """`Child` of a process that another process started."""
 
     def __init__(self, run: Path, own: Path, plan: Plan = (), started_s: float = 0.0) -> None:
-        """The run in a folder, its words in `own`, started at `started_s` since the epoch. Raises MuError."""
+        """The run in a folder, its messages in `own`, begun at `started_s` since the epoch. MuError."""
         super().__init__((), own, {}, plan=plan, waits=True)
         self.run = run
         try:
@@ -40,11 +40,11 @@ class FoundChild(Child):
 
     @property
     def pid(self) -> int:
-        """Number of the process, 0 where it is not known."""
+        """Number of the process, 0 if unknown."""
         return holder(self.run) or 0
 
     def poll(self) -> bool:
-        """Read what is new; returns whether there was anything. Never waits."""
+        """Read new messages; return True if there were any. Never waits."""
         if self.state != RUNNING:
             return False
         self.seconds = time.monotonic() - self.started
@@ -61,7 +61,7 @@ class FoundChild(Child):
         return new
 
     def begin(self) -> None:
-        """Nothing: it was begun."""
+        """Do nothing: it has been started."""
 
     def cancel(self) -> None:
         """Ask it to stop; it keeps what it has finished."""
@@ -70,14 +70,14 @@ class FoundChild(Child):
             self._signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill it at once."""
         if self.state == RUNNING:
             self._asked = time.monotonic()
             self._signal(getattr(signal, "SIGKILL", signal.SIGTERM))
             self._end(0)
 
     def send(self, words: str) -> None:
-        """Nothing hears: its standard input is none."""
+        """Do nothing: its standard input is closed."""
 
     def _signal(self, number: int) -> None:
         pid = holder(self.run)
@@ -86,7 +86,7 @@ class FoundChild(Child):
                 os.kill(pid, number)
 
     def _close_input(self) -> None:
-        """It has none."""
+        """Do nothing: its standard input is closed."""
 
     def _without_message(self, status: int) -> dict[str, Any]:
         error = MuError(

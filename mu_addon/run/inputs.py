@@ -1,4 +1,4 @@
-"""A run's inputs read back from its folder: TOML whose every key and type is checked."""
+"""A run's inputs read back from its folder: TOML with every key and type checked."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read_toml(path: Path, what: str = "inputs", remedy: str = "choose another fo
 
 
 def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What a file of inputs says, and its table `[run]` of what decides no result. Raises InputError.
+    """Content of a file of inputs, and its table `[run]` of keys that decide no result. Raises InputError.
 
     A file without `format`, as older versions wrote some, is of format 1. words: as those of `read_toml`.
     """
@@ -80,7 +80,7 @@ def structured(kind: type[Made], table: Any, where: str, **given: Any) -> Made:
 
 
 def _value(hint: Any, value: Any, where: str) -> Any:
-    """A value of TOML as the type of a field has it."""
+    """A value of TOML converted to the type of a field."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (Union, types.UnionType):
         (hint,) = [option for option in inner if option is not type(None)]
@@ -104,9 +104,9 @@ def _value(hint: Any, value: Any, where: str) -> Any:
 
 
 def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:
-    """Where a file or folder lies that a run reads and does not keep, by its file of inputs.
+    """Path of a file or folder that a run reads and does not keep, by its file of inputs.
 
-    Raises InputError where that does not say, or where nothing is there any more.
+    Raises InputError where that does not name it, or where it no longer exists.
     """
     named = run.get(key)
     if not isinstance(named, str):
@@ -124,7 +124,7 @@ def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:
 
 
 def require_digest(path: Path, content: bytes, sha256: Any, what: str) -> None:
-    """Raise InputError where a file is not the one that a run was made with."""
+    """Raise InputError if a file is not the one that a run was made with."""
     if digest(content) != sha256:
         raise InputError(
             f"the {what} is not the one that the run was made with",

@@ -1,8 +1,7 @@
-"""The Python that runs a job in a process of its own, started from inside Blender.
+"""The Python that runs a job in a separate process, started from inside Blender.
 
-Blender has its own copies of libraries that the solver's wheels bring, too (CHOLMOD, BLAS): in one process
-the calls of the one may be bound to the other's code, of another version. So nothing is solved in Blender's
-process.
+Blender has its own copies of libraries that the solver's wheels also contain (CHOLMOD, BLAS). In one process
+calls to one may be bound to the other's code, of another version, so nothing is solved in Blender's process.
 """
 
 from __future__ import annotations
@@ -16,13 +15,13 @@ from ..errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 ENTRY = "MU_ENTRY"
-"""Environment variable: the Python file that runs the core's command line where its package has another name,
-as in Blender; `jobs/child_main.py` sets it to itself."""
+"""Environment variable: Python file that runs the core's command line where its package has another name, as
+in Blender; `jobs/child_main.py` sets it to itself."""
 _LIBRARY_FOLDERS = ("site-packages", "dist-packages")
 
 
 def interpreter(blender: str = "") -> list[str]:
-    """Command that runs a Python file: this Python, or where it has no file of its own, Blender's.
+    """Command that runs a Python file: this Python or, if it has no file of its own, Blender's.
 
     blender: path of Blender's program, if any. Raises InputError where there is neither.
     """
@@ -47,14 +46,14 @@ def worker_command(worker: Path, arguments: Sequence[str], blender: str = "") ->
 
 
 def environment(more: Iterable[Path] = ()) -> dict[str, str]:
-    """Environment of such a process: it finds the packages that this one finds, and those in `more`."""
+    """Environment of such a process: it finds the packages of this one, and those in `more`."""
     found = [Path(p) for p in sys.path if Path(p).name in _LIBRARY_FOLDERS]
     folders = dict.fromkeys(str(p) for p in [*more, *found])
     return {**os.environ, "PYTHONPATH": os.pathsep.join(folders), "PYTHONUNBUFFERED": "1"}
 
 
 def core_command() -> list[str]:
-    """Command to which the words of a line of the core's command line are added. Raises InputError."""
+    """Command prefix for a line of the core's command line. Raises InputError."""
     entry = os.environ.get(ENTRY)
     return worker_command(Path(entry), ()) if entry else [sys.executable, "-m", "mu_addon.cli"]
 

@@ -1,4 +1,4 @@
-"""One process a folder: a lock that the system takes back when its holder ends, however it ends."""
+"""A lock of a folder for one process, released by the system when its holder ends, however it ends."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class InUseError(InputError):
 
 
 class FolderLock:
-    """The lock of one folder, held from when it is made until `release`, or until this process ends.
+    """The lock of one folder, held from its creation until `release`, or until this process ends.
 
     `held` is False where the file system offers no locks. A lock of the system (flock; LockFile on Windows)
-    dies with its holder, so that none is ever left behind, whatever the clock and the process numbers say.
-    The file itself stays: removing it could part two processes that are about to lock it.
+    dies with its holder, so that none is ever left behind, independent of clocks and process numbers. The
+    file itself stays: removing it could let two processes lock different files.
     """
 
     def __init__(self, folder: Path) -> None:
-        """Lock `folder`; raises InUseError that names the process which has it, and OutputError."""
+        """Lock `folder`; raises InUseError that names the process holding it, and OutputError."""
         self.path = make_folder(folder) / LOCK
         # A link would be followed to a file of somebody else's.
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
@@ -59,7 +59,7 @@ class FolderLock:
             raise output_error(error, self.path) from error
 
     def release(self) -> None:
-        """Give the folder free; a second time does nothing."""
+        """Release the folder; no effect the second time."""
         if self._handle >= 0:
             # Closing unlocks, on every system.
             os.close(self._handle)
@@ -83,10 +83,10 @@ class FolderLock:
 
 
 def holder(folder: Path) -> int | None:
-    """Number of the process of this machine that works in a folder, or None: nobody does, or another's.
+    """Number of the process of this machine that works in a folder, or None for none or another machine's.
 
-    Of a process that is watched it is the number of who watches: that one is to be asked to stop. 0 where one
-    works that has not signed yet. Where the file system offers no locks nobody is found.
+    For a watched process it is the number of its watcher, which is to be asked to stop. 0 for one that has
+    not signed yet. None where the file system offers no locks.
     """
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     try:
@@ -108,7 +108,7 @@ def holder(folder: Path) -> int | None:
 
 
 def _signature(handle: int) -> dict[str, Any]:
-    """What the holder of a lock has signed; empty before it has."""
+    """Signature of a lock's holder; empty before it has signed."""
     try:
         os.lseek(handle, 0, os.SEEK_SET)
         signed: Any = json.loads(os.read(handle, 1000))
@@ -118,7 +118,7 @@ def _signature(handle: int) -> dict[str, Any]:
 
 
 def _owner(handle: int) -> str:
-    """Who signed the lock, in words."""
+    """Holder of the lock, in words."""
     try:
         os.lseek(handle, 0, os.SEEK_SET)
         signed: Any = json.loads(os.read(handle, 1000))

@@ -1,4 +1,4 @@
-"""Work in processes of their own: one pool for candidates, columns and the evidence's simulations."""
+"""Work in separate processes: one pool for candidates, columns and the evidence's simulations."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Found = TypeVar("Found")
 
 
 class Pool:
-    """Processes of one thread each that end with this one; started when first needed, until closed.
+    """Processes of one thread each that end with this one; started on demand, until closed.
 
-    what: names their work in errors. start, arguments: what each process calls first.
+    what: names their work in errors. start, arguments: called first in each process.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Pool:
         self._pool: ProcessPoolExecutor | None = None
 
     def submit(self, work: Callable[..., Found], *arguments: Any) -> Future[Found]:
-        """Have a process do `work`, a module's own function. Raises MuError where a process has died."""
+        """Submit `work`, a module-level function, to a process. Raises MuError if a process has died."""
         with one_thread_each():
             _survive_broken_pipes()
             if self._pool is None:
@@ -45,7 +45,7 @@ class Pool:
                 return self._pool.submit(work, *arguments)
 
     def result(self, future: Future[Found]) -> Found:
-        """What was found, once it is there. Raises what the work raised, and MuError where a process died."""
+        """Wait for the result. Raises what the work raised, and MuError if a process died."""
         with self._errors():
             return future.result()
 
@@ -61,7 +61,7 @@ class Pool:
             ) from None
 
     def close(self) -> None:
-        """End the processes, at once: whoever stops early does not wait for what nobody will read."""
+        """End the processes at once, without waiting for results that nobody reads."""
         if self._pool is None:
             return
         processes = list((self._pool._processes or {}).values())
@@ -74,10 +74,10 @@ class Pool:
 def each(
     work: Callable[[Task], Found], tasks: Sequence[Task], workers: int, what: str = ""
 ) -> Iterator[tuple[int, Found]]:
-    """Number of each task as it is done, and what `work`, a module's own function, found.
+    """Number of each finished task, with the result of `work`, a module-level function.
 
-    what: names the work in errors. Whoever stops listening ends the processes. Raises what `work` raises, and
-    MuError where a process dies.
+    what: names the work in errors. The processes end with the iteration. Raises what `work` raises, and
+    MuError if a process dies.
     """
     if workers == 1 or len(tasks) < 2:
         for number, task in enumerate(tasks):
@@ -96,9 +96,9 @@ def _start(start: Callable[..., None] | None, arguments: tuple[Any, ...]) -> Non
 
 
 def _survive_broken_pipes() -> None:
-    """Writing to a process that has ended must be an error, as Python has it, not the end of this one.
+    """Ignore SIGPIPE, so that writing to an ended process raises an error and does not end this one.
 
-    The compiler inside Warp resets what Python had set when it starts.
+    The compiler inside Warp resets Python's handler when it starts.
     """
     if hasattr(signal, "SIGPIPE"):
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)

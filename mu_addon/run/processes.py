@@ -18,13 +18,13 @@ MOST_WORKERS = 16
 
 
 def cores() -> int:
-    """How many cores this process may use, `MOST_WORKERS` at most: a process for each is what pays."""
+    """Number of cores for this process, at most `MOST_WORKERS`: one process for each pays."""
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(allowed, MOST_WORKERS)
 
 
 def end_with_parent() -> None:
-    """End this process as soon as its parent has ended: one that was killed cannot end its workers."""
+    """End this process as soon as its parent has ended, also a killed one."""
     threading.Thread(target=_wait_for_parent, daemon=True).start()
 
 
@@ -39,9 +39,9 @@ def _wait_for_parent() -> None:
 
 
 def end_with_input() -> None:
-    """End this process as soon as its standard input ends: who holds the other end was killed, or is done.
+    """End this process as soon as its standard input closes: the other end's holder was killed, or is done.
 
-    Works on every system and without a signal, for a child that was given a pipe and nothing in it.
+    Works on every system and without a signal, for a child with a pipe that stays empty.
     """
     threading.Thread(target=_wait_for_input, daemon=True).start()
 
@@ -54,7 +54,7 @@ def _wait_for_input() -> None:
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Children inherit these: with a process a core, more threads a process only get in each other's way."""
+    """Context whose child processes use one thread each: with a process a core, more only compete."""
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}
     os.environ.update(dict.fromkeys(names, "1"))
@@ -70,9 +70,10 @@ def one_thread_each() -> Iterator[None]:
 
 @contextmanager
 def ctrl_c_held_back() -> Iterator[None]:
-    """Ctrl-C waits until the body is done. Children born inside never get it: one process decides for all.
+    """Context that delays Ctrl-C; child processes started inside never get it, as one process decides for
+    all.
 
-    In a terminal it reaches every process. Ignored instead, one that came inside would be lost.
+    In a terminal it reaches every process. If it were ignored instead, one inside the body would be lost.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -97,10 +98,9 @@ def ctrl_c_held_back() -> Iterator[None]:
 
 
 def limit_memory(megabytes: int) -> None:
-    """From now on, refuse this process and its children more memory of their own than that; 0 is no limit.
+    """Limit the memory of this process and its future children, in MB; 0 is no limit.
 
-    On Linux, where what was asked for and never touched counts as well; other systems count otherwise or not
-    at all, and there nothing is done.
+    On Linux only, where memory requested and never touched counts as well; no effect on other systems.
     """
     if megabytes > 0 and sys.platform == "linux":
         import resource
@@ -109,9 +109,9 @@ def limit_memory(megabytes: int) -> None:
 
 
 def require_memory() -> None:
-    """Raise MuError where this process is limited to less memory than its libraries can fail in cleanly.
+    """Raise MuError if this process has too little memory for its libraries to fail cleanly.
 
-    Refused memory, OpenBLAS asks again for ever and Manifold crashes; neither can be told from here.
+    Without memory, OpenBLAS retries for ever and Manifold crashes; neither can be detected here.
     """
     if sys.platform == "win32":
         return

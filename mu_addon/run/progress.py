@@ -36,13 +36,13 @@ Clock = Callable[[], float]
 
 
 BEAT_S = 5.0
-"""Seconds after which a stage that says nothing is told to go on."""
+"""Seconds after which a message is sent for a stage that reports nothing."""
 
 
 class Progress:
-    """The stages of one run, told to `sinks`; `seconds` keeps how long each stage took, in order.
+    """Stages of one run, reported to `sinks`; `seconds` keeps each stage's duration, in order.
 
-    estimate: the whole of the run, as far as a `plan` tells of it.
+    estimate: of the whole run, if there is a `plan`.
     """
 
     def __init__(self, sinks: Sequence[Sink] = (), clock: Clock = time.perf_counter) -> None:
@@ -59,14 +59,14 @@ class Progress:
         self.estimate = ProgressEstimate((), clock)
 
     def plan(self, stages: Plan) -> None:
-        """Tell which stages the run is expected to have, with their seconds; nothing without any."""
+        """Report the expected stages of the run, with their seconds; no effect without any."""
         if stages:
             self.estimate = ProgressEstimate(stages, self._clock)
             self.emit({"type": "plan", "stages": [*map(list, stages)], "seconds": sum(s for _, s in stages)})
 
     @contextmanager
     def beating(self, every_s: float = BEAT_S) -> Iterator[None]:
-        """Meanwhile a thread tells a stage's time where the stage itself has told nothing for `every_s`."""
+        """Context in which a thread reports a stage's time if it has reported nothing for `every_s`."""
         ended = threading.Event()
 
         def beat() -> None:
@@ -87,7 +87,7 @@ class Progress:
     def stage(self, name: str, expected_s: float | None = None) -> Iterator[None]:
         """Time the body as stage `name`; `expected_s` gives a time left until the first `update`.
 
-        Stages do not nest. One that is left by an exception keeps its seconds and is not told as ended.
+        Stages do not nest. One that is left by an exception keeps its seconds and is not reported as ended.
         """
         if self._stage:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
@@ -105,14 +105,14 @@ class Progress:
                 self._stage = self._made = ""
 
     def made(self, size: str) -> None:
-        """Say how large what the present stage makes is, "6210 nodes" say; told with its end."""
+        """Set the size of the present stage's result, such as "6210 nodes", reported at its end."""
         self._made = size
 
     def update(self, fraction: float, detail: str = "") -> None:
-        """Tell that `fraction` (0..1) of the present stage is done; outside a stage, nothing is told.
+        """Report that `fraction` (0..1) of the present stage is done; outside a stage, no effect.
 
-        One that is less than before counts as before: what was done stays done. detail: a few words on what
-        was just done, a load step and its residual, say.
+        The fraction never decreases. detail: a few words on the last step, such as a load step and its
+        residual.
         """
         with self._one_at_a_time:
             if self._stage:
@@ -121,17 +121,17 @@ class Progress:
                 self._emit_progress("run", self._fraction, detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
-        """Tell something the user should know that does not end the run."""
+        """Report something that the user should know and that does not end the run."""
         self.emit({"type": "warning", "what": what, "where": where, "what_to_do": what_to_do})
 
     def result(self, found: Mapping[str, Any]) -> None:
-        """Tell what the run found: the terminal message of a run that succeeded."""
+        """Report the run's results: the terminal message of a run that succeeded."""
         self.emit({**found, "type": "result"})
 
     def error(self, error: MuError) -> None:
-        """Tell what ended the run: the terminal message of a run that did not succeed.
+        """Report the error that ended the run: the terminal message of a run that did not succeed.
 
-        A sink that fails is passed over: the others should still hear why.
+        A sink that fails is skipped: the others should still get the reason.
         """
         message = {
             "type": "error",
@@ -146,7 +146,7 @@ class Progress:
                     sink(message)
 
     def emit(self, message: Message) -> None:
-        """Hand `message` to every sink."""
+        """Send `message` to every sink."""
         with self._one_at_a_time:
             for sink in self.sinks:
                 sink(message)
@@ -177,12 +177,12 @@ class Progress:
 
 
 def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> Sink:
-    """A sink for people: one live line a stage on a tty, else plain lines at start, end and every 5 s."""
+    """A sink for terminals: one live line a stage on a tty, else plain lines at start, end and every 5 s."""
     return _LiveLine(stream, clock) if stream.isatty() else _PlainLines(stream, clock)
 
 
 def outcome(sink: Sink) -> Sink:
-    """Hands `sink` how the run ended, result or error, and nothing of its way there."""
+    """Pass only the outcome of the run, result or error, to `sink`."""
 
     def passed(message: Message) -> None:
         if message["type"] in ("result", "error"):
@@ -212,7 +212,7 @@ def _spelt(character: str) -> str:
 
 
 def _json_line(message: Mapping[str, Any]) -> str:
-    """A message as one line of JSON; what a terminal would obey and what is no text as JSON's own escapes."""
+    """A message as one line of JSON; control characters and invalid text as JSON's own escapes."""
     line = json.dumps(plain(message), ensure_ascii=False)
     if line.isprintable():
         return line + "\n"
@@ -220,7 +220,7 @@ def _json_line(message: Mapping[str, Any]) -> str:
 
 
 class _Lines:
-    """What both terminal sinks say in the same words."""
+    """Wording shared by both terminal sinks."""
 
     def __init__(self, stream: TextIO, clock: Clock) -> None:
         self.stream = stream
@@ -251,7 +251,7 @@ class _Lines:
 
 
 class _LiveLine(_Lines):
-    """One line a stage, redrawn in place at most ten times a second."""
+    """One line for each stage, redrawn in place at most ten times a second."""
 
     bar = 24
     open = False
@@ -296,7 +296,7 @@ class _PlainLines(_Lines):
 
 
 def _left(message: Message, before: str) -> str:
-    """Time left in words, of the whole run where that was planned, and why it grew; or nothing."""
+    """Time left in words, of the whole run if that was planned, and why it grew; or ""."""
     left = message.get("whole_seconds_left", message["seconds_left"])
     # Less is nothing that one could wait for, and would stand there for longer.
     if left is None or left < 1.0:
@@ -315,7 +315,7 @@ def _formatted(message: Message) -> str:
 
 
 def spell(seconds: float) -> str:
-    """`seconds` as a person would say it: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min"."""
+    """Format `seconds` as "0.4 s", "12 s", "3 min 05 s" or "2 h 10 min"."""
     if seconds < 9.95:
         return f"{seconds:.1f} s"
     whole = round(seconds)
@@ -343,7 +343,7 @@ def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) ->
 
 
 def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
-    """A sink that adds to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
+    """A sink that appends to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
 
     Raises OutputError where the file cannot be written, at once and later.
     """

@@ -1,4 +1,4 @@
-"""How far a run is as a whole, and how long it still takes: from a plan of its stages and what it says."""
+"""Progress and remaining time of a whole run, from a plan of its stages and its messages."""
 
 from __future__ import annotations
 
@@ -7,25 +7,26 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 Plan = Sequence[tuple[str, float]]
-"""Stages of a run in order, with the seconds that each is expected to take."""
+"""Stages of a run in order, with the expected seconds of each."""
 LONGER = 1.2
-"""By what factor an estimate has to grow before it is told, with the reason; else the old one counts on."""
+"""Factor by which an estimate must grow before it is reported, with the reason; else the old one counts down.
+"""
 SLACK_S = 5.0
 MOST_BY_CLOCK = 0.95
-"""How much of a stage is taken for done by the clock alone: it has not ended."""
+"""Largest share of a stage taken as done by the clock alone, as it has not ended."""
 SURE = 0.1
-"""Share of a stage, or of all, from which on it alone tells of the rest: first steps may be far slower."""
+"""Share of a stage, or of all, from which it alone determines the rest: first steps may be far slower."""
 OVERDUE = 0.2
-"""Share of its time that a stage beyond its plan is taken to need still: nothing says that it ends now."""
+"""Remaining share of its time assumed for a stage beyond its plan, as nothing says that it ends now."""
 UNPLANNED_S = 20.0
-"""Seconds that a stage which no plan has is taken for."""
+"""Seconds assumed for a stage that no plan has."""
 
 
 def own_left(elapsed: float, since: float, fraction: float | None, expected: float | None) -> float | None:
-    """Seconds left of a stage, by the share done where it is known, else by what was expected; None without.
+    """Seconds left of a stage, by the share done if known, else by its plan; None without either.
 
-    since: seconds since the share was known, from when on it counts down. What is overdue by a share takes a
-    fifth of its time still, since nothing says that it ends now; by what was expected nothing is known then.
+    since: seconds since the share was known, from which it counts down. A stage overdue by its share is
+    assumed to take a fifth of its time still; one overdue by its plan has no known end.
     """
     if fraction:
         rest = (1.0 - fraction) / fraction
@@ -34,11 +35,11 @@ def own_left(elapsed: float, since: float, fraction: float | None, expected: flo
 
 
 class ProgressEstimate:
-    """The whole of a run as it goes on; `tell` it each progress message.
+    """Progress of the whole run; `tell` it each progress message.
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
-    why: why the time left grew, for as long as it is more than before, or nothing. Without a plan there are
-    only the stages so far, and no time left but the present stage's.
+    why: why the time left grew, while it is more than before, or "". Without a plan there are only the stages
+    so far, and only the present stage's time left.
     """
 
     def __init__(self, plan: Plan = (), clock: Callable[[], float] = time.monotonic) -> None:
@@ -63,16 +64,16 @@ class ProgressEstimate:
 
     @property
     def count(self) -> int:
-        """Number of stages, 0 where nobody planned them."""
+        """Number of stages, 0 without a plan."""
         return len(self._expected) if self._planned else 0
 
     @property
     def seconds_left(self) -> float | None:
-        """Seconds until the end, counted down since the last message; None where that is not known."""
+        """Seconds until the end, counted down since the last message; None if unknown."""
         return None if self._left is None else max(self._left - (self._clock() - self._at), 0.0)
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        """Take in a progress message, see `progress`."""
+        """Process a progress message, see `progress`."""
         stage, share = str(message.get("stage", "")), message.get("fraction")
         whole, _, _ = stage.rpartition(": ")
         if stage not in self._expected and whole in self._expected:
@@ -108,10 +109,9 @@ class ProgressEstimate:
         self._estimate(added)
 
     def _tell_part(self, stage: str, left: float) -> None:
-        """Take in that a planned stage goes on which tells parts of its own: "wall 0.9: Model A".
+        """Process a message of a planned stage's part: "wall 0.9: Model A".
 
-        Which parts there are is known to nobody before: what is done of it is by the clock. left: of its
-        present part, in s.
+        Its parts are not known before, so its share goes by the clock. left: of its present part, in s.
         """
         now = self._clock()
         if stage != self._stage:
@@ -124,7 +124,7 @@ class ProgressEstimate:
         self._estimate("")
 
     def _add(self, stage: str) -> None:
-        """Put a stage that was not planned after the present one."""
+        """Insert an unplanned stage after the present one."""
         items = list(self._expected.items())
         items.insert(self.number, (stage, UNPLANNED_S))
         self._expected = dict(items)
@@ -147,9 +147,9 @@ class ProgressEstimate:
             self._set_left(own, "")
 
     def _pace(self) -> float:
-        """By what factor finished stages took longer than expected, within what one can believe.
+        """Ratio of finished stages' time to the plan, within plausible bounds.
 
-        Four seconds say little of ten minutes: less than SURE of the whole counts by its share of that.
+        Four seconds say little of ten minutes: less than SURE of the whole is weighted by its share of that.
         """
         expected = sum(self._expected[name] for name in self._taken)
         if expected <= 1.0:
@@ -159,7 +159,7 @@ class ProgressEstimate:
         return 1.0 + weight * (factor - 1.0)
 
     def _set_left(self, left: float, added: str) -> None:
-        """The time left: it shrinks, or grows by so much that the reason is told."""
+        """Set the time left: it shrinks, or grows by so much that the reason is reported."""
         shown = self.seconds_left
         if shown is not None and left > shown:
             if left <= LONGER * shown + SLACK_S:
@@ -172,6 +172,6 @@ class ProgressEstimate:
         self._left, self._at = left, self._clock()
 
     def _forget_reason(self, left: float) -> None:
-        """Forget why the time left grew once it is about what it was before."""
+        """Clear the reason why the time left grew once it is about what it was before."""
         if left <= LONGER * self._grown_from + SLACK_S:
             self.why = ""

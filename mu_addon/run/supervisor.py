@@ -1,9 +1,9 @@
-"""Work in a forked process that this one watches, so that no crash ends a command without a word.
+"""Work in a forked process that this one watches, so that a crash never ends a command without a message.
 
-A native library (CHOLMOD, BLAS, gmsh, Manifold, Warp) that is refused memory or has a fault ends its process
-by a signal, and no Python in it runs again. So whoever must have the last word is another process, that
-loads nothing and waits. The two are one to the outside: Ctrl-C, SIGTERM and Ctrl-Z reach the worker once,
-the worker's exit status is handed on, and neither outlives the other's `kill -9`.
+A native library (CHOLMOD, BLAS, gmsh, Manifold, Warp) without memory or with a fault ends its process by a
+signal, and no Python in it runs again. So another process, which loads nothing and waits, reports the end.
+Both act as one: Ctrl-C, SIGTERM and Ctrl-Z reach the worker once, its exit status is passed on, and neither
+survives the other's `kill -9`.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from typing import Any, NamedTuple
 from .processes import end_with_input
 
 CRASHED = 71
-"""Exit status of a command whose process was ended by a signal, or by a library without a word."""
+"""Exit status of a command whose process was ended by a signal, or by a library without a message."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 TERMINATED = 143
 """Exit status after SIGTERM."""
 GRACE_S = {signal.SIGTERM: 1.0, signal.SIGINT: 2.5}
-"""Seconds that a worker asked to stop has to write what it found: whoever cancels is answered in two, whoever
-presses Ctrl-C in five. A library may hold the interpreter for longer, and a report takes longer."""
+"""Seconds that a worker asked to stop has to save its results: it answers a cancel in two, Ctrl-C in five. A
+library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _watcher: list[int] = []
 _stack_to: list[int] = []
-"""Where a worker that crashes writes Python's stack: the end of the pipe to who watches."""
+"""File descriptor for Python's stack of a crashing worker: the end of the pipe to its watcher."""
 
 
 class Crash(NamedTuple):
-    """A worker that ended without having said its exit status.
+    """A worker that ended without reporting its exit status.
 
-    signal: its number, or 0 for a library that ended the process by itself, with exit status `status`.
-    memory_MB: the most that the process held. stack: Python's, where it crashed, or nothing. asked: the
-    signal that asked it to stop, SIGINT or SIGTERM, whose end is no crash, else 0.
+    signal: its number, or 0 for a library that ended the process itself, with exit status `status`.
+    memory_MB: peak of the process. stack: Python's, at the crash, or "". asked: the signal that asked it to
+    stop, SIGINT or SIGTERM, whose end is no crash, else 0.
     """
 
     signal: int
@@ -52,12 +52,11 @@ class Crash(NamedTuple):
 def supervised(
     work: Callable[[], int], tell: Callable[[Crash], object], ends_with_input: bool = False
 ) -> int:
-    """Exit status of `work`, done in a fork of this process; `CRASHED` where it did not live to give one.
+    """Run `work` in a fork of this process; return its exit status, or `CRASHED` if it gave none.
 
     A worker that does not end within `GRACE_S` of Ctrl-C or SIGTERM is killed: status 128 + that signal.
-    tell: called in this process, after an end of which the worker said nothing. ends_with_input: end both
-    once standard input ends. Without fork (Windows), or where the system refuses one, `work` is done in
-    this process.
+    tell: called in this process, after an unreported end. ends_with_input: end both once standard input
+    closes. Without fork (Windows), or if the system refuses one, `work` runs in this process.
     """
     if not hasattr(os, "fork"):
         return _alone(work, ends_with_input)
@@ -112,7 +111,7 @@ def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
 
 
 def _report_status(work: Callable[[], int], status_write: int) -> int:
-    """Do the work and give its exit status to who watches, before libraries are unloaded, which may crash."""
+    """Run the work and report its exit status to the watcher, before libraries unload and may crash."""
     status = 1
     try:
         status = work()
@@ -125,7 +124,7 @@ def _report_status(work: Callable[[], int], status_write: int) -> int:
 
 
 def _outcome(report: bytes, ended: int, usage: Any, asked: int, tell: Callable[[Crash], object]) -> int:
-    """What a worker said, else that it crashed."""
+    """Exit status reported by a worker, else that of a crash."""
     if report.startswith(b"status "):
         return int(report.split()[1])
     if ended == INTERRUPTED:
@@ -156,7 +155,7 @@ def watcher() -> int:
 
 
 def write_stack_at_crash() -> None:
-    """Have this process, if it is a worker, write Python's stack where it crashes.
+    """Let this process, if it is a worker, write Python's stack when it crashes.
 
     To be called again after a library that takes over the signals of crashes, as gmsh does.
     """
@@ -169,11 +168,11 @@ def write_stack_at_crash() -> None:
 
 
 def _end_with(group_alive: int, alive: int) -> None:
-    """Kill this process once the other end of a pipe is closed, as it is when its holder ends.
+    """Kill this process once the other end of a pipe is closed, as when its holder ends.
 
-    Processes of its own, its group, are ended with it: one that it was just starting would otherwise find
-    half of what it should do, and show a stack of Python's. They get SIGTERM, which the process that removes
-    shared resources after the others' end ignores.
+    Its process group is ended with it: a process that it was just starting would otherwise find half of its
+    input, and show a stack of Python's. They get SIGTERM, which the process that removes shared resources
+    after the others' end ignores.
     """
     threading.Thread(target=_wait_for_end, args=(alive,), daemon=True).start()
     if sys.platform == "linux":
@@ -184,7 +183,7 @@ def _end_with(group_alive: int, alive: int) -> None:
 
 
 def _signal_at_end(pipe: int, to: int, number: int) -> None:
-    """Have the kernel send a signal to a process, or to a group by its negative, when a pipe's end closes."""
+    """Let the kernel send a signal to a process, or to a group by its negative, when a pipe's end closes."""
     import fcntl
 
     fcntl.fcntl(pipe, fcntl.F_SETOWN, to)
@@ -199,10 +198,10 @@ def _wait_for_end(alive: int) -> None:
 
 
 def _pass_on_signals(worker: int, asked: list[int]) -> dict[int, Any]:
-    """Hand what asks this process to stop on to the worker; returns the handlers that were there before.
+    """Pass signals that ask this process to stop on to the worker; return the former handlers.
 
-    asked: gets the first signal to stop when it comes, from when on the worker has `GRACE_S` left; a second
-    one leaves it no more than SIGTERM does.
+    asked: gets the first signal to stop, from which the worker has `GRACE_S` left; a second one leaves it no
+    more than SIGTERM does.
     """
 
     def stop(number: int, frame: Any) -> None:

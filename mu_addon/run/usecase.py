@@ -1,4 +1,4 @@
-"""What every kind of run has in common: inputs as files in a folder, work, a report and a summary."""
+"""Interface of every kind of run: inputs as files in a folder, work, a report and a summary."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class UseCase(Generic[Job]):
     """One kind of run. Its job is a frozen class whose `texts()` gives the files of inputs by name.
 
     name: of its command. read: the job that a folder's inputs describe; raises InputError. run: does the job
-    in its folder, fills `context.summary` and sets `context.report`; what it returns is what was found.
-    console_summary: a run's summary in a few lines of text. begin: makes a folder the run's, where that takes
-    more than `folder.begin`. plan: stages that a job is expected to have, with their seconds on two cores.
+    in its folder, fills `context.summary`, sets `context.report` and returns the result. console_summary: a
+    run's summary in a few lines of text. begin: makes a folder the run's, where that takes more than
+    `folder.begin`. plan: expected stages of a job, with their seconds on two cores.
     """
 
     name: str
@@ -35,7 +35,7 @@ class UseCase(Generic[Job]):
     plan: Callable[[Job], Plan] = lambda job: ()
 
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
-        """Run a job in a folder and leave its report, also where it stops early; returns what was found.
+        """Run a job in a folder and write its report, also if it stops early; return the result.
 
         Raises InputError, also for a folder of another kind of run or one in use, OutputError, MuError where
         the process may take up too little memory, and what the job itself raises.

@@ -1,4 +1,4 @@
-"""Versions of this program and of what it computes with, for reports and for telling what may be compared."""
+"""Versions of this program and the packages it computes with, for reports and comparisons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every byte of a serial line counted once, by what became of it; those that gave no sample are kept.
+"""Accounts of a serial line's bytes: each is counted once by its outcome; those without a sample are kept.
 
 bytes = read_bytes + rejected_bytes + cut_bytes + overlong + buffered. Read: lines and frames with a sample.
 Rejected: those that could not be read. Cut: by the start, a pulled cable or the end. Overlong: stretches that
@@ -28,9 +28,9 @@ class Counters:
     bytes: int = 0
     samples: int = 0
     lost: int = 0
-    """Samples that gaps in the running number say are missing."""
+    """Samples missing by gaps in the running number."""
     repeated: int = 0
-    """Samples that came again, the same in number, clock and values, and were left out."""
+    """Samples repeated, equal in number, clock and values, which were left out."""
     misnumbered: int = 0
     """Samples whose running number or clock fits neither before nor after; kept, and counted on."""
     incomplete: int = 0

@@ -176,7 +176,7 @@ def calibrate(sweeps: Sequence[CalibrationSweep], channel: str, dark: str | floa
 
 
 def _best(sweeps: Sequence[CalibrationSweep], drift: float) -> tuple[float, int, list[Array]]:
-    """Mean square in left-out sweeps, the number of intervals that makes it least, and what is left."""
+    """Mean square in left-out sweeps, the number of intervals that makes it least, and the residuals."""
     tried = [(m, _left_out(sweeps, m, drift)) for m in _INTERVALS if m == 1 or _determined(sweeps, m)]
     squares = [float(np.mean(np.concatenate(off) ** 2)) for _, off in tried]
     best = int(np.argmin(squares))
@@ -252,7 +252,7 @@ def _within(sweep: CalibrationSweep, knots: Array) -> Array:
 
 
 def _drift(sweeps: Sequence[CalibrationSweep]) -> float:
-    """The drift an hour that leaves least, with a spline of medium size."""
+    """The drift an hour with the least residual, with a spline of medium size."""
     knots = _knots(sweeps, 4)
     hours = max(max(float(np.abs(s.time_s).max()) for s in sweeps) / 3600, 1e-6)
     most = min(_MOST_DRIFT_PER_H, 0.5 / hours)
@@ -286,7 +286,7 @@ def _left_out(sweeps: Sequence[CalibrationSweep], intervals: int, drift: float) 
 
 
 def _band(off: Sequence[Array]) -> float:
-    """Half width in V that holds 95 % of a new sweep's readings, of what left-out sweeps are off (n_k,) each.
+    """Half width in V that holds 95 % of a new sweep's readings, from left-out sweeps' errors (n_k,) each.
 
     A sweep is off as a whole, with variance B known from few sweeps, and within, with variance E known from
     many readings; Satterthwaite's degrees of freedom weigh the two.

@@ -1,4 +1,4 @@
-"""Names of channels in labels and JSON: which to believe, where a name may have been damaged on its way."""
+"""Names of channels in labels and JSON: which to trust where a name may have been damaged in transfer."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ChannelNames:
         return len(lines) < SURE and any(2 * times <= max(names.values()) for times in names.values())
 
     def learn(self, lines: Sequence[Pairs], layout: Layout | None) -> Layout | None:
-        """The layout that most lines agree on, lest a damaged one that comes first should set it.
+        """Learn the layout that most lines agree on, so that a damaged first line does not set it.
 
         layout: the present one, which stays if there is one.
         """
@@ -53,7 +53,7 @@ class ChannelNames:
         return layout
 
     def trust(self) -> None:
-        """Doubt no name."""
+        """Trust every name."""
         self._doubtful = set()
 
     def strange(self, names: list[str], layout: Layout | None, number: int) -> tuple[set[str], Layout | None]:

@@ -1,4 +1,4 @@
-"""Clocks: a counter that wraps made endless, and a device's time told in the host's."""
+"""Clocks: counters unwrapped, and a device's time converted to the host's."""
 
 from __future__ import annotations
 
@@ -74,5 +74,5 @@ class HostTime:
         return device_s + self._offset + self._slope * (device_s - self._origin)
 
     def restart(self) -> None:
-        """Forget all arrivals: the device's clock was set back."""
+        """Drop all arrivals: the device's clock was set back."""
         self._least.clear()

@@ -37,7 +37,7 @@ class CsvColumns:
     def take(self, line: str, piece: bytes, first: bool) -> Pairs | None:
         """Values by column of a line that is a row, nothing of a header, or None of one that is neither.
 
-        piece: the line as it came. first: whether the line may lack its beginning, and is no row.
+        piece: the line as it came. first: the line may lack its beginning, and is no row.
         """
         row = row_of(line)
         if row is None:

@@ -99,12 +99,12 @@ class Decoder:
 
     @property
     def complaint(self) -> tuple[str, str] | None:
-        """Fault of input of which almost nothing can be read, and what to do; else None."""
+        """Fault of input that is almost entirely unreadable, and what to do; else None."""
         return None if self.format is not None else self._accounts.complaint(bytes(self._buffer))
 
     @property
     def why_no_sample(self) -> tuple[str, str] | None:
-        """As `complaint`, however little came, where nothing could be read by the end; else None."""
+        """Return `complaint`, however little input came, if nothing could be read by the end; else None."""
         return None if self.counters.samples else self._accounts.complaint(bytes(self._buffer), 1)
 
     # The buffer.
@@ -135,7 +135,7 @@ class Decoder:
         self._first = not end
 
     def _trim(self, most: int) -> None:
-        """No line or frame is that long: it may be another format's."""
+        """Drop part of a buffer longer than any line or frame: it may be of another format."""
         if len(self._buffer) > most:
             self._drop(len(self._buffer) - most // 2)
             self._first = True
@@ -257,7 +257,7 @@ class Decoder:
             self._number(row._replace(values=[self.layout.per_count * count for count in row.values]))
 
     def _take_info(self, info: dict[str, Any] | None) -> bool:
-        """Take the layout that an INFO tells; False if it makes no sense."""
+        """Take the layout from an INFO; False if it is invalid."""
         if info is None:
             return False
         names, factor = info.get("channels"), info.get("unit_per_count", 1.0)
@@ -292,7 +292,7 @@ class Decoder:
         self._trim(_LONGEST_LINE)
 
     def _take_line(self, line: str, piece: bytes, first: bool) -> bool:
-        """Read a line of the present format; False if it is none."""
+        """Read a line of the present format; False if it is not one."""
         if self.format == "csv":
             return self._take_csv(line, piece, first)
         found = None if first else json_of(line) if self.format == "json" else pairs_of(line)
@@ -335,7 +335,7 @@ class Decoder:
         return pairs is not None
 
     def _take_pairs(self, found: Pairs, piece: bytes) -> None:
-        """A sample of the present layout, with its number and clock told from its values."""
+        """A sample of the present layout, with number and clock separated from its values."""
         pairs = dict(found)
         number = next((pairs.pop(name) for name in NUMBERS if name in pairs), None)
         ticks, numbering = None, self._timeline.numbering

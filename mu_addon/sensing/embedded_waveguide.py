@@ -44,10 +44,10 @@ class WaveguideShape:
 
 @attrs.frozen(eq=False)
 class EmbeddedWaveguide:
-    """A printed waveguide at rest, and which lattice nodes carry it.
+    """A printed waveguide at rest, and the lattice nodes that carry it.
 
-    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, and before
-    and after them the end faces; s (m,): lengths in mm along the axis; joint (m,): number of the node that
+    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, and before and
+    after them the end faces; s (m,): lengths in mm along the axis; joint (m,): number of the node that
     carries each point; normals (m - 1, 3): of the face with the wells, a piece of the axis.
     """
 

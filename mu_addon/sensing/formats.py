@@ -9,9 +9,9 @@ from .framing import END, payload_of
 from .lines import Pairs, json_of, pairs_of, row_of
 
 ENOUGH = 3
-"""So many pieces or names make a format, a header or a channel believed."""
+"""Number of pieces or names from which a format, a header or a channel is trusted."""
 SURE = 8
-"""Of so many first lines what most of them lack is rare or damaged; of fewer it may be what is right."""
+"""Number of first lines from which anything that most of them lack is rare or damaged."""
 # The format is told by the latest lines: what a device says while it starts is soon past.
 _LATEST_LINES = 20
 
@@ -29,8 +29,7 @@ _COLOUR_CODES = re.compile(rb"\x1b\[[0-9;:]*m")
 def format_of(data: bytes, whole: bool, enough: int, last: str | None) -> str | None:
     """One of FORMATS, or None where too few pieces, less than `enough`, can be read as any.
 
-    whole: whether the first piece is known to begin where one begins. last: the format before; it needs less
-    to be believed again.
+    whole: the first piece is known to be complete. last: the format before, which needs less evidence.
     """
     frames = [p for p in data.split(END)[0 if whole else 1 : -1] if p]
     framed = sum(payload_of(p) is not None for p in frames)

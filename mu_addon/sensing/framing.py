@@ -89,7 +89,7 @@ def sample_frame(sequence: int, time_us: int, counts: Sequence[int]) -> bytes:
 
 
 def info_frame(info: dict[str, Any]) -> bytes:
-    """The frame of an INFO: what the device says of itself, as JSON."""
+    """The frame of an INFO: the device's description of itself, as JSON."""
     return framed(bytes([INFO]) + json.dumps(info, separators=(",", ":")).encode())
 
 

@@ -40,10 +40,11 @@ _STRETCH = (0.96, 1.06)
 _SMALLEST_KINK = 0.1
 
 MISFIT = 0.05
-"""What the law misses of a guide's log(light) beyond the noise of its trace: 200 traces of 40 000 rays."""
+"""Error of the law in a guide's log(light) beyond the noise of its trace: 200 traces of 40 000 rays."""
 
 CHANGE_MISFIT = 0.45
-"""What it misses of a change of log(light), as a share: three paths of mu-1.0x, five states, 100 000 rays."""
+"""Error of the law in a change of log(light), as a share: three paths of mu-1.0x, five states, 100 000 rays.
+"""
 
 
 def traced(shape: WaveguideShape, line: Centreline, optics: Optics, rays: int = RAYS, seed: int = 0) -> Light:

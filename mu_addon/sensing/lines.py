@@ -1,8 +1,8 @@
 """Text on a serial line: `label:value` pairs, CSV, or JSON, a line at a time.
 
 A value may have its unit behind it, and volts with a prefix are converted; a label's value that is a word is
-left out. A value's name may say that it is the device's clock or its running number (see CLOCKS and
-NUMBERS); everything else is a channel.
+left out. A value's name may mark it as the device's clock or its running number (see CLOCKS and NUMBERS);
+everything else is a channel.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _value(number: str, unit: str | None) -> float:
 
 
 def why_unread(line: str) -> str:
-    """What of a line is neither pairs, CSV nor JSON, in words."""
+    """Why a line is neither pairs, CSV nor JSON, in words."""
     if not any(character.isdigit() for character in line):
         return "it holds no number"
     if line.startswith("{"):

@@ -1,4 +1,4 @@
-"""Kinks of a bent and stretched bar at its wells, where it is weaker and its middle is off its axis.
+"""Kinks of a bent and stretched bar at its wells, where it is weaker and its centroid is off its axis.
 
 Each section carries the same force N and moment M about the bar's axis: with the area A, its second moment I
 and its centroid's distance c from the bar's axis, N = E A (e + c k) and M = E (A c e + (I + A c^2) k) for the

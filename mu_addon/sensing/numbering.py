@@ -1,4 +1,4 @@
-"""Running numbers and device clocks made endless: gaps, repeats, wraps, resets and glitches told apart.
+"""Running numbers and device clocks unwrapped: gaps, repeats, wraps, resets and glitches distinguished.
 
 A number that goes on by one is taken at once. Any other is judged with the next sample's: after a gap, a wrap
 or a restart the count goes on from there, after a glitch it does not. The only sample left out is one equal
@@ -32,7 +32,7 @@ class Row(NamedTuple):
 class Numbered(NamedTuple):
     """A sample with its running number and device time in s (or nan), both without wraps.
 
-    clock_restarted: whether the device's clock began anew at this sample.
+    clock_restarted: True if the device's clock began anew at this sample.
     """
 
     row: Row
@@ -86,7 +86,7 @@ class Numbering:
         self._recent: deque[tuple[float | None, float | None, list[float]]] = deque(maxlen=_RECENT)
 
     def take(self, row: Row) -> list[Numbered]:
-        """The samples that are settled by this one: none, itself, or one that was held back too."""
+        """Take a sample; return the settled ones: none, itself, or also one that was held back."""
         settled = []
         if self._repeat(row):
             self._repeats += 1
@@ -108,7 +108,7 @@ class Numbering:
         return [] if held is None else [self._settle(held, None)]
 
     def forget(self) -> list[Numbered]:
-        """Settle the sample that was held back and forget numbers and clock: another format begins."""
+        """Settle the sample that was held back and reset numbers and clock: another format begins."""
         settled = self.finish()
         self.numbers, self.clock = UnwrappedCounter(None), UnwrappedCounter(None)
         self._odd = 0
@@ -184,7 +184,7 @@ class Numbering:
         return _GLITCH
 
     def _wrapped(self, row: Row) -> int | None:
-        """The count after which the device's number began again at this row, if it looks like that."""
+        """Count at which the device's number wrapped at this row, if it seems so."""
         last, number = self.numbers.last, row.number
         if last is None or number is None or number < 0 or self.numbers.modulus is not None:
             return None
@@ -222,7 +222,7 @@ class Numbering:
 
 
 def _clock_judged(later: float, after: float | None) -> str:
-    """As for numbers: a clock that is set back or leaps, and the next reading."""
+    """Judge a clock that is set back or leaps, as a number, by the next reading."""
     if later >= 0:
         return _ON if after is None or after >= later else _GLITCH
     return _RUN if after is not None and later <= after < 0 else _GLITCH

@@ -1,4 +1,4 @@
-"""Recordings of a sensor: CSV that any program reads, written so that a crash loses next to nothing.
+"""Recordings of a sensor: CSV that any program reads, written so that a crash loses at most a second.
 
 A recording is a folder:
 

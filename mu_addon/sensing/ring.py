@@ -1,4 +1,4 @@
-"""The latest samples in a file that one process writes and others look into; none waits for another."""
+"""The latest samples in a file that one process writes and others read; none waits for another."""
 
 from __future__ import annotations
 

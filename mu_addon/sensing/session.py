@@ -1,6 +1,6 @@
-"""One session with a sensor: read, record, then show; cut lines are waited for, ports given back on request.
+"""One session with a sensor: read, record, then show; reconnects after a loss, releases ports on request.
 
-A thread does nothing but read the port, so that neither the disk nor whoever looks on can hold up the line.
+A thread only reads the port, so that neither the disk nor a display can delay it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
 
 STATUS = "status.json"
 SWEEP = "sweep"
-"""Mark with which a guided sweep begins: what was marked before it in a recording no longer counts."""
+"""Mark of the start of a guided sweep: earlier marks in a recording no longer count."""
 LOSSES = {
     "lost": "lost",
     "crc_errors": "wrong CRC",
@@ -46,7 +46,7 @@ LOSSES = {
     "restarts": "restarts",
     "reconnects": "reconnects",
 }
-"""Counters of a session's status that tell of what did not come whole, and what they are called."""
+"""Counters of losses in a session's status, with their names."""
 _STATUS_S = 0.2
 _BACK_OFF_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
@@ -121,7 +121,7 @@ def run_session(
 
 
 class _Clock:
-    """Seconds since the epoch that never run backward, whatever is done to the computer's clock."""
+    """Seconds since the epoch that never run backward, independent of changes of the computer's clock."""
 
     def __init__(self) -> None:
         self.start = time.time()
@@ -132,7 +132,7 @@ class _Clock:
 
 
 def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, clock: _Clock) -> None:
-    """The reading thread: hands over what comes, and opens the line again whenever it is gone."""
+    """The reading thread: passes on bytes, and opens the line again when it is lost."""
     connected, tries = False, 0
     try:
         while not control.stop.is_set():
@@ -174,7 +174,7 @@ class _Failure(_Piece):
 
 
 def _take(pieces: queue.SimpleQueue[_Piece], view: _View, clock: _Clock) -> bool:
-    """Decode, record and show what has come, waiting a little; False at the end."""
+    """Decode, record and show new bytes, waiting a little; False at the end."""
     try:
         piece = pieces.get(timeout=0.05)
     except queue.Empty:
@@ -223,7 +223,7 @@ class _View:
         self._rate: list[tuple[float, int]] = []
 
     def take(self, groups: list[Samples], at: float) -> None:
-        """Record what was read of bytes that came at host time `at`, and keep what could not be."""
+        """Record the samples in bytes that came at host time `at`, and keep unreadable ones."""
         if self.decoder.format != self._format:
             self._format = self.decoder.format
             self.event("format", at, detail=self._format)
@@ -268,7 +268,7 @@ class _View:
         self._last_status_s = -np.inf
 
     def tick(self, now: float) -> None:
-        """Index once a second, status five times; called often."""
+        """Write the index once a second, status five times; called often."""
         self.recorder.tick(now - self.start, attrs.asdict(self.decoder.counters))
         if now - self._last_status_s >= _STATUS_S:
             self._last_status_s = now
@@ -300,7 +300,7 @@ class _View:
         }
 
     def end(self, now: float) -> dict[str, Any]:
-        """The last status, with everything on disk."""
+        """Write the last status, with everything on disk."""
         self.state = "ended"
         self.recorder.tick(np.inf, attrs.asdict(self.decoder.counters))
         status = {**self.status(now), "live": "", "complaint": list(self.decoder.why_no_sample or ())}

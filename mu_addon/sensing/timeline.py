@@ -17,7 +17,7 @@ _TICK_S = 1e-6
 
 
 class Timeline:
-    """Rows of values as they come, to groups of samples; what it leaves out is told to the accounts."""
+    """Rows of values in order of arrival, to groups of samples; rows left out go to the accounts."""
 
     def __init__(self, accounts: Accounts) -> None:
         self.numbering = Numbering()
@@ -33,11 +33,11 @@ class Timeline:
         self._settle(self.numbering.take(row))
 
     def finish(self) -> None:
-        """Settle rows whose number is in doubt: no more will come."""
+        """Settle rows whose number is in doubt, at the end of input."""
         self._settle(self.numbering.finish())
 
     def restart(self) -> None:
-        """Begin anew with numbers and clock: another format has others."""
+        """Restart numbers and clock, for another format."""
         self._settle(self.numbering.forget())
         self._host.restart()
 
@@ -63,7 +63,7 @@ class Timeline:
         return [self._timed(layout, rows) for layout, rows in groups]
 
     def _timed(self, layout: Layout, rows: list[Numbered]) -> Samples:
-        """Numbered samples with the device's clock told in the host's."""
+        """Numbered samples with the device's clock converted to the host's."""
         self._accounts.counters.samples += len(rows)
         if any(numbered.clock_restarted for numbered in rows):
             self._host.restart()

@@ -339,7 +339,7 @@ def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Findin
 
 
 def _facets_mm(unit: Unit | None, printer: Printer) -> float:
-    """By how much in mm facets may make a unit's wall thinner than drawn; 0 where it is drawn too thin.
+    """Length in mm by which facets may make a unit's wall thinner than drawn; 0 where it is drawn too thin.
 
     Of 64 facets around, the least that a solid has, the middle of one is 0.0012 of the radius inside its
     edges; facets along the profile add to it.

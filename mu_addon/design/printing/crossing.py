@@ -18,7 +18,7 @@ MOST_CROSSINGS = 20_000
 """Points at most: of triangles without order each passes through most others."""
 
 _ROUNDING = 1e-6
-"""Height (mm) above a plane that is no more than rounding, of coordinates up to a kilometre."""
+"""Height (mm) above a plane that may be rounding, for coordinates up to a kilometre."""
 _AT_ONCE = 1_000_000
 _PAIRS_AT_ONCE = 200_000
 # A box that is wider than so many cells goes into a coarser grid.
@@ -187,7 +187,7 @@ def _through(
 def _covered(
     first: NDArray[np.int64], last: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Every cell (c, 3) of boxes first..last (m, 3), and the box it is of (c,)."""
+    """Every cell (c, 3) of boxes first..last (m, 3), and the number (c,) of its box."""
     span = last - first + 1
     count = span.prod(axis=1)
     owner = np.repeat(np.arange(len(first)), count)

@@ -13,14 +13,15 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 DEEP = 6.0
-"""Distances to the surface are told apart up to so many mm."""
+"""Distances to the surface are resolved up to so many mm."""
 NARROWING = 0.55
 """A pocket is a chamber if its way out is narrower than this share of its own greatest radius."""
 MOST_OPENINGS = 12
 RUNGS = (3.0, 2.2, 1.6, 1.2, 0.9, 0.65, 0.45, 0.3)
-"""Distances in mm from the surface at which pockets may part from the outside, DEEP * NARROWING at most."""
+"""Distances in mm from the surface at which pockets may separate from the outside, at most DEEP * NARROWING.
+"""
 NEAR = 4.0
-"""How far in mm around a pocket its ways out are sought first."""
+"""Distance in mm around a pocket within which its ways out are sought first."""
 
 Box = tuple[slice, ...]
 
@@ -103,7 +104,7 @@ def distance_field(grid: VoxelRows) -> DistanceField:
     """Distances to the surface in a grid of cubes; the outermost cells count as DEEP mm from the surface.
 
     The Euclidean distance, of one axis after the other (Saito and Toriwaki, Pattern Recognition 27 (1994)
-    1551): exact up to DEEP, as far as it is asked for, and in slices that stay in the processor's cache.
+    1551): exact up to DEEP, and computed in slices that fit the processor's cache.
     """
     step = float(grid.step[0])
     reach = int(np.ceil(DEEP / step + 0.5))
@@ -254,8 +255,8 @@ def _grown(box: Box, reach: float, step: float, shape: tuple[int, ...]) -> Box:
 def _outside(here: Parts, wide: Parts, outside: int, corner: Index) -> Index:
     """A cell (k, 3) of each part in a box from `corner` that is outside.
 
-    It was outside before openings were blocked, and reaches a face of the box, as what blocking cut off
-    does not.
+    It was outside before openings were blocked, and reaches a face of the box, unlike parts cut off by
+    blocking.
     """
     first, last = here.ends()
     touches = np.zeros(here.count, bool)
@@ -391,7 +392,7 @@ def _opening(space: DistanceField, cells: Index, radius: float) -> Opening:
 
 
 def _block(squared: NDArray[np.uint16], cells: Index, radius: float, step: float) -> None:
-    """Fill what lies within `radius` mm of cells."""
+    """Fill everything within `radius` mm of cells."""
     from scipy.ndimage import distance_transform_edt
 
     pad = int(np.ceil(radius / step)) + 1

@@ -12,7 +12,7 @@ from ..surface import Triangles, Vertices
 from .finding import NOWHERE, Points
 
 MOST_SHELLS = 400
-"""Shells beyond which only the largest are looked at one by one."""
+"""Number of shells beyond which only the largest are examined one by one."""
 
 
 class Edges(NamedTuple):

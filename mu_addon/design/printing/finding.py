@@ -1,4 +1,4 @@
-"""Findings of the printability check: a value, its limit, where it shows, and how severe it is."""
+"""Findings of the printability check: a value, its limit, its locations, and its severity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Points = NDArray[np.float64]
 
 NOWHERE: Points = np.empty((0, 3))
 MOST_PLACES = 50
-"""Places kept of one finding; its `count` says how many there are."""
+"""Number of places kept of one finding; its `count` is the total."""
 
 
 @attrs.frozen(eq=False)
@@ -48,7 +48,7 @@ class Finding:
 
 
 def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach: float = 1.0) -> Points:
-    """One place (k, 3) in mm for each group of points (n, 3) in mm that lie within about `reach` mm.
+    """One place (k, 3) in mm for each group of points (n, 3) in mm within about `reach` mm of each other.
 
     It is the group's point of the greatest badness (n,), the group of the worst first; or, without badness,
     its mean, the largest group first.
@@ -75,7 +75,7 @@ def clustered(points: Points, badness: NDArray[np.float64] | None = None, reach:
 
 
 def none_of(name: str, number: int, places: Points, what: tuple[str, str], remedy: str) -> Finding:
-    """Finding on faults of which there must be none: `error` for any number of them, else `pass`.
+    """Finding on faults that must not occur: `error` for any number of them, else `pass`.
 
     places (k, 3) in mm; what: the text for one fault and for several, which follows their number.
     """

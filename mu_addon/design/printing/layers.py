@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 @attrs.frozen(eq=False)
 class Regions:
-    """Connected regions of every layer, of solid or free cells, and which overlap from layer to layer.
+    """Connected regions of every layer, of solid or free cells, and their overlaps from layer to layer.
 
     layer (r,): number of each region's layer; cells (r,): count of its cells; middle (r, 3): its mean, in
-    cells, see VoxelRows.points; outside (r,): whether it reaches the edge of the grid. links (l, 2):
-    numbers of a region and of one in the next layer above it.
+    cells, see VoxelRows.points; outside (r,): True if it reaches the edge of the grid. links (l, 2): numbers
+    of a region and of one in the next layer above it.
     """
 
     layer: NDArray[np.int64]
@@ -44,7 +44,7 @@ class Islands:
 class Cups:
     """Cups, the largest first: largest sealed volumes (n,) in mm3, and places (n, 3) in mm of their middles.
 
-    sealed (n,): whether a cup never opens. first, last (n, 3): middles in mm of the regions with which it
+    sealed (n,): True if a cup never opens. first, last (n, 3): middles in mm of the regions with which it
     begins, on the platform's side, and ends.
     """
 
@@ -59,7 +59,7 @@ class Cups:
 class Overhang:
     """Regions of layers beyond what supports them: their farthest points (n, 3) in mm.
 
-    reach (n,): distance of these points from the supported part, in mm; bridge (n,): whether a region is
+    reach (n,): distance of these points from the supported part, in mm; bridge (n,): True if a region is
     supported from opposite sides.
     """
 
@@ -71,7 +71,8 @@ class Overhang:
 def regions(grid: VoxelRows, free: bool, at_once: int = 8_000_000) -> Regions:
     """Connected regions of every layer: free cells that touch by side, or solid ones, by side or corner.
 
-    free: which of both; at_once: cells of the layers that are looked at together, to limit memory.
+    free: of free cells instead of solid ones; at_once: cells of the layers processed together, to limit
+    memory.
     """
     layers, rows, cells = grid.shape
     thick = max(1, at_once // (rows * cells))
@@ -217,7 +218,7 @@ def overhangs(grid: VoxelRows, slope_deg: float, at_once: int = 8_000_000) -> Ov
 def _reaches(
     beyond: NDArray[np.int32], held: NDArray[np.bool_], step: float, level: int
 ) -> list[tuple[float, float, float, float, bool]]:
-    """Reach, place in cells and whether it is a bridge, of each region that touches what is held."""
+    """Reach, position in cells, and True for a bridge, of each region that touches supported cells."""
     from scipy.ndimage import distance_transform_edt, find_objects
 
     found: list[tuple[float, float, float, float, bool]] = []

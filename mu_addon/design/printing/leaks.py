@@ -98,7 +98,7 @@ def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer
 
 
 def _leak_test(solid: Any, chambers: Chambers, unit: Unit, leaks: Points) -> Finding:
-    """With the inlet plugged there must be one inner shell more: exact, however small a hole is."""
+    """Finding on leaks: with the inlet plugged there must be one more inner shell, exact for any hole."""
     d = unit.dimensions
     plug = shapes.cylinder(
         d.inlet_radius + d.inlet_wall / 2.0, -1.5 * d.inlet_length, -0.5 * d.inlet_length, 32
@@ -146,7 +146,7 @@ def _in_inlet(place: Points, d: Dimensions) -> bool:
 
 
 def _blockage(solid: Any, d: Dimensions) -> Points | None:
-    """Middle of what stops the inlet's axis, or None where nothing does."""
+    """Middle of an obstruction on the inlet's axis, or None."""
     low, high = -2.0 * d.inlet_length, 0.5 * d.cell
     nudge = 1e-3 * d.inlet_radius
     hits = solid.ray_cast([nudge, 0.7 * nudge, low], [nudge, 0.7 * nudge, high])
@@ -156,7 +156,7 @@ def _blockage(solid: Any, d: Dimensions) -> Points | None:
 
 
 def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
-    """The widest free ball about a cell's width across a way: its middle (3,) and radius, by rays around."""
+    """Widest free ball about a cell's width across a way: its middle (3,) and radius, by rays around."""
     k = np.arange(200) + 0.5
     z = 1.0 - k / 100.0
     turn = np.pi * (1.0 + np.sqrt(5.0)) * k

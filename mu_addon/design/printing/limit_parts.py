@@ -31,8 +31,8 @@ class LimitPart:
     """A part with a row of features for one limit, named as in `printer.MEANING`.
 
     sizes (n,): of the features, in the limit's unit, ascending from the part's notched corner along x; of the
-    cube that is weighed, the least and the largest density that can be. best: whether the limit is the
-    smallest or the largest size that is made. how: what to find out, in words. make: the surface.
+    weighed cube, the least and the largest possible density. best: the limit is the smallest, or the largest,
+    size that is made. how: the measurement, in words. make: the surface.
     """
 
     limit: str
@@ -43,7 +43,7 @@ class LimitPart:
 
     @property
     def name(self) -> str:
-        """Its file's name, without the ending."""
+        """Name of its file, without the ending."""
         return f"limit-{self.limit.replace('_', '-')}"
 
     @property
@@ -148,7 +148,7 @@ def _free_wall(thickness: float) -> Any:
 
 
 def _strut(diameter: float, length: float) -> Any:
-    """Two rods that lean as a body-centred cell's do, from the foot to a bar above."""
+    """Two rods, inclined as in a body-centred cell, from the foot to a bar above."""
     from manifold3d import Manifold
 
     way = length / np.sqrt(3.0)
@@ -173,7 +173,7 @@ def _slotted(width: float, depth: float) -> Any:
 
 
 def _drained(diameter: float) -> Any:
-    """A pocket that a hole near its foot drains, as the inlet drains a chamber."""
+    """A pocket with a drain hole near its foot, like a chamber with its inlet."""
     side = max(_DEEP, 2 * diameter)
     block = shapes.box([0.0, 0.0, 0.0], [side + 2 * _SOLID, side + 2 * _SOLID, side + 2 * _SOLID])
     block -= shapes.box([_SOLID] * 3, [side + _SOLID] * 3)
@@ -200,7 +200,7 @@ def _ledge(length: float) -> Any:
 
 
 def _leaning(section: Any, root: float) -> Any:
-    """A section (n, 2) in mm of y and z, held out of a post's side, some way above the foot."""
+    """A section (n, 2) in mm of y and z, extruded from a post's side, some way above the foot."""
     from manifold3d import CrossSection, Manifold
 
     # Extruded along z, then turned so that it is along x.

@@ -1,4 +1,4 @@
-"""A part against the solid of the unit that it is said to be: tunnels (genus) and volume."""
+"""A part compared with its unit's solid: tunnels (genus) and volume."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ..surface import Triangles, Vertices, genus, volume
 from .finding import Finding
 
 VOLUME_TOLERANCE = 0.02
-"""Share of the volume that other facets may change; a print offset taken off the drawing changes more."""
+"""Share of the volume by which facets may differ; a print offset taken off the drawing changes more."""
 
 
 def against_nominal(

@@ -23,8 +23,8 @@ class Build:
 
     cup_ml: the largest volume sealed against the film; islands: their number; support_mm2: surface flatter
     than the printer's slope, which needs supports; inner_mm2: the part of it in chambers, where supports
-    cannot be removed; height_mm: along the direction; fits: whether the part fits the build volume, turned
-    about the direction by 0 or 90 degrees; best_among: whether the build is Pareto-optimal in these.
+    cannot be removed; height_mm: along the direction; fits: the part fits the build volume, turned about the
+    direction by 0 or 90 degrees; best_among: the build is Pareto-optimal in these.
     """
 
     direction: tuple[float, float, float]

@@ -40,7 +40,7 @@ MEANING = {
 
 @attrs.frozen
 class Limit:
-    """One limit of a printer with a resin, its source, and whether it is assumed, measured or else published.
+    """Limit of a printer with a resin, its source, and whether it is assumed, measured or published.
 
     The value's unit is the end of the limit's name in MEANING.
     """
@@ -60,7 +60,7 @@ SUPPLIED = {
     "support_mm": Limit(7.0, "a raft of 2 mm and supports of 5 mm above it; set your slicer's figures", True),
     "layer_s": Limit(15.0, "exposure, peel and settling of a soft resin; your slicer's time by layers", True),
 }
-"""For files that do not give them, as those of older versions."""
+"""Defaults for files without these limits, as those of older versions."""
 
 
 @attrs.frozen

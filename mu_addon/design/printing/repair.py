@@ -1,7 +1,7 @@
 """Repair of a triangle surface where there is only one way: doubled and flipped faces, tiny gaps.
 
-What could be meant in several ways, a larger hole, a self-intersection, an edge of three faces, is left as
-it is and named. Every change is counted and measured.
+Ambiguous faults, such as a larger hole, a self-intersection or an edge of three faces, are left and reported.
+Every change is counted and measured.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from . import faces
 from .crossing import MOST_CROSSINGS, crossings
 
 GAP_MM = 0.02
-"""Vertices of open edges that are no farther apart are one: a fifth of a layer, less than a printer makes."""
+"""Vertices of open edges this close are merged: a fifth of a layer, less than a printer resolves."""
 
 MOST_NEAR = 50_000_000
-"""Pairs of vertices of open edges within a gap's width; where there are more, in dust, no gap is closed."""
+"""Limit on pairs of vertices of open edges within a gap's width; with more, as in dust, no gap is closed."""
 
 MOST_IN_GROUP = 1000
-"""Vertices of open edges that can become one: where a gap ends there are a few."""
+"""Limit on vertices of open edges merged into one: at a gap's end there are a few."""
 
 
 @attrs.frozen
 class Change:
-    """One kind of change: what was done, and to how many."""
+    """One kind of change, and how often it was made."""
 
     what: str
     count: int
@@ -36,10 +36,10 @@ class Change:
 
 @attrs.frozen(eq=False)
 class Repair:
-    """A repaired surface, vertices (n, 3) in mm and triangles (m, 3), and what was done to it.
+    """A repaired surface, vertices (n, 3) in mm and triangles (m, 3), and its changes.
 
-    largest_move_mm: of a vertex. volume_before_mm3, volume_after_mm3: sums over the triangles, which of a
-    surface that is open or flipped are no volumes. remains: what was left since it has more than one remedy.
+    largest_move_mm: of a vertex. volume_before_mm3, volume_after_mm3: sums over the triangles, no volumes for
+    an open or flipped surface. remains: faults left since they have more than one remedy.
     """
 
     vertices: Vertices
@@ -130,7 +130,7 @@ def repaired(vertices: Vertices, triangles: Triangles, gap_mm: float = GAP_MM) -
 
 
 def _merged(vertices: Vertices, names: NDArray[np.int64]) -> tuple[Vertices, NDArray[np.int64], int]:
-    """Distinct vertices (k, 3), the number there of each one given (n,), and how many went."""
+    """Distinct vertices (k, 3), the number there of each given one (n,), and how many were merged."""
     distinct, index = np.unique(vertices, axis=0, return_inverse=True)
     return distinct, np.ravel(index)[names], len(vertices) - len(distinct)
 
@@ -141,8 +141,8 @@ def _without_flat(triangles: Triangles) -> tuple[Triangles, int]:
 
 
 def _without_doubled(triangles: Triangles) -> tuple[Triangles, int]:
-    """Triangles without those that lie on another: one of each set stays where its neighbours need one, none
-    where they close without it, all where neither closes the surface."""
+    """Triangles without doubled ones: one of each set stays where its neighbours need one, none where they
+    close without it, all where neither closes the surface."""
     key = np.sort(triangles, axis=1)
     _, group, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     group = np.ravel(group)
@@ -168,7 +168,7 @@ def _without_doubled(triangles: Triangles) -> tuple[Triangles, int]:
 def _closed_gaps(
     vertices: Vertices, triangles: Triangles, gap_mm: float
 ) -> tuple[Vertices, NDArray[np.int64], int, float]:
-    """Vertices with those of open edges within a gap merged, the new number of each, how many went, how far.
+    """Merge vertices of open edges across gaps: vertices, new number of each, number merged, largest move.
 
     A group of vertices that is wider than the gap stays: which of them belong together cannot be known. So do
     the ends of one edge: merging them would take a face away, and close nothing.

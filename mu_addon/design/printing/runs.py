@@ -35,7 +35,7 @@ class Runs:
 
     @property
     def gaps(self) -> tuple[Index, Index, Index]:
-        """Lines, starts and ends of what lies before, between and after the runs of lines that have any."""
+        """Lines, starts and ends of the gaps before, between and after the runs of lines that have any."""
         first = np.diff(self.line, prepend=-1) != 0
         last = np.diff(self.line, append=-1) != 0
         before = np.where(first, 0, np.concatenate([[0], self.end[:-1]])) if len(self.line) else self.start
@@ -99,8 +99,8 @@ def runs_of(marked: NDArray[np.bool_]) -> Runs:
 def meeting(one: Runs, other: Runs, shift: int, reach: int = 0) -> tuple[Index, Index]:
     """Pairs of runs, numbers (p,) in `one` and (p,) in `other`, with cells over each other.
 
-    shift: by how much the other's line is numbered higher. reach: also those whose ends miss each other by so
-    many cells, 1 for cells that touch by a corner.
+    shift: offset of the other's line numbers. reach: include runs whose ends miss each other by so many
+    cells, 1 for cells that touch by a corner.
     """
     width = one.cells + 2
     line = (one.line + shift) * width
@@ -113,7 +113,7 @@ def meeting(one: Runs, other: Runs, shift: int, reach: int = 0) -> tuple[Index, 
 
 
 def joined(count: int, pairs: list[tuple[Index, Index]]) -> tuple[int, NDArray[np.int32]]:
-    """Number of the groups that pairs of `count` things make, and each thing's group (count,)."""
+    """Number of the groups that pairs of `count` things form, and each thing's group (count,)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -142,7 +142,7 @@ class Parts:
         return np.where(run < 0, -1, self.part[run] if len(self.part) else -1)
 
     def ends(self, wanted: NDArray[np.bool_] | None = None) -> tuple[Index, Index]:
-        """First cells of the runs (r, 3), and last ones; only of those wanted (r,)."""
+        """First and last cells of the runs (r, 3); only of those wanted (r,)."""
         r = self.runs
         which = slice(None) if wanted is None else wanted
         line = r.line[which]

@@ -1,4 +1,4 @@
-"""Pictures of a printer's layers: outlines of a part's sections, and what they enclose."""
+"""Pictures of a printer's layers: outlines of a part's sections, and of the enclosed areas."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Slice:
     """One section of a part, at a height in mm above the part's lowest point.
 
     outlines: closed polygons (n, 2) in mm, in the plane of the section, counter-clockwise around material and
-    clockwise around holes. area_mm2: of the material; enclosed_mm2: of the holes, which hold resin that can
-    leave only along the build, as a chamber's. open_chamber: polygons, likewise, of a chamber that is no hole
-    of this section because its inlet opens it here; open_mm2: their area.
+    clockwise around holes. area_mm2: of the material; enclosed_mm2: of the holes, whose resin can leave only
+    along the build, as in a chamber. open_chamber: polygons, likewise, of a chamber that is no hole of this
+    section because its inlet opens it here; open_mm2: their area.
     """
 
     height_mm: float
@@ -39,7 +39,7 @@ class Slice:
 
 @attrs.frozen(eq=False)
 class Filled:
-    """One section as triangles: vertices (n, 3) in mm, of its material (m, 3) and of what it encloses (k, 3).
+    """One section as triangles: vertices (n, 3) in mm, of its material (m, 3) and of enclosed areas (k, 3).
 
     area_mm2, enclosed_mm2: their areas.
     """
@@ -115,7 +115,7 @@ def _outlines(section: Any) -> list[Array]:
 
 
 class Layers:
-    """A closed surface, vertices (n, 3) in mm and triangles (m, 3), whose sections are asked for one by one.
+    """A closed surface, vertices (n, 3) in mm and triangles (m, 3), whose sections are computed on demand.
 
     direction (3,): of the build, away from the platform. height_mm: of the whole part along it. chamber: the
     closed surface of a chamber within it, which counts as enclosed where its inlet opens it, too. Raises

@@ -1,8 +1,8 @@
 """Vents for resin that a part traps along a build direction, and the plugs that close them afterwards.
 
-While a part is printed, the film closes every layer; what is closed in toward the platform is a cup. A hole
-where the cup begins, on the platform's side, lets resin in and out of it. A void that never opens gets a
-second hole at its other end, so that air follows the resin. Once printed and washed, each takes its plug.
+While a part is printed, the film closes every layer; a space closed toward the platform is a cup. A hole at
+its start, on the platform's side, lets resin in and out. A void that never opens gets a second hole at its
+other end, so that air follows the resin. After printing and washing, each gets its plug.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from .voxels import frame_along, voxel_rows
 Array = NDArray[np.float64]
 
 DIAMETER_MM = 2.0
-"""Of a vent: a ball of it passes, and viscous resin does (assumed)."""
+"""Diameter of a vent: a ball of it passes, and viscous resin does (assumed)."""
 THINNEST_MM = 1.2
-"""Of a wall that may take a vent: a thinner one stretches as the part moves, and holds no plug (assumed)."""
+"""Least thickness of a wall for a vent: a thinner one stretches, and holds no plug (assumed)."""
 THICKEST_MM = 12.0
-"""Of such a wall: a longer bore is not washed out (assumed)."""
+"""Largest thickness of such a wall: a longer bore cannot be washed out (assumed)."""
 CLEARANCE_MM = 0.05
-"""Between plug and bore on every side, for resin as glue (assumed)."""
+"""Clearance between plug and bore on every side, for resin as glue (assumed)."""
 HEAD_MM = (1.0, 1.0)
-"""By how much a plug's head is wider than the bore on every side, and how thick it is."""
+"""Overhang of a plug's head over the bore on every side, and its thickness."""
 STEP_MM = 0.25
 FACETS = 48
 
@@ -43,7 +43,7 @@ FACETS = 48
 class Vent:
     """A hole through a wall: its ends (3,) in mm, within and outside, and its plug, a Manifold in place.
 
-    head: whether the plug has a head outside; without one, the wall around the hole is not flat there.
+    head: True if the plug has a head outside; the wall around the hole is not flat without one.
     """
 
     inner: Array
@@ -78,7 +78,7 @@ class Vent:
 
 @attrs.frozen(eq=False)
 class Vented:
-    """A part with its vents: vertices (n, 3) in mm, triangles (m, 3), and what was trapped, in ml.
+    """A part with its vents: vertices (n, 3) in mm, triangles (m, 3), and the trapped resin, in ml.
 
     before_ml, after_ml: the largest cup along the direction, without and with the vents.
     """
@@ -144,7 +144,7 @@ def _cups(solid: Any, up: Array, printer: Printer) -> Any:
 
 
 def _outside(solid: Any) -> Any:
-    """A function that tells whether a point (3,) in mm sees the box's outside in some direction."""
+    """Return a function that tells whether a point (3,) in mm sees the box's outside in some direction."""
     low, high = np.array(solid.bounding_box()).reshape(2, 3)
     far = 2.0 * float(np.linalg.norm(high - low))
     ways = np.array(list(itertools.product((-1.0, 0.31, 1.0), repeat=3)))
@@ -153,7 +153,7 @@ def _outside(solid: Any) -> Any:
 
 
 def _vent(solid: Any, outside: Any, start: Array, up: Array, ml: float) -> Vent:
-    """The vent from where a cup begins, through the wall that is best suited; raises GateError."""
+    """The vent at the start of a cup, through the most suitable wall; raises GateError."""
     ways = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)]) @ frame_along(up)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     # Toward the platform first, then aside: a hole away from it would begin above the cup's first layer.
@@ -200,7 +200,7 @@ def _bore(inner: Array, outer: Array, radius: float, beyond: float) -> Any:
 
 
 def _plug(solid: Any, inner: Array, outer: Array, radius: float) -> tuple[Any, bool]:
-    """The plug of a bore, with a head outside if there is room for it, and whether there is."""
+    """The plug of a bore, with a head outside if there is room for it, and True if so."""
     way = (outer - inner) / np.linalg.norm(outer - inner)
     stem = _bore(inner, outer, radius - CLEARANCE_MM, 0.0)
     wider, thick = HEAD_MM

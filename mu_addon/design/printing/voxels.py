@@ -1,6 +1,6 @@
-"""A surface seen as a grid of cells: which runs of them, along the rows of each layer, are solid.
+"""A surface as a grid of cells: the solid runs along the rows of each layer.
 
-What is inside is counted (winding number), so that solids which overlap count as one.
+The inside is found by winding number, so that overlapping solids count as one.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def _crossings(
 ) -> tuple[Index, Index, NDArray[np.int8]]:
     """Crossings of triangles with rows at whole numbers of the first two coordinates, in units of cells.
 
-    Of each: number of its line, first cell whose centre lies beyond, and +1 where the solid begins, -1 where
-    it ends.
+    Returned for each: number of its line, first cell whose centre lies beyond, and +1 where the solid begins,
+    -1 where it ends.
     """
     # Row by row of cells or layer by layer, in whichever there are fewer.
     spans = []

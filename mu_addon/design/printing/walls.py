@@ -10,7 +10,7 @@ from .printer import Printer
 from .thickness import RayHits, Samples
 
 OPPOSED = -0.9
-"""Cosine between two faces up to which what lies between them is a wall or a gap and not a wedge."""
+"""Cosine between two faces up to which the space between them is a wall or a gap and not a wedge."""
 
 
 def thinnest(surface: Samples, inward: RayHits, printer: Printer) -> Finding:
@@ -89,7 +89,7 @@ def chamber_walls(
     """Finding on the thinnest wall in mm between chambers and the outside; empty without such a wall.
 
     inward: rays from samples into the solid; between (s,): marks those from a chamber that end outside any;
-    facets_mm: by so much flat facets may be nearer than the curved wall that they stand for.
+    facets_mm: distance by which flat facets may lie inside the curved wall.
     """
     if not between.any():
         return []
