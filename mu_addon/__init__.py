@@ -1,4 +1,4 @@
-"""Blender's door to the core: `register` and `unregister`; everywhere else the core is a plain package."""
+"""Entry points of the Blender extension: `register` and `unregister`; elsewhere a plain package."""
 
 import importlib
 from typing import Any

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class MuError(Exception):
-    """A failure told as `what`, `where` and `remedy`; `status` is the exit status it ends a run with."""
+    """A failure described by `what`, `where` and `remedy`; `status` is the exit status of its run."""
 
     status = 1
 

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place, flushed to disk, then renamed into it."""
+"""Files that are complete or absent: written beside their place, flushed to disk, then renamed into it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _REMEDY = {
 
 
 def output_error(error: OSError, path: Path) -> OutputError:
-    """`error`, met while writing `path`, as an OutputError that says what to do about it."""
+    """`error`, raised while writing `path`, as an OutputError with a remedy."""
     return OutputError(
         f"cannot write {path.name}: {error.strerror or error}",
         where=str(path),
@@ -48,7 +48,7 @@ def output_error(error: OSError, path: Path) -> OutputError:
 
 
 def make_folder(path: Path) -> Path:
-    """Create `path` and its parents where they are missing; raises OutputError."""
+    """Create `path` and its missing parents; raises OutputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -58,7 +58,8 @@ def make_folder(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path beside `path`, of the same suffix, to be written by the body; it then becomes `path`.
+    """Context with a path beside `path`, of the same suffix, to be written by the body; it then replaces
+    `path`.
 
     Missing folders are made. If the body fails, `path` stays as it was. An OSError becomes an OutputError.
     """
@@ -113,7 +114,7 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]])
 
 
 def append_lines(stream: IO[bytes], lines: bytes) -> None:
-    """Add whole lines to the end of an unbuffered file; where not all find room, those that do.
+    """Add complete lines to the end of an unbuffered file; on a full disk, those that fit.
 
     Raises OSError.
     """
@@ -142,10 +143,10 @@ _MOST_UNPACKED = 1 << 32
 
 
 def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | None:
-    """Arrays by name of an NPZ file, or None where there is none that can be read whole.
+    """Arrays by name of an NPZ file, or None where there is none that can be read completely.
 
-    Nothing of the file is run, and nothing is set aside for an array before the archive is known to hold as
-    many bytes as the array's header claims, no more than `most_bytes` in all and in proportion to its size.
+    No code in the file is run. No memory is allocated for an array before the archive is known to hold as
+    many bytes as its header claims, at most `most_bytes` in all and in proportion to its size.
     """
     try:
         # A pipe would be waited for.
@@ -164,12 +165,12 @@ def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | N
 
 
 def _most_unpacked(packed: int) -> int:
-    """How many bytes an archive of `packed` bytes may unpack to."""
+    """Largest number of bytes that an archive of `packed` bytes may unpack to."""
     return max(_SMALL, _MOST_SHRUNK * packed)
 
 
 def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
-    """Raise ValueError unless a member is one array, of plain numbers or text, that fills it exactly."""
+    """Raise ValueError unless a member is one array, of plain numbers or text, of exactly its size."""
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)
         if version != (1, 0):
@@ -182,7 +183,7 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write named `arrays` to `path`; equal arrays make equal bytes; raises OutputError.
 
-    They are compressed, unless they shrink so far that `read_npz` would not take them.
+    They are compressed, unless so strongly that `read_npz` would refuse them.
     """
     # Packed in memory: an archive on a full disk fails again when it is thrown away, with a traceback.
     packed = io.BytesIO()
@@ -195,7 +196,7 @@ def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """`value` in JSON's terms: arrays as lists, numpy numbers as numbers, paths as text, nan as null."""
+    """`value` as JSON types: arrays as lists, numpy numbers as numbers, paths as text, nan as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):

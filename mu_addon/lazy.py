@@ -1,4 +1,4 @@
-"""The public face of a package at no cost: a name is imported when it is first asked for (PEP 562)."""
+"""Lazy public face of a package: a name is imported when it is first asked for (PEP 562)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 
 def public_face(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """`__getattr__`, `__dir__` and `__all__` of a package that offers names of its modules.
+    """`__getattr__`, `__dir__` and `__all__` of a package that exports names of its modules.
 
-    package: its `__name__`. The names offered are those that its source imports for type checkers, under
-    `if TYPE_CHECKING:`, so that they are stated once.
-    A name must differ from every module's, which the import system would put in its place.
+    package: its `__name__`. The exported names are those that its source imports for type checkers, under `if
+    TYPE_CHECKING:`, so that they are stated once. A name must differ from every module's, which the import
+    system would put in its place.
     """
     home = _imported_for_type_checkers(package)
 
@@ -27,7 +27,7 @@ def public_face(package: str) -> tuple[Callable[[str], Any], Callable[[], list[s
 
 
 def _imported_for_type_checkers(package: str) -> dict[str, str | None]:
-    """Module by name. The loader gives the source, from a folder or a zip."""
+    """Module by exported name. The loader gives the source, from a folder or a zip."""
     source = sys.modules[package].__spec__.loader.get_source(package)  # type: ignore[union-attr]
     found = {}
     for node in ast.parse(source).body:

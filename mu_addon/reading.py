@@ -1,7 +1,7 @@
-"""Files, TOML and JSON from anywhere, read so that whatever they hold ends in a clear error.
+"""Files, TOML and JSON from anywhere, read so that any content ends in a clear error.
 
 Every reader of the program takes its text, TOML and JSON from here: a pipe or a device does not hang it, and
-neither brackets nor digits without end exhaust it.
+endless brackets or digits do not exhaust it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ csv.field_size_limit(_LONGEST)
 
 
 def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
-    """What a regular file holds; raises OSError, also for pipes and devices and beyond `most` bytes."""
+    """Content of a regular file; raises OSError, also for pipes and devices and beyond `most` bytes."""
     require_readable(path, most)
     with open(path, "rb", opener=_without_waiting) as stream:
         # Another file may have taken its place by now; the system's own are said to hold nothing.
@@ -58,7 +58,7 @@ def _without_waiting(path: str, flags: int) -> int:
 
 
 def require_readable(path: str | Path, most: int = _LONGEST) -> None:
-    """Raise OSError for what is no regular file, and for one of more than `most` bytes."""
+    """Raise OSError for anything but a regular file, and for one of more than `most` bytes."""
     path = Path(path)
     try:
         found = path.stat()
@@ -84,7 +84,7 @@ def _size(count: int) -> str:
 
 
 def require_rows(count: int, where: str) -> None:
-    """Raise InputError where a table of `count` rows is longer than is read."""
+    """Raise InputError for a table of `count` rows if that exceeds the limit."""
     if count > MOST_ROWS:
         raise InputError(
             f"the table has more than the {MOST_ROWS} rows that are read",
@@ -94,19 +94,19 @@ def require_rows(count: int, where: str) -> None:
 
 
 def _require_length(text: str | bytes, most: int, origin: str, remedy: str) -> None:
-    """Raise InputError for a document that would exhaust the memory when it is parsed."""
+    """Raise InputError for a document that would exhaust the memory when parsed."""
     if len(text) > most:
         words = f"its {_size(len(text))} are more than the {_size(most)} that are read"
         raise InputError(words, origin, remedy)
 
 
 def unreadable(error: OSError | UnicodeDecodeError) -> str:
-    """Why a file could not be read as text, in words without its name."""
+    """Reason why a file could not be read as text, in words without its name."""
     return str(error.strerror or error) if isinstance(error, OSError) else "it is not UTF-8 text"
 
 
 def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dict[str, Any]:
-    """Tables and values of TOML text; raises InputError, with the line where it is known."""
+    """Tables and values of TOML text; raises InputError, with the line if known."""
     _require_length(text, _LONGEST_TOML, origin or "TOML text", "check that it is the right file")
     if _DOTTED.search(text):
         raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin or "TOML text", remedy)
@@ -135,15 +135,15 @@ def parse_json(text: str | bytes, origin: str, remedy: str = "let the program wr
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value that was read is a number; `true` and `false` are none."""
+    """Return True if a value from a file is a number; `true` and `false` are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> None:
-    """Raise InputError for whole numbers of more than 64 bits, and tables in tables without end."""
+    """Raise InputError for whole numbers of more than 64 bits, and for endless nesting of tables."""
 
     def at(number: int) -> str:
-        """The origin, with the number's line where it is written in decimal digits."""
+        """The origin, with the number's line if it is written in decimal digits."""
         if number.bit_length() > 8192:
             # Python does not write longer ones out.
             return origin
@@ -176,7 +176,7 @@ def _short(error: Exception) -> str:
 
 
 def _located(message: str, text: str) -> tuple[str, int | None]:
-    """The parser's complaint without its place, and its line."""
+    """The parser's complaint without its location, and its line."""
     match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)", message)
     if not match:
         return message, None

@@ -1,6 +1,6 @@
-"""TOML text from plain data and comments: the library writes every key and value, the layout is here.
+"""TOML text from plain data and comments: the library writes keys and values, the layout is made here.
 
-A table in a table becomes `[outer.inner]`, one inside a list stands on its line. What is None is left out.
+A table in a table becomes `[outer.inner]`, one inside a list stands on its line. None values are left out.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ class Commented:
 
 
 def toml_value(value: Any) -> str:
-    """A truth, number, text, array, or a list or table of them, on one line of TOML."""
+    """A boolean, number, text, array, or a list or table of them, on one line of TOML."""
     return str(_item(value).as_string())
 
 
 def toml_key(name: str) -> str:
-    """A key, in quotes where it needs them."""
+    """A key, quoted where needed."""
     from tomlkit.items import SingleKey
 
     return str(SingleKey(name).as_string())

@@ -1,5 +1,5 @@
-"""Cells of tables as people write them: encodings, separators, and the signs in numbers, judged by column.
+"""Cells of tables in any notation: encodings, separators, and the signs in numbers, judged by column.
 
-`encoding` makes text of a file's bytes, `dialect` rows of cells of the text, `notation` numbers of a column's
-cells, `clock` seconds of times of day, and `own` reads the tables that this program asks for.
+`encoding` decodes a file's bytes, `dialect` splits the text into rows of cells, `notation` reads numbers in a
+column's cells, `clock` times of day, and `own` reads the tables that this program asks for.
 """

@@ -30,9 +30,8 @@ _CLOCK = re.compile(rf"(?:{_DATE})?(?:(?:^|[T,]? ?)(?:{_TIME}))?(?: ?(?:Z|UTC|[+
 class Clock:
     """Seconds (n,) from the first reading, nan where a cell holds none.
 
-    dated, timed: whether the cells hold dates, times of day; halves: whether these have two parts, which may
-    be hours and minutes (as which they are read) or minutes and seconds; unreadable: which cells are neither
-    clock nor empty.
+    dated, timed: the cells hold dates, times of day; halves: these have two parts, which may be hours and
+    minutes (so read) or minutes and seconds; unreadable: mask of cells that are neither clock nor empty.
     """
 
     seconds: Array
@@ -43,7 +42,7 @@ class Clock:
 
 
 def is_clock(cell: str) -> bool:
-    """Whether a cell holds a date, a time of day, or both."""
+    """Return True if a cell holds a date, a time of day, or both."""
     return bool(cell) and cell[0].isdigit() and _CLOCK.fullmatch(cell) is not None
 
 

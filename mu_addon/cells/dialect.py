@@ -31,27 +31,27 @@ class Row:
 
     @property
     def filled(self) -> tuple[str, ...]:
-        """The cells that hold something."""
+        """Cells that are not empty."""
         return tuple(cell for cell in self.cells if cell)
 
     @property
     def lines(self) -> tuple[int, ...]:
-        """The lines of the file that it stands on."""
+        """Numbers of the file's lines that it spans."""
         return tuple(range(self.line, max(self.line, self.last) + 1))
 
     @property
     def numeric(self) -> frozenset[int]:
-        """The places of the cells that hold a number, a date or a time of day."""
+        """Positions of the cells that hold a number, a date or a time of day."""
         return frozenset(k for k, cell in enumerate(self.cells) if cell and is_reading(cell))
 
 
 def is_reading(cell: str) -> bool:
-    """Whether a cell looks like a number, a date or a time of day."""
+    """Return True if a cell looks like a number, a date or a time of day."""
     return is_like_number(cell) or is_clock(cell)
 
 
 def lines_of(text: str) -> list[str]:
-    """The lines of a text as an editor counts them."""
+    """Lines of a text as an editor counts them."""
     lines = _LINE_END.split(text)
     if not lines[-1]:
         lines.pop()
@@ -82,14 +82,14 @@ def delimiter_of(lines: Sequence[str]) -> str:
 
 
 def _share(cells: Sequence[str]) -> float:
-    """The share of numbers among the cells of a row of two or more, 0 for other rows."""
+    """Share of numbers among the cells of a row of two or more, 0 for other rows."""
     filled = [cell for cell in cells if cell]
     numbers = sum(is_reading(cell) or bool(unit_behind(cell)) for cell in filled)
     return numbers / len(filled) if numbers > 1 or (numbers and len(filled) > 1) else 0.0
 
 
 def _quoted(lines: Sequence[str], begin: int, delimiter: str) -> int:
-    """How many lines a row has: more than one where quotes hold line ends, as in titles, and no numbers.
+    """Number of lines of a row: more than one if quotes contain line ends, as in titles, and no numbers.
 
     A quote that is never closed, or stands in a row of numbers, ends with its line.
     """

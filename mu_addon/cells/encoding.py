@@ -1,4 +1,4 @@
-"""The text of a file, in whatever encoding a laboratory's computer writes."""
+"""Text of a file, in any encoding that a laboratory's computer writes."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19]")
 def decoded(data: bytes, where: str, known: Callable[[str], int] = lambda text: 0) -> str:
     """Text of bytes: by its byte order mark, as UTF-8 or UTF-16, else where `known` counts most.
 
-    known: how many words of a text are known. Bytes of zero in a text are kept as U+FFFD. Raises InputError
-    for what is no text, with what it is.
+    known: counts the known words of a text. Zero bytes in a text are kept as U+FFFD. Raises InputError for a
+    file that is no text, naming its kind.
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -79,7 +79,7 @@ def _of(data: bytes, encoding: str, where: str) -> str:
 
 
 def _guessed(data: bytes, known: Callable[[str], int]) -> str:
-    """Text in the encoding in which most words of its beginning are known; Windows-1252 where none tells."""
+    """Text in the encoding with most known words at its beginning; Windows-1252 if none is decisive."""
     head = data[:8000]
     best = max(_OTHERS, key=lambda encoding: known(head.decode(encoding, errors="replace")))
     return data.decode(best, errors="replace")

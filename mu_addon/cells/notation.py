@@ -1,4 +1,4 @@
-"""Numbers in the cells of a column: which sign divides decimals, which thousands, and what is no number."""
+"""Numbers in the cells of a column: the signs for decimals and thousands, and cells that are no number."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PLAIN = {
 
 
 def _grouped(decimal: str) -> re.Pattern[str]:
-    """Groups of thousands, by one sign throughout; the first begins with another digit than 0."""
+    """Groups of thousands, with the same sign throughout; the first does not begin with 0."""
     d, other = re.escape(decimal), re.escape(",.".replace(decimal, ""))
     indian = rf"|[1-9]\d?(?:{other}\d\d)+{other}\d{{3}}" if decimal == "." else ""
     return re.compile(rf"{_SIGNED}(?:[1-9]\d{{0,2}}([{other}' ])\d{{3}}(?:\1\d{{3}})*{indian})(?:{d}\d*)?")
@@ -49,9 +49,9 @@ _SIMPLE = re.compile(r"[-+0-9.eE\n]*")
 class Numbers:
     """The numbers of a column's cells.
 
-    values (n,): nan where a cell is empty or no number; decimal: the sign; sure: whether the cells tell it,
-    or hold none; unreadable: which cells are neither number nor empty; both: which have one sign for decimals
-    and thousands.
+    values (n,): nan where a cell is empty or no number; decimal: the sign; sure: the cells determine it, or
+    hold none; unreadable: mask of cells that are neither number nor empty; both: mask of those with one sign
+    for decimals and thousands.
     """
 
     values: Array
@@ -62,17 +62,17 @@ class Numbers:
 
 
 def plain_signs(cell: str) -> str:
-    """A cell with the minus signs, spaces and apostrophes of a typewriter."""
+    """A cell with ASCII minus signs, spaces and apostrophes."""
     return cell if cell.isascii() else cell.translate(_SIGNS).strip()
 
 
 def is_like_number(cell: str) -> bool:
-    """Whether a cell looks like a number, whichever sign is the decimal one."""
+    """Return True if a cell looks like a number, with either decimal sign."""
     return _LIKE.fullmatch(plain_signs(cell)) is not None
 
 
 def unit_behind(cell: str) -> str:
-    """What stands behind the number in a cell such as "12.5 N", "" for nothing or for no number."""
+    """Unit after the number in a cell such as "12.5 N", "" without a unit or a number."""
     match = _WITH_UNIT.fullmatch(plain_signs(cell))
     return match[2] if match else ""
 
@@ -94,7 +94,7 @@ def number(cell: str, decimal: str) -> float | None:
 def judged(cells: Sequence[str], usual: str = "", forced: str = "") -> Numbers:
     """The numbers of a column's cells, by the decimal sign that reads most of them.
 
-    usual: the sign where the cells do not tell; forced: the one that holds in any case.
+    usual: the sign if the cells are ambiguous; forced: the sign in any case.
     """
     fast = _simple(cells) if forced != "," else None
     if fast is not None and (forced or fast.sure or usual == "."):
@@ -119,7 +119,7 @@ def judged(cells: Sequence[str], usual: str = "", forced: str = "") -> Numbers:
 
 
 def _both(cells: Sequence[str], found: Sequence[float | None], decimal: str) -> dict[int, float]:
-    """Numbers, by place, of cells that are none but where the decimal sign divides thousands, too."""
+    """Numbers, by position, of cells that are numbers only if the decimal sign also divides thousands."""
     both = {}
     for i, value in enumerate(found):
         if value is None and _BOTH[decimal].fullmatch(cell := plain_signs(cells[i])):
@@ -129,7 +129,7 @@ def _both(cells: Sequence[str], found: Sequence[float | None], decimal: str) -> 
 
 
 def _simple(cells: Sequence[str]) -> Numbers | None:
-    """Numbers of nothing but digits and points, many times as fast; None where there is anything else."""
+    """Numbers of digits and points alone, read many times as fast; None if there is anything else."""
     if not _SIMPLE.fullmatch("\n".join(cells)):
         return None
     try:
@@ -144,7 +144,7 @@ def _simple(cells: Sequence[str]) -> Numbers | None:
 
 
 def without_units(cells: Sequence[str]) -> tuple[list[str], str]:
-    """Cells such as "12.5 N" without the unit that stands behind most of them, and the unit; "" for none."""
+    """Cells such as "12.5 N" without the unit that most of them have, and that unit; "" for none."""
     found = [_WITH_UNIT.fullmatch(plain_signs(cell)) for cell in cells]
     units = [match[2] for match in found if match]
     filled = sum(1 for cell in cells if cell)

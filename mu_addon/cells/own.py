@@ -35,7 +35,7 @@ def own_text(path: Path, most: int = _LONGEST) -> str:
 
 
 def own_lines(text: str) -> list[tuple[int, str]]:
-    """Lines that hold something, with their numbers, less comments and Excel's line `sep=;`."""
+    """Lines that are not empty, with their numbers, less comments and Excel's line `sep=;`."""
     numbered = [(n, line) for n, line in enumerate(lines_of(text), 1) if line.strip()]
     numbered = [(n, line) for n, line in numbered if not line.lstrip().startswith("#")]
     if numbered and re.fullmatch(r'"?sep=.?"?', numbered[0][1].strip()):
@@ -46,8 +46,8 @@ def own_lines(text: str) -> list[tuple[int, str]]:
 def own_rows(numbered: Sequence[tuple[int, str]]) -> list[tuple[int, list[str]]]:
     """The cells of lines whose first names the columns; numbers with a decimal point.
 
-    The first line tells the separator: comma, semicolon or tab. A column tells its decimal sign; thousands
-    are not divided in these tables, so that 1,234 in one alone is a decimal. Raises csv.Error.
+    The first line determines the separator: comma, semicolon or tab. A column determines its decimal sign;
+    thousands are not divided in these tables, so that a single 1,234 is a decimal. Raises csv.Error.
     """
     if not numbered:
         return []

@@ -70,7 +70,7 @@ _MIRROR3 = np.array([-1.0, 1.0, 1.0])
 
 
 def nodal_mass_g(unit: Unit, mesh: Mesh, density_g_per_ml: float) -> Array:
-    """Mass (n,) in g of each node of a unit's mesh; a homogenised lattice weighs what its struts do."""
+    """Mass (n,) in g of each node of a unit's mesh; a homogenised lattice weighs as much as its struts."""
     points, _ = tet_quadrature(mesh.order)
     hollow = (mesh.region == LATTICE) & (not mesh.resolved)
     solid = np.where(hollow, relative_density(strut_cell(unit)), 1.0)

@@ -30,7 +30,7 @@ _LEAST_SHARE = 1e-3
 
 @attrs.frozen(eq=False)
 class Link:
-    """One unit of a chain: its joint, and how far it is turned about its axis against the chain's frame."""
+    """One unit of a chain: its joint, and its rotation about its axis against the chain's frame."""
 
     joint: Joint
     turn_deg: float = 0.0
@@ -40,7 +40,7 @@ class Link:
 class Loads:
     """Loads on a chain besides pressure, in the frame of its base.
 
-    down (3,): the way things fall, of length 1, or 0 without gravity. tip_mass_g hangs at the middle of the
+    down (3,): direction of gravity, of length 1, or 0 without gravity. tip_mass_g hangs at the middle of the
     tip's plate. tip_force_N (3,) and tip_couple_N_mm (3,) keep their direction; a couple in space has no
     potential, so that where it acts the tangent is not symmetric.
     """
@@ -198,7 +198,7 @@ class Chain:
         return [link.joint.at(float(value)) for link, value in zip(self.links, p, strict=True)]
 
     def free_plates(self, pressures_kPa: Array) -> Array:
-        """Plates (n + 1, 4, 4) where nothing but the pressures (n,) in kPa acts."""
+        """Plates (n + 1, 4, 4) under the pressures (n,) in kPa alone."""
         return self.plates_of(np.array([joint.eta0 for joint in self.joints_at(pressures_kPa)]))
 
     def plates_of(self, eta: Array) -> Array:

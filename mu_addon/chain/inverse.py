@@ -22,10 +22,10 @@ _CONVERGED_KPA = 1e-4
 
 @attrs.frozen(eq=False)
 class Reach:
-    """Pressures (n,) in kPa, the state there, and how far its tip is from the point, in mm.
+    """Pressures (n,) in kPa, the state there, and the distance of its tip from the point, in mm.
 
-    at_bound (n,): units whose pressure is at the end of what their joint was learned for. iterations:
-    solutions of the chain that it took.
+    at_bound (n,): mask of units whose pressure is at the end of their joint's range. iterations: number of
+    solutions of the chain.
     """
 
     pressures_kPa: Array
@@ -44,10 +44,10 @@ def reach_point(
 ) -> Reach:
     """Pressures that bring the tip as near to a point (3,) in mm as bounds allow, low ones first.
 
-    The point is in the frame of the chain's base. low_kPa, high_kPa (n,): bounds, by default what the joints
-    were learned for. The nearest stable state is followed from the chain at rest, so that another posture
-    that reaches the point, too, may be missed. report: called with the step and the miss in mm. Raises
-    InputError for bounds that are none, ConvergenceError where the chain does not bear its loads at rest.
+    The point is in the frame of the chain's base. low_kPa, high_kPa (n,): bounds, by default the joints'
+    ranges. The nearest stable state is followed from the chain at rest, so that another posture that reaches
+    the point, too, may be missed. report: called with the step and the miss in mm. Raises InputError for
+    invalid bounds, ConvergenceError where the chain cannot carry its loads at rest.
     """
     from scipy.optimize import lsq_linear
 

@@ -73,7 +73,7 @@ class Sampling:
 
 @attrs.frozen(eq=False)
 class Learned:
-    """A joint, and what its held-out states say of it.
+    """A joint, and its accuracy at held-out states.
 
     held_out: a row a state, with its pressure in kPa, the error of the load in N and N mm, and the
     placement's error in mm and degrees that it makes of the free tip. free_u: displacements (k, n, 3) of the
@@ -104,10 +104,10 @@ def learn(
     """The joint of a unit at pressures (k,) in kPa, from equilibria of its whole mesh between rigid plates.
 
     At each pressure: the free state with its stiffness, and twelve or nine loaded ones, one a direction and
-    side; mirror images come for nothing. Two corners of the range at every other pressure, and a free and a
-    loaded state between pressures, are held out and give the error. kept and keep: a cache by the state's
-    name. report: called with the share done and a few words. Raises ConvergenceError where a free state is
-    not there.
+    side; mirror images are free. Two corners of the range at every other pressure, and a free and a loaded
+    state between pressures, are held out and give the error. kept and keep: a cache by the state's name.
+    report: called with the share done and a few words. Raises ConvergenceError where a free state is not
+    there.
     """
     body = PlateBody(unit, mesh, density_g_per_ml)
     size = sampling.size(body.height)
@@ -134,7 +134,7 @@ def learn(
     missed: list[str] = []
 
     def loaded(pressure: float, y: Array, words: str) -> PlateState | None:
-        """The state at y (6,) of the range, or nearer to the free one; None where none was reached."""
+        """State at y (6,) of the range, or nearer to the free one; None where none was reached."""
         label = f"{words} {pressure:.9g}"
         found = kept(label)
         if found is None:

@@ -1,4 +1,4 @@
-"""Settings of a chain, stated once: its file, the command line and the node take them from here."""
+"""Settings of a chain, used by its file, the command line and the node."""
 
 from __future__ import annotations
 

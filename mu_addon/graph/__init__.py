@@ -1,4 +1,4 @@
-"""Node trees: what a node is, a tree and its file, what is wrong with one, and its evaluation.
+"""Node trees: nodes, trees and their files, faults, and evaluation.
 
 Nothing here knows a unit or a simulation: the definitions of nodes come from `usecases.graph`.
 """

@@ -14,7 +14,7 @@ from .tree import Node, NodeTree, Source
 
 @attrs.frozen
 class Fault:
-    """Something wrong at a node: what, what to do, and the input and source of a link that is refused."""
+    """A fault at a node: what, what to do, and the input and source of a refused link."""
 
     node: str
     what: str
@@ -22,7 +22,7 @@ class Fault:
     input: str = ""
     source: Source | None = None
     missing: bool = False
-    """Whether only an input is missing: a tree that is being wired has such nodes."""
+    """True if only an input is missing, as in a tree that is being wired."""
 
     def error(self) -> InputError:
         """The fault as an error."""
@@ -31,7 +31,7 @@ class Fault:
 
 
 def faults(tree: NodeTree, definitions: Definitions) -> tuple[Fault, ...]:
-    """Everything wrong with a tree: kinds, settings, links, missing inputs, circles."""
+    """All faults of a tree: kinds, settings, links, missing inputs, circles."""
     found: list[Fault] = []
     for name, node in tree.nodes.items():
         definition = definitions.get(node.kind)
@@ -109,7 +109,7 @@ def _of_link(
 
 
 def _offer(taken: Input, definitions: Definitions) -> str:
-    """Nodes whose outputs an input takes, in words."""
+    """Nodes with an output that an input accepts, in words."""
     kinds = [
         d.label for d in definitions.values() if any(taken.refusal(output) == "" for output in d.outputs)
     ]

@@ -11,15 +11,15 @@ import attrs
 from ..design.quantity import Description, described
 
 NUMBER = "number"
-"""Type of the outputs that may give a setting its value."""
+"""Type of the outputs that may supply a setting's value."""
 FILE, FOLDER = "file", "folder"
 
 
 @attrs.frozen
 class Setting:
-    """A value that is set on a node itself; one that is a number may come from another node instead.
+    """A value set on a node itself; a number may come from another node instead.
 
-    path: `FILE` or `FOLDER` where the value names one; shown: False for what no editor shows.
+    path: `FILE` or `FOLDER` if the value names one; shown: False if no editor shows it.
     """
 
     description: Description
@@ -33,7 +33,7 @@ class Setting:
 
     @property
     def is_number(self) -> bool:
-        """True if its value is a number, so that a link may give it."""
+        """True if its value is a number, which a link may supply."""
         return self.description.type in (int, float)
 
     def checked(self, value: Any) -> Any:
@@ -62,7 +62,7 @@ def setting(
 class Input:
     """An input of a node: outputs of these types; where `only` is given, of these names alone.
 
-    needed: whether nothing is made without it; many: whether it takes several links.
+    needed: the node cannot be evaluated without it; many: it accepts several links.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Output:
 
 @attrs.frozen
 class Call:
-    """One evaluation of a node: its name, checked settings, values of its inputs, and whether it is muted.
+    """One evaluation of a node: its name, checked settings, values of its inputs, and True if it is muted.
 
     inputs: by name; None without a link, a tuple of (name of the node, value) where it takes many.
     """
@@ -111,9 +111,10 @@ class Definition:
     """One kind of node.
 
     make: outputs by name, for a node that takes milliseconds; order: a run (`evaluation.Order`) for one that
-    takes longer, and read: its outputs, from the call and the finished run. muting: what muting does in
-    words, "" where it cannot be; mute: outputs of the muted node, without it nothing behind it is made.
-    remark: a few words on its outputs; named: whether outputs tell the node's name, as the cause of an error.
+    takes longer, and read: its outputs, from the call and the finished run. muting: effect of muting in
+    words, "" if it cannot be muted; mute: outputs of the muted node, without it nothing behind it is
+    evaluated. remark: a few words on its outputs; named: outputs contain the node's name, as the cause of an
+    error.
     """
 
     kind: str
@@ -133,7 +134,7 @@ class Definition:
 
     @property
     def runs(self) -> bool:
-        """True if its work is a run of its own, in a folder."""
+        """True if its work is a separate run, in a folder."""
         return self.order is not None
 
     def setting(self, name: str) -> Setting | None:

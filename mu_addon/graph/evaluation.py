@@ -1,7 +1,7 @@
-"""Evaluation of a node tree: only what is asked for, and of that only what is not there yet.
+"""Evaluation of a node tree: only the nodes asked for, and of these only uncached ones.
 
-Every node has a key, a hash of its kind, its settings and the keys of what it is linked to; a run's key is
-the hash of its files of inputs. So equal work is done once, in whatever node it stands.
+Every node has a key, a hash of its kind, its settings and the keys of its sources; a run's key is the hash of
+its files of inputs. So equal work is done once, in whatever node.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LONGEST_FILE = 1 << 31
 
 
 class NodeError(MuError):
-    """An error of which another node than the one that found it is the cause: `node`."""
+    """An error caused by another node than the one that found it: `node`."""
 
     def __init__(self, error: MuError, node: str) -> None:
         super().__init__(error.what, error.where, error.remedy)
@@ -44,10 +44,10 @@ class NodeError(MuError):
 
 @attrs.frozen
 class Order:
-    """A run that a node wants: its use case and its job.
+    """A run that a node needs: its use case and its job.
 
-    after: folder of a run that this one goes on from, whose cache it takes up; decides no result. answers:
-    whether a verdict in its summary is its answer, also where it ends with an error because of that.
+    after: folder of a run that this one continues, whose cache it reuses; decides no result. answers: a
+    verdict in its summary is its answer, even if it ends with an error because of that.
     """
 
     use_case: UseCase[Any]
@@ -56,7 +56,7 @@ class Order:
     answers: bool = False
 
     def is_done(self, summary: Mapping[str, Any]) -> bool:
-        """True if the run that left this summary need not be repeated."""
+        """True if the run with this summary need not be repeated."""
         return summary.get("status") == "complete" or (self.answers and "verdict" in summary)
 
     @property
@@ -69,14 +69,14 @@ class Order:
 
 @attrs.frozen
 class Finished:
-    """A run that is done: its folder and its summary."""
+    """A finished run: its folder and its summary."""
 
     folder: Path
     summary: Mapping[str, Any]
 
     @property
     def cost_s(self) -> float:
-        """Seconds that its stages took."""
+        """Total seconds of its stages."""
         found = self.summary.get("seconds")
         return sum(s for s in found.values() if is_number(s)) if isinstance(found, Mapping) else 0.0
 
@@ -85,17 +85,17 @@ class Runs(Protocol):
     """Runs of an evaluation."""
 
     def find(self, order: Order) -> Finished | None:
-        """The run where it is done already."""
+        """Find the run if it is finished."""
 
     def start(self, node: str, order: Order) -> Finished:
-        """The run, done now. Raises MuError."""
+        """Run it now, and return it. Raises MuError."""
 
 
 @attrs.frozen
 class Record:
     """Record of an evaluated node: words on its outputs, those that are numbers, folder of its run.
 
-    cost_s: how long it took to compute.
+    cost_s: seconds it took to compute.
     """
 
     remark: str = ""
@@ -106,10 +106,10 @@ class Record:
 
 @attrs.frozen
 class State:
-    """State of a node after evaluation: the seconds it took, its key and a few words on its outputs.
+    """State of a node after evaluation: its seconds, its key and a few words on its outputs.
 
-    cost_s: how long it took when it was computed, now or before; folder: of its run; error: why it failed;
-    because: the node that it waits for, or that failed.
+    cost_s: seconds when it was computed, now or before; folder: of its run; error: why it failed; because:
+    the node that it waits for, or that failed.
     """
 
     state: str
@@ -126,7 +126,7 @@ class State:
 class Kept:
     """Outputs of nodes, and orders of runs, by key; the least recently used are dropped.
 
-    counts: how often each node was made, by its name.
+    counts: number of evaluations of each node, by its name.
     """
 
     counts: Counter[str] = attrs.field(factory=Counter)
@@ -139,7 +139,7 @@ class Kept:
         return self._values.get(key)
 
     def put(self, key: str, value: Any) -> None:
-        """Keep a value."""
+        """Store a value."""
         self._values[key] = value
         while len(self._values) > MOST_KEPT:
             self._values.popitem(last=False)
@@ -152,8 +152,9 @@ Report = Callable[[str, State], None]
 class Evaluation:
     """One tree, evaluated by `run`; afterwards `states` and `outputs` by node, and the tree's `faults`.
 
-    runs: where runs are found and started; None for a refresh, which makes only what takes milliseconds and
-    knows of the rest what earlier evaluations left: `records`, by key. report: called with each node's state.
+    runs: where runs are found and started; None for a refresh, which evaluates only nodes that take
+    milliseconds and takes the others from earlier evaluations: `records`, by key. report: called with each
+    node's state.
     """
 
     tree: NodeTree
@@ -167,9 +168,10 @@ class Evaluation:
     faults: tuple[Fault, ...] = ()
 
     def run(self, wanted: Iterable[str] = ()) -> dict[str, State]:
-        """Make the wanted nodes, all of the tree where none is named, and what they need.
+        """Evaluate the wanted nodes, all of the tree if none is named, and their sources.
 
-        A node that fails does not keep others from being made. Raises what `runs` raises to end it all.
+        A node that fails does not keep others from being evaluated. Raises only errors of `runs` that end
+        everything.
         """
         order, circle = self.tree.ordered()
         needed = self.tree.upstream(tuple(wanted) or self.tree.nodes)
@@ -196,7 +198,7 @@ class Evaluation:
         return name in self.states and self.states[name].state in MADE
 
     def _before(self, name: str) -> str:
-        """The first source of a node that is not made."""
+        """First source of a node that is not evaluated."""
         return next((s for s in self.tree.sources(name) if not self._is_made(s)), "")
 
     def _make(self, name: str) -> None:
@@ -277,7 +279,7 @@ class Evaluation:
             self._set(cause, attrs.evolve(found, state=FAILED, error=error, because=""))
 
     def _lacking(self, node: Node, definition: Definition) -> str | None:
-        """The first source that is not made and that the node cannot do without, or None."""
+        """First unevaluated source that the node cannot do without, or None."""
         for key, sources in node.links.items():
             taken = definition.input(key)
             optional = taken is not None and (taken.many or not taken.needed)
@@ -304,7 +306,7 @@ class Evaluation:
         return found
 
     def _number(self, source: Source) -> Any:
-        """A number that another node gives; None where a refresh does not know it."""
+        """A number from another node; None where a refresh does not know it."""
         if source.node in self.outputs:
             return self.outputs[source.node][source.output]
         record = self.records.get(self.states[source.node].key)
@@ -332,7 +334,7 @@ class Evaluation:
 
 
 def _content(path: str, value: str) -> Any:
-    """Digest by which a change of a named file or folder is noticed."""
+    """Digest by which a change of a named file or folder is detected."""
     if not value:
         return ""
     place = Path(value)
@@ -352,5 +354,5 @@ def _content(path: str, value: str) -> Any:
 
 @lru_cache(256)
 def _digest(place: Path, size: int, mtime_ns: int) -> str:
-    """SHA-256 of a file, read once as long as neither size nor time changes: a slider asks at every move."""
+    """SHA-256 of a file, read once while size and time stay: a slider asks at every move."""
     return digest(file_bytes(place, LONGEST_FILE))

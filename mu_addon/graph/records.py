@@ -19,13 +19,13 @@ LONGEST, MOST_RECORDS = 1 << 24, 5000
 
 
 def record_of(definition: Definition, outputs: Outputs, state: State) -> Record:
-    """Record of a node that was made."""
+    """Record of an evaluated node."""
     numbers = {o.name: float(outputs[o.name]) for o in definition.outputs if o.type == NUMBER}
     return Record(state.remark, state.cost_s, numbers, state.folder)
 
 
 def read_records(folder: Path) -> dict[str, Record]:
-    """Records by key of a tree's folder; those without their run, and what is no record, left out."""
+    """Records by key of a tree's folder, without those whose run is missing or that are invalid."""
     try:
         found = parse_json(file_bytes(folder / FOLDER / NAME, LONGEST), NAME)
     except (OSError, InputError):

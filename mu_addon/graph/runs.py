@@ -1,4 +1,4 @@
-"""Runs of an evaluation, each in a folder that is named by the hash of its inputs."""
+"""Runs of an evaluation, each in a folder named by the hash of its inputs."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _STOPPED = (130, 143)
 
 @attrs.define
 class FolderRuns:
-    """Runs in a folder, started where they are not done; what a killed one left is taken up.
+    """Runs in a folder, started if they are not finished; a killed one is resumed.
 
-    progress: told of the stages of each, by node; reports: whether each writes its report.
+    progress: gets the stages of each, by node; reports: write a report for each.
     """
 
     folder: Path
@@ -43,7 +43,7 @@ class FolderRuns:
         return self.folder / FOLDER / f"{order.use_case.name}-{order.key[:16]}"
 
     def find(self, order: Order) -> Finished | None:
-        """The run where it lies there whole, of the same inputs."""
+        """Find the run in its folder, complete and with the same inputs."""
         place = self.place(order)
         summary = _summary(place)
         if not order.is_done(summary) or not order.use_case.layout.is_of(place):
@@ -51,7 +51,7 @@ class FolderRuns:
         return Finished(place, summary) if same_inputs(place, order.job.texts()) else None
 
     def start(self, node: str, order: Order) -> Finished:
-        """The run, done; raises MuError as it does, and Stopped where the whole evaluation is to stop."""
+        """Run it to its end; raises its MuError, and Stopped when the whole evaluation is to stop."""
         errors: list[Message] = []
         inner = Progress([_of_node(node, self.progress.sinks, errors)])
         place = self.place(order)
@@ -85,7 +85,7 @@ class Stopped(Exception):
 
 
 def _take_up(before: Path, now: Path) -> None:
-    """Put the finished work of one run, files named by the hash of their inputs, into another's cache."""
+    """Copy the finished work of one run, files named by the hash of their inputs, into another's cache."""
     with suppress(OSError):
         for path in before.glob("*.npz"):
             make_folder(now)
@@ -95,7 +95,7 @@ def _take_up(before: Path, now: Path) -> None:
 
 
 def _of_node(node: str, sinks: Sequence[Sink], errors: list[Message]) -> Sink:
-    """A sink that passes a run's stages and warnings on under the node's name, and keeps its errors."""
+    """A sink that passes on a run's stages and warnings under the node's name, and keeps its errors."""
 
     def sink(message: Message) -> None:
         if message["type"] == "error":
@@ -109,7 +109,7 @@ def _of_node(node: str, sinks: Sequence[Sink], errors: list[Message]) -> Sink:
 
 
 def _summary(folder: Path) -> dict[str, Any]:
-    """The summary of a run's folder, empty where there is none to read."""
+    """Summary of a run's folder, empty where none can be read."""
     try:
         found = parse_json(file_bytes(folder / SUMMARY, _LONGEST), SUMMARY)
     except (OSError, InputError):

@@ -1,4 +1,4 @@
-"""A node tree as data: nodes by name, their settings, and where their inputs come from."""
+"""A node tree as data: nodes by name, their settings, and the sources of their inputs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Source(NamedTuple):
 class Node:
     """One node: its kind, settings that differ from their defaults, and the sources of each linked input.
 
-    at: place in an editor, frame: label of the frame around it; both decide nothing.
+    at: position in an editor, frame: label of the frame around it; neither affects results.
     """
 
     kind: str
@@ -41,17 +41,17 @@ class NodeTree:
     nodes: Mapping[str, Node]
 
     def sources(self, name: str) -> tuple[str, ...]:
-        """Names of the nodes that a node is linked to, each once, those that are not there left out."""
+        """Names of the sources of a node, each once, without missing ones."""
         links = self.nodes[name].links.values()
         return tuple(dict.fromkeys(s.node for sources in links for s in sources if s.node in self.nodes))
 
     def ends(self) -> tuple[str, ...]:
-        """Names of the nodes whose outputs nothing takes."""
+        """Names of the nodes whose outputs are not used."""
         taken = {source for name in self.nodes for source in self.sources(name)}
         return tuple(name for name in self.nodes if name not in taken)
 
     def upstream(self, wanted: Iterable[str]) -> frozenset[str]:
-        """Names of those nodes and of all that they are made from."""
+        """Names of those nodes and all of their sources."""
         found: set[str] = set()
         waiting = [name for name in wanted if name in self.nodes]
         while waiting:

@@ -55,7 +55,7 @@ def tree_text(tree: NodeTree, run: Mapping[str, Any] | None = None) -> str:
 
 
 def read_tree(path: str | Path) -> NodeTree:
-    """The tree in a TOML file; raises InputError with what is wrong and where."""
+    """The tree in a TOML file; raises InputError with the fault and its place."""
     try:
         text = file_text(path, MOST_BYTES)
     except (OSError, UnicodeDecodeError) as error:
@@ -66,7 +66,7 @@ def read_tree(path: str | Path) -> NodeTree:
 
 
 def parse_tree(text: str, origin: str = "node tree") -> NodeTree:
-    """The tree in TOML text; raises InputError. What nodes mean is for `check.faults`."""
+    """The tree in TOML text; raises InputError. The meaning of nodes is checked by `check.faults`."""
     return tree_of(parse_toml(text, origin), origin)
 
 

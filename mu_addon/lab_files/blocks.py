@@ -1,7 +1,7 @@
-"""Tables in the rows of a file, judged by column: a row belongs to one where its columns have numbers.
+"""Tables in the rows of a file, judged by column: a row belongs to one if its columns have numbers.
 
-A row with a cell that is no number, a line of text or a blank line within a table end it not; what of them is
-not read is listed with its lines and the reason.
+A row with a cell that is no number, a line of text or a blank line does not end a table; unread parts of them
+are listed with lines and reason.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _LONGEST_SHOWN = 50
 
 @attrs.frozen
 class Unread:
-    """Something of a file that is not read: its lines, or a column, and the reason."""
+    """A part of a file that is not read: its lines, or a column, and the reason."""
 
     what: str
     why: str
@@ -72,12 +72,11 @@ def spans(lines: Sequence[int]) -> str:
 class Block:
     """A table of one record.
 
-    columns: what each holds; values (n, columns) as they stand, nan where one is missing or unreadable;
-    lines (n,) in the file; label: name above its columns, "" without one; facts: what the rows above say, by
-    name in small letters: the cells after it, none of a line of one cell; decimal: the sign in these; bad:
-    text of the cells that are no number, by row and column; unread: columns that are not read; unsure:
-    whether both decimal signs are possible; noted: what was concluded; clock: the column that holds times of
-    day, None for none.
+    columns: the quantity of each; values (n, columns) as in the file, nan where one is missing or unreadable;
+    lines (n,) in the file; label: name above its columns, "" without one; facts: of the rows above, by name
+    in small letters: the cells after it, none for a line of one cell; decimal: the sign in these; bad: text
+    of the cells that are no number, by row and column; unread: columns that are not read; unsure: both
+    decimal signs are possible; noted: conclusions; clock: the column that holds times of day, None for none.
     """
 
     sheet: str
@@ -96,7 +95,7 @@ class Block:
 
 @attrs.frozen(eq=False)
 class Tables:
-    """The records of a sheet in their order, the lines that are not read, and those of titles and facts."""
+    """The records of a sheet in their order, the unread lines, and those of titles and facts."""
 
     blocks: tuple[Block, ...]
     unread: tuple[Unread, ...]
@@ -104,12 +103,12 @@ class Tables:
 
 
 def tables(sheet: Sheet) -> Tables:
-    """The records of a sheet; records side by side in one table are divided. Raises InputError."""
+    """Records of a sheet; records side by side in one table are divided. Raises InputError."""
     return _Finding(sheet).tables()
 
 
 class _Finding:
-    """A sheet on its way to tables."""
+    """Search for the tables of a sheet."""
 
     def __init__(self, sheet: Sheet) -> None:
         self.sheet, self.rows = sheet, sheet.rows
@@ -152,7 +151,7 @@ class _Finding:
             self.unread.append(Unread("", why, lines))
 
     def _leave_text(self, rows: Sequence[Row], why: str) -> None:
-        """List rows with what they say."""
+        """List rows as unread, with their text."""
         by_text: dict[str, list[Row]] = {}
         for row in rows:
             by_text.setdefault(" ".join(row.filled), []).append(row)
@@ -161,12 +160,12 @@ class _Finding:
             self._leave(same, f"{shown!r}: {why}")
 
     def _note_numbers(self, places: Sequence[int] | range) -> None:
-        """List the rows of numbers that are no record, also one that was cut after its first number."""
+        """List rows of numbers that belong to no record, also one that was cut after its first number."""
         rows = [self.rows[k] for k in places if len(self.numeric[k]) > 1 or self._begins_with_number(k)]
         self._leave(rows, f"numbers above a table, fewer than {FEWEST} rows")
 
     def _begins_with_number(self, k: int) -> bool:
-        """Whether the first cell of a row that is not empty is a number: a fact begins with its name."""
+        """Return True if the first filled cell of a row is a number: a fact begins with its name."""
         first = next((place for place, cell in enumerate(self.rows[k].cells) if cell), -1)
         return first in self.numeric[k]
 
@@ -181,7 +180,7 @@ class _Finding:
         return None
 
     def _extent(self, start: int) -> tuple[list[int], list[int], int]:
-        """The rows of a table, the rows within it that hold no two numbers of it, and where it ends."""
+        """The rows of a table, the rows within it without two numbers of it, and its end."""
         near = [m for m in self.numeric[start : start + _JUDGED] if len(m) > 1]
         counts: dict[int, int] = {}
         for m in near:
@@ -206,7 +205,7 @@ class _Finding:
         return members, skipped, members[-1] + 1
 
     def _begins_anew(self, members: Sequence[int], between: Sequence[int], k: int) -> bool:
-        """Whether another record begins at row k, after rows without numbers."""
+        """Return True if another record begins at row k, after rows without numbers."""
         if any(
             len(row.filled) == 1 and _SPECIMEN.fullmatch(plain(row.filled[0])) for row in self._at(between)
         ):
@@ -230,7 +229,7 @@ class _Finding:
         return [list(row.filled) for row in self.rows[max(0, start - _MOST_TITLE_ROWS) : start] if row.filled]
 
     def _order(self, members: Sequence[int], k: int) -> int | None:
-        """1 where the first column that grows goes on growing at row k, -1 where it falls back, None else."""
+        """1 if the first growing column goes on growing at row k, -1 if it falls back, else None."""
         first, last = members[0], members[-1]
         # Of the last rows one may be damaged.
         places = (first, members[-min(2, len(members))], last, k)
@@ -245,7 +244,7 @@ class _Finding:
         return None
 
     def _table(self, begin: int, start: int, members: Sequence[int], skipped: Sequence[int]) -> list[Block]:
-        """The records of a table whose rows are known."""
+        """Records of a table whose rows are known."""
         above = self.rows[begin:start]
         titles, damaged = self._titles(range(begin, start))
         used = {row.line for row in titles} | {row.line for row in damaged}
@@ -268,7 +267,7 @@ class _Finding:
         return [attrs.evolve(block, label=block.label or self.specimen) for block in blocks]
 
     def _titles(self, places: range) -> tuple[list[Row], list[Row]]:
-        """The rows of titles, units and labels above the numbers, and damaged rows of numbers below them."""
+        """Rows of titles, units and labels above the numbers, and damaged rows of numbers below them."""
         width = max(self.usual) + 1
         found: list[Row] = []
         damaged: list[Row] = []
@@ -300,7 +299,7 @@ class _Finding:
         return (found, damaged) if found else ([], [])
 
     def _title_row(self, k: int, width: int) -> Row:
-        """A row above the numbers with its titles apart, though another separator divides them."""
+        """A row above the numbers split into its titles, also with another separator."""
         row = self.rows[k]
         cells = (_COMMENT.sub("", row.cells[0]), *row.cells[1:]) if row.cells else row.cells
         if len([c for c in cells if c]) == 1 and width > 1:
@@ -317,19 +316,19 @@ class _Finding:
 
 
 def _numeric_with_units(row: Row) -> frozenset[int]:
-    """The places of a row's cells that hold a number, also one with its unit behind it."""
+    """Positions of a row's cells that hold a number, also one followed by its unit."""
     return row.numeric | {k for k, cell in enumerate(row.cells) if is_unit(unit_behind(cell))}
 
 
 def _is_titles(row: Row) -> bool:
-    """Whether a row may be titles or units: text in two cells or more, and nothing that is a reading."""
+    """Return True if a row may be titles or units: text in two cells or more, and no reading."""
     filled = row.filled
     numbers = [cell for cell in filled if not is_unit(cell) and row.cells.index(cell) in row.numeric]
     return len(filled) >= 2 and not numbers
 
 
 def _is_units(row: Row) -> bool:
-    """Whether a row is of units, known ones or not: all in brackets, or most known and all short."""
+    """Return True if a row is of units: all in brackets, or most known and all short."""
     filled = row.filled
     if all(re.fullmatch(r"[(\[].*[)\]]", cell) for cell in filled):
         return True
@@ -340,12 +339,12 @@ def _is_units(row: Row) -> bool:
 
 
 def _is_label_row(row: Row, titles: Row) -> bool:
-    """Whether a row names the specimens of several columns each."""
+    """Return True if a row names the specimens of several columns each."""
     return 2 <= len(row.filled) < len(titles.filled) and len(row.cells) > len(row.filled)
 
 
 def _known(row: Row) -> int:
-    """How many cells of a row name a quantity."""
+    """Number of a row's cells that name a quantity."""
     return sum(bool(column(cell).quantity) for cell in row.cells)
 
 
@@ -431,7 +430,7 @@ def _named(title: str, k: int) -> str:
 
 
 def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) -> None:
-    """Raise InputError where commas divide columns and decimals alike."""
+    """Raise InputError if commas divide columns and decimals alike."""
     named = sum(map(bool, heads))
     if sheet.delimiter != "," or named < 2 or any("." in cell for row in rows[:99] for cell in row.cells):
         return
@@ -446,7 +445,7 @@ def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) ->
 
 @attrs.frozen(eq=False)
 class _Read:
-    """A column as it was read: numbers (values (n,)) or none, with the words that say why."""
+    """A column read as numbers (values (n,)), or the reason why not."""
 
     values: Array
     bad: dict[int, str]
@@ -462,7 +461,7 @@ class _Read:
 
 
 def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
-    """A column of numbers, of a clock, or of words, as most of its cells are."""
+    """A column of numbers, of a clock, or of words, by most of its cells."""
     filled = [cell for cell in cells if cell]
     empty = np.full(len(cells), np.nan)
     if not filled:
@@ -494,7 +493,7 @@ def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
 
 
 def _require_forced(sheet: Sheet, unreadable: Sequence[int], cells: Sequence[str], lines: Array) -> None:
-    """Raise InputError for a number that the answered decimal sign does not read, and the other does."""
+    """Raise InputError for a number that can be read with the other decimal sign only."""
     other = "." if sheet.forced == "," else ","
     for i in unreadable:
         if number(cells[i], other) is not None:
@@ -514,7 +513,7 @@ def _clock_column(cells: list[str]) -> _Read:
 
 
 def _in_one_notation(sheet: Sheet, read: dict[int, _Read]) -> dict[int, _Read]:
-    """The columns, those that do not tell their decimal sign by the sign of those that do."""
+    """The columns, ambiguous ones read with the decimal sign of the others."""
     taken = [
         one.decimal
         for one in read.values()
@@ -540,7 +539,7 @@ def _cell(cells: Sequence[str], k: int) -> str:
 
 
 def _side_by_side(columns: dict[int, Column]) -> list[list[int]]:
-    """Groups of columns, a new one wherever the title of a group's first column comes again."""
+    """Groups of columns, a new one at each repetition of a group's first title."""
     groups: list[list[int]] = []
     for k, one in columns.items():
         first = columns[groups[-1][0]].title if groups else None
@@ -551,7 +550,7 @@ def _side_by_side(columns: dict[int, Column]) -> list[list[int]]:
 
 
 def _facts(rows: Sequence[Row]) -> dict[str, tuple[str, ...]]:
-    """What rows above a table say, as in `Thickness;3.0;mm`, `Thickness: 3.0 mm` and `Thickness = 3.0`."""
+    """Facts in rows above a table, as in `Thickness;3.0;mm`, `Thickness: 3.0 mm` and `Thickness = 3.0`."""
     found: dict[str, tuple[str, ...]] = {}
     for row in rows:
         cells = list(row.filled)
@@ -571,6 +570,6 @@ def _facts(rows: Sequence[Row]) -> dict[str, tuple[str, ...]]:
 
 
 def _specimen(rows: Sequence[Row]) -> str:
-    """The name of a specimen that stands on a line of its own, the last one; "" for none."""
+    """Name of a specimen on a separate line, the last one; "" for none."""
     lines = [row.filled[0] for row in rows if len(row.filled) == 1]
     return next((line for line in reversed(lines) if _SPECIMEN.fullmatch(plain(line))), "")

@@ -8,13 +8,13 @@ _ROWS, _CELLS, _TABLES = ("tr", "row", "ss:row"), ("td", "th", "cell", "ss:cell"
 
 
 def is_markup(text: str) -> bool:
-    """Whether a text is HTML, or XML of a spreadsheet."""
+    """Return True if a text is HTML, or XML of a spreadsheet."""
     head = text[:2000].lstrip("\ufeff \r\n\t").casefold()
     return head.startswith(("<html", "<!doctype html", "<table", "<?xml", "<meta", "<head", "<style"))
 
 
 def rows_of_markup(text: str) -> list[list[str]]:
-    """The rows of all its tables as cells, in their order; none where it has no table."""
+    """Rows of all its tables as cells, in order; empty without a table."""
     reader = _Reader()
     reader.feed(text)
     reader.close()
@@ -22,7 +22,7 @@ def rows_of_markup(text: str) -> list[list[str]]:
 
 
 class _Reader(HTMLParser):
-    """Gathers cells; what is not closed ends with the next one."""
+    """Collects cells; an unclosed one ends with the next."""
 
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)
@@ -30,7 +30,7 @@ class _Reader(HTMLParser):
         self.within = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """A row, or a cell: at the place that it names, and as wide as it spans."""
+        """Start a row or a cell, at its named position and with its span."""
         if tag in _ROWS or (tag in _TABLES and self.rows):
             self.rows.append([])
             self.within = False
@@ -47,11 +47,11 @@ class _Reader(HTMLParser):
             self.rows[-1][self.at] += " "
 
     def handle_endtag(self, tag: str) -> None:
-        """The end of a cell."""
+        """End a cell."""
         if tag in _CELLS:
             self.within = False
 
     def handle_data(self, data: str) -> None:
-        """Text of a cell."""
+        """Add text to a cell."""
         if self.within:
             self.rows[-1][self.at] = f"{self.rows[-1][self.at]}{data}".strip("\r\n\t")

@@ -1,4 +1,4 @@
-"""Which experiments the tables of laboratory files are, what was concluded, and what has to be asked."""
+"""Experiments in the tables of laboratory files, the conclusions drawn, and the open questions."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ _STEP, _WITHIN, _CAMERA_Hz = 0.6, 0.02, 20.0
 
 @attrs.frozen
 class Question:
-    """What a file cannot say: the key that answers it, in words, and answers that may be given.
+    """A question that a file leaves open: its key, its text, and possible answers.
 
-    proposed: an answer that suggests itself, "" where none does.
+    proposed: the likely answer, "" without one.
     """
 
     key: str
@@ -59,18 +59,18 @@ class Question:
 
     @property
     def text(self) -> str:
-        """The question with the answers that it offers."""
+        """The question with its possible answers."""
         return self.words + (f" ({', '.join(self.choices)})" if self.choices else "")
 
 
 @attrs.frozen(eq=False)
 class Proposal:
-    """One experiment, as far as it is understood.
+    """One experiment, as far as it was read.
 
-    file, sheet: where it stands; lines (n,): of the rows that are read; keys: of experiments.toml; columns:
-    arrays (n,) by their names in a folder of measured data; origin: where each column comes from; concluded:
-    what was changed or assumed; unread: lines and columns that are not read; questions: what has still to be
-    answered; titles: of all columns of the table, and their numbers.
+    file, sheet: its source; lines (n,): of the rows read; keys: of experiments.toml; columns: arrays (n,) by
+    their names in a folder of measured data; origin: source of each column; concluded: changes and
+    assumptions; unread: lines and columns that are not read; questions: those still open; titles: of all
+    columns of the table, and their numbers.
     """
 
     file: Path
@@ -102,20 +102,20 @@ class Proposal:
 
 
 class NoExperiment(InputError):
-    """A table of which no experiment can be made."""
+    """A table from which no experiment can be made."""
 
 
 def propose(path: Path, block: Block, name: str, answers: Mapping[str, str]) -> Proposal:
-    """What experiment a table is.
+    """Make an experiment of a table.
 
-    name: of the experiment; answers: by key, as text, of this experiment. Raises InputError for an answer
-    that cannot be, for a time that does not run on, and NoExperiment where columns are missing.
+    name: of the experiment; answers: by key, as text, of this experiment. Raises InputError for an invalid
+    answer, for a time that does not increase, and NoExperiment where columns are missing.
     """
     return _Proposing(path, block, name, dict(answers)).proposal()
 
 
 def answers_for(name: str, given: Mapping[str, str]) -> dict[str, str]:
-    """The answers that hold for an experiment: those under its name before those for all."""
+    """Answers for an experiment: those under its name before those for all."""
     general = {key: value for key, value in given.items() if "." not in key or key.startswith(_OWN)}
     own = {key[len(name) + 1 :]: value for key, value in given.items() if key.startswith(name + ".")}
     return general | own
@@ -126,7 +126,7 @@ _OWN = ("unit.", "column.")
 
 
 class _Proposing:
-    """One table on its way to an experiment: what was found so far."""
+    """Conversion of one table to an experiment."""
 
     def __init__(self, path: Path, block: Block, name: str, answers: dict[str, str]) -> None:
         self.path, self.block, self.name, self.answers = path, block, name, answers
@@ -193,7 +193,7 @@ class _Proposing:
         return f"what it holds is not known; column.{one.name}=QUANTITY says it"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
-        """The columns that are understood, in the units that are read, and where each comes from."""
+        """The columns of known quantity, in the units that are read, and the source of each."""
         columns: dict[str, Array] = {}
         origin: dict[str, str] = {}
         position: tuple[int, Array, str] | None = None
@@ -275,7 +275,7 @@ class _Proposing:
         return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, stated="")
 
     def _ask_column(self, k: int, quantities: Sequence[str], words: str) -> None:
-        """Ask what a column holds."""
+        """Ask for the quantity of a column."""
         one = self.block.columns[k]
         values = self.block.values[:, k]
         proposed = one.likely if one.likely in quantities else ""
@@ -286,7 +286,7 @@ class _Proposing:
         )
 
     def _unit(self, one: Column, k: int) -> Column:
-        """A column with the unit that an answer gives it, `unit.TITLE=N`; asked for where none does."""
+        """A column with its unit from an answer, `unit.TITLE=N`; asked for without one."""
         wanted = READ_IN[one.quantity]
         key, answer = self._answer("unit", one)
         if answer is None:
@@ -323,7 +323,7 @@ class _Proposing:
         return attrs.evolve(one, unit=answer, factor=known[1])
 
     def _likely(self, one: Column, k: int) -> str:
-        """The unit that suggests itself: of strain and of time by how large the values are."""
+        """The likely unit: of strain and of time by the size of the values."""
         values = self.block.values[:, k]
         if one.quantity == "strain":
             return "%" if np.nanmax(np.abs(values), initial=0) > 1.5 else "1"
@@ -335,7 +335,7 @@ class _Proposing:
         return _OFTEN[READ_IN[one.quantity]][0] if READ_IN[one.quantity] in ("mm", "N", "deg") else ""
 
     def _kind(self, columns: Mapping[str, Array]) -> str:
-        """The kind of experiment, "" where it must be asked."""
+        """Kind of experiment, "" if it must be asked."""
         answer = self.answers.get("kind")
         if answer is not None:
             if answer not in KINDS:
@@ -374,7 +374,7 @@ class _Proposing:
         return ""
 
     def _ask_unknown(self) -> bool:
-        """Ask for the columns of which nothing is known; returns whether there are any."""
+        """Ask for the columns of unknown quantity; return True if there are any."""
         unknown = [k for k in self.free if not self.block.columns[k].quantity]
         for k in unknown[:_MOST_ASKED]:
             unit = unit_of(self.block.columns[k].unit) if self.block.columns[k].unit else None
@@ -385,7 +385,7 @@ class _Proposing:
         return bool(unknown)
 
     def _refuse(self, have: set[str]) -> None:
-        """Raise NoExperiment with what there is and what each kind needs."""
+        """Raise NoExperiment with the columns found and those that each kind needs."""
         ways = "; ".join(
             f"{kind.name}: {' or '.join(', '.join(g) for g in kind.needs)}" for kind in KINDS.values()
         )
@@ -398,7 +398,7 @@ class _Proposing:
         )
 
     def _require_needed(self, columns: Mapping[str, Array], kind: str) -> None:
-        """Ask which column is what the kind needs; raises NoExperiment where none is left."""
+        """Ask for the columns that the kind needs; raises NoExperiment if no candidate is left."""
         have = set(columns)
         groups = [set(group) | ({"time_s"} if KINDS[kind].timed else set()) for group in KINDS[kind].needs]
         if any(group - {"time_s"} <= have for group in groups):
@@ -429,7 +429,7 @@ class _Proposing:
                 self.questions[-1] = attrs.evolve(self.questions[-1], proposed=wanted[0])
 
     def _may_be(self, k: int, quantities: Sequence[str]) -> bool:
-        """Whether a column that is not read may hold one of these, by its unit."""
+        """Return True if an unread column may hold one of these quantities, by its unit."""
         one = self.block.columns[k]
         if self._answer("column", one)[1] is not None or (one.quantity == "count" and one.unit):
             return False
@@ -437,7 +437,7 @@ class _Proposing:
         return known is None or any(READ_IN[q] == known[0] for q in quantities)
 
     def _loading(self) -> str:
-        """Whether a specimen is pulled or a lattice compressed, by the words of the file."""
+        """Kind of loading, a pulled specimen or a compressed lattice, by the words of the file."""
         words = " ".join(
             [self.path.stem, self.block.sheet, self.block.label, *(c.title for c in self.block.columns)]
             + [" ".join((key, *cells)) for key, cells in self.block.facts.items()]
@@ -458,7 +458,7 @@ class _Proposing:
         return ""
 
     def _interval(self, columns: dict[str, Array], origin: dict[str, str], kind: str) -> None:
-        """A time made from an interval, where the file has none and the kind needs one."""
+        """A time made from an interval, if the file has none and the kind needs one."""
         if "time_s" in columns:
             return
         interval = self._positive("interval_s") if "interval_s" in self.answers else None
@@ -471,7 +471,7 @@ class _Proposing:
             )
 
     def _of_kind(self, columns: Mapping[str, Array], kind: str) -> dict[str, Array]:
-        """The columns that a kind may have."""
+        """Columns that a kind may have."""
         kept = {name: values for name, values in columns.items() if KINDS[kind].knows(name)}
         self.unread += [
             Unread(self._title(self.places[name]), f"{name} is nothing that {kind} has")
@@ -481,7 +481,7 @@ class _Proposing:
         return kept
 
     def _complete(self, columns: dict[str, Array], kind: str) -> dict[str, Array]:
-        """The rows in which nothing is missing that may not be; the others are listed with the reason."""
+        """Rows without missing required values; the others are listed with the reason."""
         needs = KINDS[kind].needs
         reasons: dict[str, list[int]] = {}
         for name, values in list(columns.items()):
@@ -521,7 +521,7 @@ class _Proposing:
         return {name: values[self.keep] for name, values in columns.items()}
 
     def _time(self, columns: dict[str, Array], kind: str) -> None:
-        """Raise InputError for a time that runs backward; leave out one that stands still, if it may be."""
+        """Raise InputError for a time that runs backward; leave out one that stands still, if allowed."""
         if "time_s" not in columns:
             return
         step = np.diff(columns["time_s"])
@@ -539,7 +539,7 @@ class _Proposing:
             del columns["time_s"]
 
     def _signs(self, columns: dict[str, Array], kind: str) -> None:
-        """Compression is positive in a block of lattice; force and stretch of a coupon have one sign."""
+        """Set signs: compression positive in a block of lattice; a coupon's force and stretch alike."""
         pairs = [name for name in ("strain", "displacement_mm", "stress_kPa", "force_N") if name in columns]
         negative = [name for name in pairs if _extreme(columns[name]) < 0]
         differ = kind == "coupon" and len(negative) < len(pairs)
@@ -553,7 +553,7 @@ class _Proposing:
             self.concluded.append("force and displacement are negative: read as compression of the coupon")
 
     def _zero(self, columns: dict[str, Array]) -> None:
-        """A displacement that begins at a place of the machine begins at zero."""
+        """Shift a displacement that begins at a position of the machine to begin at zero."""
         found = columns.get("displacement_mm")
         if found is None or self.answers.get("zero") == "as_read":
             return
@@ -566,7 +566,7 @@ class _Proposing:
             )
 
     def _keys(self, columns: Mapping[str, Array], kind: str) -> dict[str, Any]:
-        """The keys of experiments.toml: answers, then what the file says, else a question."""
+        """Keys of experiments.toml: answers, then facts in the file, else a question."""
         keys: dict[str, Any] = {"name": self.name, "kind": kind}
         keys["specimen"] = self.answers.get("specimen") or self._fact_text(_NAME) or self.name
         keys["role"] = self._choice("role", ("fit", "held_out")) or "fit"
@@ -613,7 +613,7 @@ class _Proposing:
         self.questions.append(Question(key, words, choices, proposed))
 
     def _section(self) -> list[float] | None:
-        """Width and thickness in mm by an answer or the file; of a round one, of a square of its area."""
+        """Width and thickness in mm by an answer or the file; a round section as a square of equal area."""
         if "section_mm" in self.answers:
             return self._numbers("section_mm", (2,))
         width, thickness = self._fact_mm(_WIDTH), self._fact_mm(_THICKNESS)
@@ -642,7 +642,7 @@ class _Proposing:
         )
 
     def _fact_mm(self, pattern: re.Pattern[str]) -> float | None:
-        """A positive length (or area) in mm that the file states, None without one or without its unit."""
+        """A positive length (or area) in mm stated in the file, None without it or its unit."""
         for key, cells in self.block.facts.items():
             if not cells or not pattern.search(key):
                 continue
@@ -672,7 +672,7 @@ class _Proposing:
         return value
 
     def _numbers(self, key: str, counts: Sequence[int], whole: bool = False) -> list[Any]:
-        """The numbers of an answer such as 12.5x3 or 3,3,3."""
+        """Numbers of an answer such as 12.5x3 or 3,3,3."""
         parts = [part for part in re.split(r"[x\u00d7,; ]+", self.answers[key].strip("[]() ")) if part]
         try:
             values = [int(part) if whole else float(part) for part in parts]
@@ -702,7 +702,7 @@ _OFTEN = {
 
 
 def stepped(columns: Mapping[str, Array]) -> bool:
-    """Whether a record is of steps: a pressure that jumps, read by something fast."""
+    """Return True if a record is of pressure steps, sampled fast."""
     t, p = columns.get("time_s"), columns["pressure_kPa"]
     if t is None or len(t) < 50 or not np.isfinite(p).all() or not (np.diff(t) > 0).all():
         return False

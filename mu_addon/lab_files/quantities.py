@@ -1,4 +1,4 @@
-"""What a column of a test machine's file holds: quantity and unit, by its name and the row of units."""
+"""Quantity and unit of a column in a test machine's file, by its name and the row of units."""
 
 from __future__ import annotations
 
@@ -173,12 +173,12 @@ _COMPOUND = re.compile(r"[^/\s]{1,6}/[^/\s]{1,6}|[\u00b0\u00ba]\s?[CFK]|\u2103|[
 
 @attrs.frozen
 class Column:
-    """What a column holds.
+    """Quantity of a column.
 
-    title: as the file has it; quantity: a name of `measured.kinds.UNITS`, "position", "count", or "" where it
-    is not known; unit: as the file has it, "" without one; factor: how much of the unit that is read is one
-    of it, None where the unit is not given or not known; place: number of the column in its table; likely:
-    the quantity that the unit suggests where the title says none; stated: another one that the title says.
+    title: as in the file; quantity: a name of `measured.kinds.UNITS`, "position", "count", or "" if unknown;
+    unit: as in the file, "" without one; factor: to the unit that is read, None for a missing or unknown
+    unit; place: number of the column in its table; likely: the quantity that the unit suggests if the title
+    names none; stated: another one that the title names.
     """
 
     title: str
@@ -191,14 +191,14 @@ class Column:
 
     @property
     def name(self) -> str:
-        """Its title, or its number where it has none: what answers call it."""
+        """Its title, or its number without one, as used in answers."""
         return self.title or str(self.place)
 
 
 def column(title: str, unit: str = "") -> Column:
-    """What a column of this title, and this cell in the row of units, holds.
+    """Column with this title and this cell in the row of units.
 
-    Where title and unit disagree, as in "Strain" in mm, the unit says the quantity.
+    Where title and unit disagree, as in "Strain" in mm, the unit decides.
     """
     name = title
     if not unit:
@@ -226,7 +226,7 @@ def column(title: str, unit: str = "") -> Column:
 
 
 def unit_of(text: str) -> tuple[str, float] | None:
-    """The unit that is read in place of this one, and how much of it is one of it; None for no unit."""
+    """The unit that is read in place of this one, and the factor to it; None for no unit."""
     text = unicodedata.normalize("NFC", text.strip().strip("()[]{}").strip())
     if text in _BY_CASE:
         return _BY_CASE[text]
@@ -234,12 +234,12 @@ def unit_of(text: str) -> tuple[str, float] | None:
 
 
 def is_unit(cell: str) -> bool:
-    """Whether a cell holds the name of a unit and nothing else."""
+    """Return True if a cell is the name of a unit."""
     return unit_of(cell) is not None
 
 
 def known_words(text: str) -> int:
-    """How many cells of a text's first lines name a quantity or a unit in letters beyond ASCII."""
+    """Number of cells in a text's first lines that name a quantity or a unit with letters beyond ASCII."""
     cells = [cell for cell in re.split(r"[\t;,\n()\[\]\"]| {2,}", text[:4000]) if cell and not cell.isascii()]
     return sum(bool(_meant(cell)) + is_unit(cell) for cell in cells)
 
@@ -259,7 +259,7 @@ def _apart(title: str) -> tuple[str, str]:
 
 
 def _meant(name: str, unit: str | None = None) -> str:
-    """The quantity that a name says, of those that have this unit where it is known; "" for none."""
+    """Quantity of a name, among those of this unit if it is known; "" for none."""
     words = plain(name).replace("_", " ")
     if words.strip() == "t" and unit in (None, "s"):
         return "time"

@@ -1,4 +1,4 @@
-"""A file of a laboratory as sheets of cells, by its content: text in any encoding, a workbook, HTML."""
+"""A laboratory's file as sheets of cells, by its content: text in any encoding, a workbook, HTML."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 class Sheet:
     """Rows of a file, or of one sheet of a workbook (name "").
 
-    delimiter: what divides the cells of a text; usual: the decimal sign where cells do not tell it; forced:
-    the one that holds in any case; "" for neither.
+    delimiter: between the cells of a text; usual: the decimal sign of ambiguous cells; forced: the sign in
+    any case; "" for neither.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Sheet:
 
 
 def read_sheets(path: Path, decimal: str | None = None) -> tuple[Sheet, ...]:
-    """The sheets of a workbook, or the one of a text file; raises InputError with what to do.
+    """Sheets of a workbook, or the one of a text file; raises InputError with the remedy.
 
     decimal: the decimal sign of a text, "." or ",", where it is known.
     """
@@ -59,7 +59,7 @@ def read_sheets(path: Path, decimal: str | None = None) -> tuple[Sheet, ...]:
 
 
 def sheet_of_text(text: str, decimal: str | None = None, where: str = "") -> Sheet:
-    """The sheet of a text, or of the tables in HTML; raises InputError for HTML without one."""
+    """Sheet of a text, or of the tables in HTML; raises InputError for HTML without one."""
     if not is_markup(text):
         rows, delimiter = rows_of(text)
         # A comma between columns is no decimal sign but in quotes.
@@ -75,7 +75,7 @@ def sheet_of_text(text: str, decimal: str | None = None, where: str = "") -> She
 
 
 def _workbook(path: Path, data: bytes) -> tuple[Sheet, ...]:
-    """Every sheet with something in it; numbers as text with a decimal point."""
+    """Every sheet that is not empty; numbers as text with a decimal point."""
     import io
 
     from python_calamine import CalamineError, CalamineWorkbook
@@ -100,7 +100,7 @@ def _workbook(path: Path, data: bytes) -> tuple[Sheet, ...]:
 
 
 def _require_small(path: Path, data: bytes) -> None:
-    """Raise InputError for a workbook that unpacks to more than is read."""
+    """Raise InputError for a workbook that unpacks to more than the limit."""
     if not data.startswith(b"PK"):
         return
     import io

@@ -207,7 +207,7 @@ def _diagonal(stretches: Array) -> Array:
 
 
 def _check_axes(law: Any, stress: Array, modulus: float) -> None:
-    """A coupon stays a brick only if the law's axes are its own."""
+    """Raise InputError unless the law's axes are the coupon's, so that it stays a brick."""
     shear = np.abs(stress - stress * np.eye(3)).max()
     if shear > 1e-9 * modulus:
         raise InputError(

@@ -29,7 +29,7 @@ class ModeError:
     """Misfit of a law to one coupon.
 
     rms_MPa: root mean square of the deviation in MPa; share: norm of the deviations over the norm of the
-    stresses; worst: largest deviation over the largest stress; fitted: whether the law was fitted to the
+    stresses; worst: largest deviation over the largest stress; fitted: True if the law was fitted to the
     coupon.
     """
 
@@ -219,7 +219,7 @@ def _weights(coupons: Sequence[Coupon], weights: str) -> Array:
 
 
 def _fewer(form: Form, coupons: Sequence[Coupon], weights: str) -> Problem:
-    """The problem with long records in bins: within one a law is as good as straight."""
+    """The problem with long records in bins, within which a law is almost straight."""
     parts = [binned(c) for c in coupons]
     means = [c for c, _ in parts]
     scale = np.concatenate([_weights([c], weights) for c in means])

@@ -246,7 +246,7 @@ def parse_material(text: str, origin: str = "") -> Material:
 
 @attrs.frozen
 class _Reader:
-    """Values of a document, each checked where it stands."""
+    """Values of a document, each checked at its place."""
 
     text: str
     origin: str

@@ -23,7 +23,7 @@ STARTS = 6
 class Problem:
     """Weighted least squares of a form: principal stretches (n, 3) and target (n,), stress over scale.
 
-    scale (n,): what residuals are divided by, in MPa.
+    scale (n,): divisors of the residuals, in MPa.
     """
 
     form: Form
@@ -33,7 +33,7 @@ class Problem:
 
     @classmethod
     def of(cls, form: Form, coupons: Sequence[Coupon], scale: Array) -> Problem:
-        """The problem of a form and coupons; scale (n,): what residuals are divided by, in MPa."""
+        """The problem of a form and coupons; scale (n,): divisors of the residuals, in MPa."""
         stretches = np.concatenate([isochoric_stretches(c.mode, c.stretch) for c in coupons])
         stress = np.concatenate([c.stress_MPa for c in coupons])
         return cls(form, stretches, stress / scale, scale)

@@ -1,4 +1,4 @@
-"""One experiment: what was tested, and the columns that were recorded."""
+"""One experiment: its specimen and conditions, and the recorded columns."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ def _read_only(columns: Mapping[str, Any]) -> Mapping[str, Array]:
 
 @attrs.frozen(eq=False)
 class Experiment:
-    """One experiment of a folder of measured data; what a kind does not have, or was not given, is None.
+    """One experiment of a folder of measured data; keys that its kind lacks, or were not given, are None.
 
     columns: arrays (n,) by their names, which end with the unit; for a coupon or a lattice that was recorded
     as displacement and force they include strain and nominal stress_kPa (compression positive in
     lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
     by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
     mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
-    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see
-    `pose.down`. gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness
-    of what bears the load. sha256: of the file's bytes.
+    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see `pose.down`.
+    gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness of what bears
+    the load. sha256: of the file's bytes.
     """
 
     name: str

@@ -80,7 +80,7 @@ def read_folder(folder: Path) -> Measured:
 
 
 def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, ...]:
-    """Experiments in the order they were made: by run_order where it is given, else as they stand."""
+    """Experiments in the order they were made: by run_order if given, else by the file's order."""
     without = [e.name for e in experiments if e.run_order is None]
     if len(without) == len(experiments):
         return tuple(experiments)
@@ -95,7 +95,7 @@ def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, 
 
 @attrs.frozen
 class _Place:
-    """Where the keys of the n-th experiment stand."""
+    """Location of the keys of the n-th experiment."""
 
     path: Path
     text: str
@@ -144,14 +144,14 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
 
 
 def _gauge_pressure(pressure_kPa: Array, entry: dict[str, Any], at: _Place) -> Array:
-    """Gauge pressure (n,) in kPa: as read, or less the atmosphere where it is said to be absolute."""
+    """Gauge pressure (n,) in kPa: as read, or less the atmosphere if it is marked as absolute."""
     if "pressure" in entry and _choice(entry, "pressure", PRESSURES, at) == "absolute":
         return pressure_kPa - ATMOSPHERE_kPa
     return pressure_kPa
 
 
 def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequence[dict[str, Any]]) -> None:
-    """Raise InputError where nothing is said and all readings are like a unit's absolute pressures."""
+    """Raise InputError if all readings look like a unit's absolute pressures and are not marked."""
     read = [e for e in experiments if "pressure_kPa" in e.columns]
     if not read or any("pressure" in entry for entry in entries):
         return
@@ -168,7 +168,7 @@ def _require_gauge_pressures(experiments: Sequence[Experiment], entries: Sequenc
 
 
 def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
-    """The values of the keys that are there, checked."""
+    """Checked values of the keys that are present."""
     fields: dict[str, Any] = {
         "name": _word(entry, "name", at),
         "role": _choice(entry, "role", ROLES, at),
@@ -251,7 +251,7 @@ def _cells(value: Any, at: _Place) -> tuple[int, int, int]:
 def _strained(
     columns: dict[str, Array], fields: dict[str, Any], kind: Kind, path: Path, remarks: list[Remark]
 ) -> dict[str, Array]:
-    """The columns with strain and nominal stress among them, from displacement and force where needed."""
+    """The columns with strain and nominal stress added, from displacement and force where needed."""
     needed = {"strain": ("displacement_mm", "length_mm"), "stress_kPa": ("force_N", "section_mm")}
     for column, (source, key) in needed.items():
         if column in columns:
@@ -298,7 +298,7 @@ def _strained(
 
 
 def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: list[Remark]) -> None:
-    """Strain that no body can have, or that looks like percent."""
+    """Check for strain that no body can have, or that looks like percent."""
     gone = strain >= 1 if kind.name == "lattice_compression" else strain <= -1
     if gone.any():
         row = int(rows[np.argmax(gone)])
@@ -320,7 +320,7 @@ def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: l
 
 
 def _check_preload(columns: dict[str, Array], rows: Array, path: Path, remarks: list[Remark]) -> None:
-    """Stress where there is no strain."""
+    """Check for stress where there is no strain."""
     strain, stress = np.abs(columns["strain"]), columns["stress_kPa"]
     rest = int(np.argmin(strain))
     if strain[rest] < 1e-3 * strain.max() and abs(stress[rest]) > PRELOAD * np.abs(stress).max():
@@ -334,7 +334,7 @@ def _check_preload(columns: dict[str, Array], rows: Array, path: Path, remarks: 
 
 
 def _check_spread(spread: Array, column: str, rows: Array, path: Path) -> None:
-    """The spread of a record is somewhere and nowhere negative."""
+    """Check that the spread of a record is positive somewhere and nowhere negative."""
     if spread.max() > 0 and spread.min() >= 0:
         return
     row = int(rows[np.argmin(spread)])
@@ -346,7 +346,7 @@ def _check_spread(spread: Array, column: str, rows: Array, path: Path) -> None:
 
 
 def _check_apart(found: Experiment, before: Sequence[Experiment], at: _Place) -> None:
-    """Names differ, and nothing held out was fitted."""
+    """Check that names differ, and that nothing held out was fitted."""
     for other in before:
         if other.name == found.name:
             raise InputError(

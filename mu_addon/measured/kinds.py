@@ -1,4 +1,4 @@
-"""The kinds of experiment: which columns each has, which of them it needs, which keys describe it."""
+"""Kinds of experiment: their columns, required ones, and keys."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ COMMON = (
 class Kind:
     """A kind of experiment.
 
-    needs: groups of columns, of which at least one must be complete; may_have: further columns; timed:
-    whether time_s is required; needs_keys, may_have_keys: keys of experiments.toml beyond `COMMON`; fewest:
-    least number of rows; marked: whether it may have columns of markers.
+    needs: groups of columns, of which at least one must be complete; may_have: further columns; timed: time_s
+    is required; needs_keys, may_have_keys: keys of experiments.toml beyond `COMMON`; fewest: least number of
+    rows; marked: it may have columns of markers.
     """
 
     name: str
@@ -104,7 +104,7 @@ class Kind:
         return COMMON + self.needs_keys + self.may_have_keys
 
     def knows(self, column: str) -> bool:
-        """Whether it may have a column of this name, with the unit that is read."""
+        """Return True if it may have a column of this name, with the unit that is read."""
         return column in self.columns or (self.marked and _MARKER.fullmatch(column) is not None)
 
 
@@ -194,7 +194,7 @@ def units_of(quantity: str) -> dict[str, float]:
 
 
 def markers(columns: Sequence[str]) -> dict[int, set[str]]:
-    """Which of x, y and z are among the columns, by the number of the marker."""
+    """Axes x, y and z among the columns, by the number of the marker."""
     found: dict[int, set[str]] = {}
     for column in columns:
         match = _MARKER.fullmatch(column)
@@ -204,5 +204,5 @@ def markers(columns: Sequence[str]) -> dict[int, set[str]]:
 
 
 def may_be_missing(column: str) -> bool:
-    """Whether single values of this column may be missing: angle, voltage, volume or a marker."""
+    """Return True if single values of this column may be missing: angle, voltage, volume or a marker."""
     return column.startswith(MAY_BE_MISSING)

@@ -1,4 +1,4 @@
-"""Which way things fall, seen from a unit that was turned."""
+"""Direction of gravity, seen from a unit that was turned."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ X: Direction = (1.0, 0.0, 0.0)
 
 
 def down(orientation_deg: float, axis: Direction = X) -> Array:
-    """Unit vector (3,) along which things fall in the unit's frame; at 0 degrees along z, as a unit hangs.
+    """Unit vector (3,) of gravity in the unit's frame; at 0 degrees along z, as a unit hangs.
 
     Gravity is turned by orientation_deg degrees about `axis` (3,), of any length but 0, as a right-handed
     screw turns (Rodrigues): about x to -y, about y to +x. Raises InputError for an axis without a length.

@@ -116,10 +116,10 @@ def _lines(text: str, path: Path) -> tuple[list[str], list[tuple[int, list[str]]
 
 
 def _plain_numbers(text: str) -> tuple[list[str], Array, Array] | None:
-    """Names (c,), line numbers (n,) and numbers (n, c) of a long table of nothing but numbers; else None.
+    """Names (c,), line numbers (n,) and numbers (n, c) of a long table of plain numbers; else None.
 
-    What has empty cells, quotes, comments between rows or numbers beyond `LARGEST` is read cell by cell, so
-    that what is wrong is told with its place.
+    Tables with empty cells, quotes, comments between rows or numbers beyond `LARGEST` are read cell by cell,
+    so that a fault is reported with its place.
     """
     above = 0
     while text.startswith(("#", "\n"), above):
@@ -160,7 +160,7 @@ def _check_names(header: Sequence[str], row: int, path: Path) -> None:
 def _header(
     header: Sequence[str], kind: Kind, path: Path, remarks: list[Remark]
 ) -> dict[int, tuple[str, float]]:
-    """The columns that are read and what their numbers are multiplied by, by their place."""
+    """Columns that are read and their factors, by position."""
     known = ", ".join(kind.columns) + (", marker1_x_mm, marker1_y_mm, ..." if kind.marked else "")
     kept: dict[int, tuple[str, float]] = {}
     for i, name in enumerate(header):

@@ -168,7 +168,7 @@ def _check(tracks: Tracks, view: View, where: str) -> None:
 
 
 def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: list[Remark], where: str) -> float:
-    """Millimetres a pixel: as given, by the ruler, or by the base; what disagrees is remarked."""
+    """Millimetres a pixel: as given, by the ruler, or by the base; disagreement is remarked."""
     found = {}
     if view.mm_per_pixel is not None:
         found["mm_per_pixel"] = view.mm_per_pixel

@@ -1,4 +1,4 @@
-"""Experiments put into a folder of measured data: tried by its reader first, then written whole."""
+"""Experiments put into a folder of measured data: checked by its reader first, then written completely."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def csv_text(columns: Mapping[str, Array], shown: Callable[[float], str] = "{:.1
 
 
 def tried(block: str, file: str, text: str) -> tuple[Remark, ...]:
-    """What the reader of measured data remarks on an experiment before it is put anywhere.
+    """Remarks of the reader of measured data on an experiment before it is written anywhere.
 
     block: its [[experiment]] in TOML; file, text: its CSV file's name and content. Raises InputError.
     """
@@ -67,9 +67,9 @@ def require_free(folder: Path, name: str, block: str, file: str) -> None:
 
 
 def add_experiment(folder: Path, name: str, block: str, file: str, text: str) -> tuple[Remark, ...]:
-    """Put an experiment into a folder; returns what the reader remarks.
+    """Put an experiment into a folder; return the reader's remarks.
 
-    One with the same entry is made anew. Arguments as of `tried`. Raises InputError where another holds the
+    One with the same entry is replaced. Arguments as of `tried`. Raises InputError where another holds the
     name or the file, or the data could not be read again, and OutputError.
     """
     remarks = tried(block, file, text)
@@ -79,7 +79,7 @@ def add_experiment(folder: Path, name: str, block: str, file: str, text: str) ->
 
 
 def put(folder: Path, block: str, file: str, text: str) -> None:
-    """Write an experiment that was tried and has its place free into a folder; raises OutputError."""
+    """Write a checked experiment whose name and file are free into a folder; raises OutputError."""
     listed = folder / FILE
     before = file_text(listed) if listed.exists() else ""
     write_text(folder / file, text)

@@ -1,4 +1,4 @@
-"""design.toml: a unit, what it shall do, what of it is free, and how the search goes about it."""
+"""design.toml: a unit, its targets, its free parameters, and settings of the search."""
 
 from __future__ import annotations
 
@@ -46,15 +46,14 @@ _KEYS = (
 class Design:
     """Contents of design.toml.
 
-    unit: where the search starts, with fixed values in it; check_refine: of the mesh that proposed units are
-    simulated on again; print_tolerance_mm, modulus_tolerance: standard errors of a print's surfaces, and of
-    the resin's modulus as a share of it, for the uncertainty of what is proposed. document: the file's own
-    tables; material: the resin's, for density and elongation at break. orientation_deg: in which the unit
-    bears its weight, 0 hanging, tip down, turned about x; None: without weight. robust:
-    whether the search asks for what is met within the uncertainty. check_struts: whether what is proposed is
-    simulated strut by strut besides. materials: the resins that the freedom `resin` is among, by name; body:
-    a closed surface in place of the lattice's box, in the unit's frame; self_contact: whether walls and
-    struts of a resolved unit keep apart.
+    unit: where the search starts, with fixed values in it; check_refine: of the mesh for the check of
+    proposed units; print_tolerance_mm, modulus_tolerance: standard errors of a print's surfaces, and of the
+    resin's modulus as a share of it, for the proposals' uncertainty. document: the file's own tables;
+    material: the resin's, for density and elongation at break. orientation_deg: of the unit under its weight,
+    0 hanging, tip down, turned about x; None: without weight. robust: targets must be met within the
+    uncertainty. check_struts: proposals are also simulated strut by strut. materials: the resins that the
+    freedom `resin` is among, by name; body: a closed surface in place of the lattice's box, in the unit's
+    frame; self_contact: of walls and struts of a resolved unit.
     """
 
     unit: Unit
@@ -82,9 +81,9 @@ class Design:
         return Uncertainty(self.print_tolerance_mm, self.modulus_tolerance)
 
     def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name; the unit lies beside, with fixed values in it.
+        """Text of every file of inputs, by name; the unit's is separate, with fixed values in it.
 
-        So does a resin that is a file of the user's.
+        Likewise a user's resin file.
         """
         tables = {key: v for key, v in self.document.items() if key not in ("preset", "unit", "run")}
         tables["unit"] = UNIT
@@ -153,7 +152,7 @@ class Design:
 
 
 def _of_resin(unit: Unit, chosen: Material, first: Material) -> Unit:
-    """The unit of another resin than its first one; its lattice and its sensor change as the wall does."""
+    """The unit with another resin; its lattice and its sensor change in proportion to the wall."""
     if chosen is first:
         return unit
     found = chosen.in_unit(unit)
@@ -168,7 +167,7 @@ def _of_resin(unit: Unit, chosen: Material, first: Material) -> Unit:
 
 
 def _as_chosen(quantity: Any, path: str, material: Material) -> Any:
-    """A quantity of a path that was left free, or of the resin's density or elongation, with these."""
+    """A quantity with the chosen path and the chosen resin's density or elongation."""
     if path and getattr(quantity, "path", None) == "":
         quantity = attrs.evolve(quantity, path=path)
     if isinstance(quantity, Mass):
@@ -201,7 +200,7 @@ def parse_design(
 ) -> Design:
     """The design in TOML text; raises InputError with file, line and key.
 
-    unit, body: in place of those that the text names; folder: where its files lie.
+    unit, body: replace those that the text names; folder: of its files.
     """
     with located_keys(text):
         return _design(text, origin, unit, folder or Path(), body)
@@ -335,7 +334,7 @@ def _places_of(
 def _require_homogenised(
     freedoms: list[Freedom], targets: list[Target], tables: list[dict[str, Any]], where: list[str]
 ) -> None:
-    """Raise InputError for what a homogenised lattice has no struts for."""
+    """Raise InputError for requests that need struts, which a homogenised lattice has not."""
     places = {table.get("parameter"): place for table, place in zip(tables, where, strict=True)}
     for freedom in freedoms:
         if freedom.name in UNSEEN:
@@ -370,7 +369,7 @@ def _tables(document: Mapping[str, Any], key: str, origin: str) -> list[dict[str
 
 
 def _places(text: str, key: str, origin: str, count: int) -> list[str]:
-    """File and line of each [[key]]; of the file alone where the tables are written otherwise."""
+    """File and line of each [[key]]; of the file alone if the tables are written otherwise."""
     lines = [n for n, line in enumerate(text.splitlines(), 1) if re.match(rf"\s*\[\[\s*{key}\s*\]\]", line)]
     if len(lines) != count:
         return [f"{origin}, {key} {number}" for number in range(1, count + 1)]

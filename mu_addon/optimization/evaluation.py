@@ -1,4 +1,4 @@
-"""From a unit to all that is asked of it, from one Model A, with gradients; never computed twice."""
+"""Evaluation of all targets of a unit from one Model A, with gradients; never computed twice."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Evaluated:
     """Evaluation of one unit.
 
     values (q,) of the targets' quantities, nan where it failed; gradient (q, f) by the continuous freedoms,
-    nan where there is none; why: what stopped it, "" where nothing did; model_a: solutions of the unit along
-    its path that it took, one for each body simulated. by_print, by_resin (q,): standard errors of the
-    values, 0 where none were asked for.
+    nan where there is none; why: the reason of a failure, else ""; model_a: number of solutions of the unit
+    along its path, one for each body simulated. by_print, by_resin (q,): standard errors of the values, 0
+    where none were asked for.
     """
 
     unit: Unit
@@ -48,7 +48,7 @@ class Evaluated:
         return not self.why
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, without the unit; `restored` is its inverse."""
+        """Plain data, without the unit; `restored` is its inverse."""
         return {
             "values": [None if np.isnan(v) else float(v) for v in self.values],
             "gradient": [[None if np.isnan(v) else float(v) for v in row] for row in self.gradient],
@@ -87,9 +87,9 @@ def evaluate(
 ) -> Evaluated:
     """All targets' quantities of a unit, and their gradients by its continuous freedoms.
 
-    A unit that cannot be meshed or does not bear a pressure is an answer (`why`), not an error. uncertainty:
-    what of a print the values' standard errors are found by. Raises InputError for targets that the mechanics
-    cannot answer.
+    A unit that cannot be meshed or cannot carry a pressure is an answer (`why`), not an error. uncertainty:
+    of a print, for the values' standard errors. Raises InputError for targets that the mechanics cannot
+    answer.
     """
     asked = [t for t in targets if t.quantity is not None]
     quantities = [t.quantity for t in asked if t.quantity is not None]
@@ -120,7 +120,7 @@ def evaluate(
 
 @attrs.frozen
 class Candidate:
-    """A unit to be evaluated, and what is chosen besides its parameters: path and resin by name."""
+    """A unit to be evaluated, and the chosen path and resin by name."""
 
     unit: Unit
     choice: tuple[tuple[str, str], ...] = ()
@@ -131,13 +131,12 @@ Asked = tuple[Sequence[Target], Mechanics]
 
 @attrs.define(eq=False)
 class Evaluator:
-    """Evaluates units, each once: from its cache where it was found before, by this run or a killed one.
+    """Evaluates units, each once: from its cache if evaluated before, by this run or a killed one.
 
-    origin: text of all that decides a value besides the unit (targets, mesh, extended model); many: evaluates
-    several candidates at a time, a function of them that yields their number and what was found; None: one
-    after the other, here. uncertainty: as `evaluate` has it. of_choice: targets and mechanics of a chosen
-    path and resin; None: those given. computed: how many units were simulated by this run, and model_a the
-    solutions they took.
+    origin: text of all inputs that decide a value besides the unit (targets, mesh, extended model); many:
+    evaluates several candidates at a time, yielding their number and result; None: one after the other, here.
+    uncertainty: as for `evaluate`. of_choice: targets and mechanics of a chosen path and resin; None: those
+    given. computed: number of units simulated by this run, and model_a the solutions they took.
     """
 
     targets: Sequence[Target]

@@ -1,4 +1,4 @@
-"""Freedoms of a design: which parameters of a unit may change, within which bounds or among which values."""
+"""Freedoms of a design: parameters of a unit that may change, with bounds or values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..errors import InputError
 
 SCALE = "scale"
 PATH, RESIN = "path", "resin"
-"""Freedoms besides a unit's parameters: which path the sensor takes, and which resin the unit is of."""
+"""Freedoms besides a unit's parameters: the path of the sensor, and the resin of the unit."""
 # Struts of a homogenised lattice have no stiffness of their own: its modulus is a parameter.
 UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
 
@@ -27,8 +27,8 @@ UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattic
 class FactorList:
     """A parameter that is a text of factors by place, any of which may be free: "grading.cells[0 2 *]".
 
-    key: of a [[freedom]] table, names the place; place: how a place is written, and an example. factors: of
-    a text, by the text of their place; text: the other way round; both raise InputError.
+    key: of a [[freedom]] table, names the place; place: its notation, with an example. factors: from a text,
+    by the text of their place; text: the inverse; both raise InputError.
     """
 
     name: str
@@ -40,7 +40,7 @@ class FactorList:
     text: Callable[[Mapping[str, float]], str]
 
     def canonical(self, place: str) -> str:
-        """The one text of all that name the same place; raises InputError."""
+        """Canonical text of all that name the same place; raises InputError."""
         # Any factor but 1, which would be no entry.
         [found] = self.factors(f"{place}: 1.5")
         return found
@@ -86,7 +86,7 @@ FACTOR_LISTS = (
 
 
 def _entry(name: str) -> tuple[FactorList, str] | None:
-    """The list and the place that a name such as "grading.cells[0 2 *]" is of; None for another name."""
+    """List and place of a name such as "grading.cells[0 2 *]"; None for another name."""
     match = re.fullmatch(r"([^\[]+)\[(.+)\]", name)
     lists = [known for known in FACTOR_LISTS if match is not None and match[1] == known.name]
     return (lists[0], match[2]) if match is not None and lists else None
@@ -113,7 +113,7 @@ class Freedom:
 
     @property
     def discrete(self) -> bool:
-        """True if it has values in place of a range."""
+        """True if it has values instead of a range."""
         return bool(self.values)
 
     @property
@@ -126,11 +126,11 @@ class Freedom:
         return parameter_of(unit, self.name)
 
     def place(self, value: float) -> float:
-        """A value of a continuous freedom as its place between the bounds, 0 to 1."""
+        """Position of a continuous freedom's value between the bounds, 0 to 1."""
         return (value - self.low) / (self.high - self.low)
 
     def at(self, place: float) -> float:
-        """The value at a place, 0 to 1, to nine figures: what means nothing would only make a new unit."""
+        """Value at a position, 0 to 1, to nine figures: further digits would only make a new unit."""
         value = self.low + place * (self.high - self.low)
         return min(max(float(f"{value:.9g}"), self.low), self.high)
 
@@ -153,7 +153,7 @@ def parameter_of(unit: Unit, name: str) -> Any:
 
 
 def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any]) -> Unit:
-    """The unit with other values of some freedoms, and of what follows them; raises InputError.
+    """The unit with other values of some freedoms, and of the parameters tied to them; raises InputError.
 
     All at once, so that a rule sees the whole change.
     """
@@ -204,7 +204,7 @@ def read_freedoms(tables: Sequence[Mapping[str, Any]], where: Sequence[str], uni
 
 
 def fixed_values(tables: Sequence[Mapping[str, Any]], where: Sequence[str]) -> dict[str, Any]:
-    """Values by name of the [[freedom]] tables that say `fixed`; raises InputError for an unknown name."""
+    """Values by name of the [[freedom]] tables with `fixed`; raises InputError for an unknown name."""
     found = {}
     for table, place in zip(tables, where, strict=True):
         if "fixed" in table:
@@ -329,7 +329,7 @@ def _also(given: Any, where: str) -> dict[str, float]:
 
 
 def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
-    """Raise InputError where a value is none that the parameter may have."""
+    """Raise InputError for a value that the parameter may not have."""
     if not freedom.is_of_unit:
         return
     if entry := _entry(freedom.name):

@@ -40,7 +40,7 @@ class Adjoint:
 
 
 def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]) -> Adjoint:
-    """One factorisation a condition, and one solution a quantity that has a `slope` there.
+    """Factorise once a condition, and solve once for each quantity with a `slope` there.
 
     Raises IndefiniteError at an unstable state.
     """
@@ -108,7 +108,7 @@ def gradients(
 def _changes(
     structure: Structure, states: States, solved: Adjoint
 ) -> dict[Condition, tuple[list[int], ResidualChange]]:
-    """For each condition of an adjoint the quantities it serves, and the change of lambda . r."""
+    """Quantities that each condition of an adjoint serves, and the change of lambda . r."""
     found = {}
     for condition, (numbers, lam) in solved.of.items():
         along = [_everywhere(structure, column) for column in lam.T]

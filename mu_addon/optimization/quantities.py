@@ -74,8 +74,8 @@ class TipForce:
     """Force in N with which the tip presses on a wall at a pressure in kPa: the blocked force.
 
     The wall lies along the axis, gap_mm from the +y edge of the tip as drawn, toward which pressure bends the
-    unit; the tip slides on it without friction, and turns. It is held to either side (`HeldTip`), so that
-    the force is smooth: below 0 it does not reach the wall, and would have to be pulled there.
+    unit; the tip slides on it without friction, and turns. It is held to either side (`HeldTip`), so that the
+    force is smooth: below 0 the free tip would not reach the wall.
     """
 
     name: str
@@ -154,7 +154,7 @@ class Workspace:
         return {c: _tip_slope(structure, pull) for c, pull in zip(self.conditions, pulls, strict=True)}
 
     def _steps(self, structure: Structure, states: States) -> Array:
-        """From each place to the next, (k - 1, 3) in mm."""
+        """Steps from each position to the next, (k - 1, 3) in mm."""
         return np.diff([_tip_centre(structure, states[c]) for c in self.conditions], axis=0)
 
 
@@ -313,8 +313,8 @@ class Stretch:
 def _solid(mesh: Mesh, elements: Array, volumes: Array) -> Array:
     """Volumes (e, q) in mm3 of some elements' quadrature points, as far as they are filled.
 
-    What is filled by less than half counts less and less, and by less than a quarter not at all: next to
-    nothing holds it.
+    Points filled by less than half count less and less, and by less than a quarter not at all, as they are
+    hardly supported.
     """
     if not mesh.resolved:
         return volumes
@@ -394,7 +394,7 @@ class RestStiffness:
 
 @attrs.frozen
 class WallsApart:
-    """1 where no wall of the body passes through another at a pressure in kPa, else 0; it has no slope."""
+    """1 if no wall of the body passes through another at a pressure in kPa, else 0; it has no slope."""
 
     name: str
     pressure_kPa: float
@@ -409,7 +409,7 @@ class WallsApart:
         return float(not crossings(structure.model.mesh, states[self.conditions[0]]))
 
     def change(self, structure: Structure, states: States, plus: Structure, minus: Structure) -> float:
-        """None, since it is a yes or a no."""
+        """0.0: a yes-or-no quantity has no derivative."""
         return 0.0
 
 

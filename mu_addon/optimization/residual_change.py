@@ -1,4 +1,4 @@
-"""Difference in the residual's work along given displacements between two bodies near to one."""
+"""Difference in the residual's work along given displacements between two similar bodies."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class ResidualChange:
 def _weights_change(plus: Materials, minus: Materials, count: int) -> Array | None:
     """Difference (m,) of the logarithm of each of `count` elements' stiffness between two bodies' materials.
 
-    None where that is not all that differs: each element of one law with the same parameters.
+    None if more differs: each element must have one law with the same parameters.
     """
     if len(plus.layers) != len(minus.layers):
         return None

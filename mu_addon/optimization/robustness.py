@@ -1,4 +1,4 @@
-"""A proposed unit simulated again on a finer mesh, and what print and resin leave uncertain of it."""
+"""A proposed unit simulated again on a finer mesh, and its uncertainty by print and resin."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Verified:
     """A proposed unit on a finer mesh.
 
     values (q,), and standard errors (q,) by mesh, print and resin, in the quantities' units; robust (q,):
-    whether it meets each target for all values within `SURE` errors, met (q,): for the value itself; why:
-    what stopped it, "" where nothing did. print_worst: of the printability check, "" where none was asked
-    for, and its findings in words. with_struts (q,): values of the body as printed, strut by strut, nan where
-    none were asked for or found, and struts_why, what stopped that one.
+    mask of targets met for all values within `SURE` errors, met (q,): for the value itself; why: the reason
+    of a failure, else "". print_worst: of the printability check, "" without one, and its findings in words.
+    with_struts (q,): values of the body as printed, strut by strut, nan without them, and struts_why, the
+    reason of its failure.
     """
 
     values: Array
@@ -67,12 +67,12 @@ def verified(
     printer: Printer | None = None,
     as_printed: Mechanics | None = None,
 ) -> Verified:
-    """A unit with values `coarse` (q,) on the search's mesh, simulated on a finer mesh of its own.
+    """Simulate a unit with values `coarse` (q,) on the search's mesh again on a finer mesh.
 
-    What is uncertain of a print acts to first order, by adjoint gradients on the finer mesh. The mesh's error
-    is taken as the difference of the two meshes, which for a converging method is more than is left. printer:
-    the printability check (thickness, chambers) is run where it is given. as_printed: of the resolved body,
-    which is simulated besides where it is given.
+    The print's uncertainty acts to first order, by adjoint gradients on the finer mesh. The mesh's error is
+    taken as the difference of the two meshes, an upper bound for a converging method. printer: the
+    printability check (thickness, chambers) is run where it is given. as_printed: of the resolved body, which
+    is also simulated if given.
     """
     found = evaluate(unit, targets, (), finer, uncertainty=uncertainty)
     zero = np.zeros(len(targets))

@@ -1,10 +1,10 @@
 """The search for designs: a trust region on a surrogate that knows slopes, for one goal or a front of
 several.
 
-Each step fits a surrogate to every quantity computed so far, looks on it for the best design within reach of
-those known, and has that computed. Bounds and targets are met first; then the objectives are weighed in turn
-(augmented Chebyshev, as in ParEGO: Knowles, IEEE Trans. Evol. Comput. 10 (2006) 50), so that the designs
-spread along the Pareto front.
+Each step fits a surrogate to every quantity computed so far, finds its best design within reach of the known
+ones, and computes that. Bounds and targets are met first; then the objectives are weighed in turn (augmented
+Chebyshev, as in ParEGO: Knowles, IEEE Trans. Evol. Comput. 10 (2006) 50), so that the designs spread along
+the Pareto front.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ Values = tuple[Any, ...]
 
 PENALTY = 10.0
 INWARD = 0.25
-"""How far inside a bound the search aims, in tolerances: a surrogate is wrong by a little."""
+"""Distance inside a bound that the search aims at, in tolerances, to allow for the surrogate's error."""
 AIM = 0.7
 """Beside objectives, a target counts as met within this share of its tolerance."""
 FIRST_REACH, LEAST_REACH, MOST_REACH = 0.35, 0.01, 1.5
 ROUNDS, SAMPLES = 9, 384
 STALLED = 8
-"""A search ends after so many steps without progress, of several objectives after so many for each."""
+"""Number of steps without progress that end a search; with several objectives, for each."""
 
 
 @attrs.frozen
 class SearchSettings:
-    """How far a search goes, and how; see `settings`."""
+    """Limits and method of a search; see `settings`."""
 
     evaluations: int = EVALUATIONS.field()
     batch: int = BATCH.field()
@@ -49,8 +49,8 @@ class SearchSettings:
 class Observed:
     """Observation of a design: values (q,), slopes (q, c) by its continuous freedoms, nan where unknown.
 
-    sound: whether it could be computed. margins (q,): how far to either side of each value its target shall
-    be met too; None for no margin.
+    sound: True if it could be computed. margins (q,): distance to either side of each value within which its
+    target must also be met; None for no margin.
     """
 
     design: Values
@@ -62,7 +62,7 @@ class Observed:
 
 @attrs.frozen(eq=False)
 class Found:
-    """All designs computed, in order, and which of them are proposed: the Pareto set, or the nearest."""
+    """All designs computed, in order, and the proposed ones: the Pareto set, or the nearest."""
 
     observed: tuple[Observed, ...]
     proposed: tuple[int, ...]
@@ -82,10 +82,10 @@ def search_units(
     on_step: Callable[[int, str], None] = lambda done, words: None,
     known: Sequence[Observed] = (),
 ) -> Found:
-    """The designs found for some targets, from a start, which may break bounds of its freedoms.
+    """Find designs for some targets, from a start, which may violate bounds of its freedoms.
 
-    observe: computes designs; on_step: called with how many were computed, and how things stand. known:
-    designs computed before, in place of the start; they count as evaluations.
+    observe: computes designs; on_step: called with the number computed, and a status. known: designs computed
+    before, replacing the start; they count as evaluations.
     """
     return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start, known)
 
@@ -113,7 +113,7 @@ class _Search:
     # Designs as places: continuous freedoms from 0 to 1, discrete ones by the number of their value.
 
     def places(self, design: Values) -> Array:
-        """Places (f,) of a design."""
+        """Positions (f,) of a design."""
         return np.array(
             [
                 float(f.values.index(v)) if f.discrete else f.place(float(v))
@@ -122,14 +122,14 @@ class _Search:
         )
 
     def design(self, places: Array) -> Values:
-        """The design at places (f,)."""
+        """Design at positions (f,)."""
         return tuple(
             f.values[int(p)] if f.discrete else f.at(float(p))
             for f, p in zip(self.freedoms, places, strict=True)
         )
 
     def coordinates(self, places: Array) -> Array:
-        """Coordinates (m, d) of a surrogate at places (m, f): numbers by their size, names one by one."""
+        """Coordinates (m, d) of a surrogate at positions (m, f): numbers by their size, names one by one."""
         columns = [places[:, self.continuous]]
         for i in self.discrete:
             values = self.freedoms[i].values
@@ -207,7 +207,7 @@ class _Search:
         self.on_step(len(self.observed), self._words(best))
 
     def _judged(self, o: Observed) -> Observed:
-        """A design with the quantities alone that the search knows."""
+        """A design reduced to the quantities of the search."""
         margins = np.zeros_like(o.values) if o.margins is None else o.margins
         return attrs.evolve(
             o, values=o.values[self.judged], slopes=o.slopes[self.judged], margins=margins[self.judged]
@@ -224,7 +224,7 @@ class _Search:
         )
 
     def _models(self) -> Sequence[Surrogate]:
-        """Models of every value, then of the margins where there are any."""
+        """Models of every value, then of the margins if there are any."""
         sound = [o for o in self.observed if o.sound]
         x = self.coordinates(np.array([self.places(o.design) for o in sound]))
         widths = np.array([self.freedoms[i].high - self.freedoms[i].low for i in self.continuous])
@@ -236,7 +236,7 @@ class _Search:
         return found + list(fit_all(x, margins, np.full_like(slopes, np.nan))) if margins.any() else found
 
     def _done(self) -> bool:
-        """Without objectives: whether a design meets all that is asked, targets near to their middle."""
+        """Return True if, without objectives, a design meets all targets near their middle."""
         if self.goals or not self.observed:
             return False
         best = self.observed[self._best()]
@@ -254,13 +254,13 @@ class _Search:
         return [t.met(float(v), float(margin)) for t, v, margin in rows]
 
     def _known(self, observed: Sequence[Observed]) -> Array:
-        """Values and behind them margins (n, 2 q) of computed designs."""
+        """Values (n, q) of computed designs, followed by margins: (n, 2 q)."""
         return np.array([[*o.values, *o.margins] for o in observed])  # type: ignore[misc]
 
     def _misfits(self, found: Array, inward: float) -> Array:
         """Squared misfits (m, q) of values and margins (m, 2 q).
 
-        inward: how far inside their bounds they shall be, in tolerances.
+        inward: required distance inside their bounds, in tolerances.
         """
         values, margins = found[:, : len(self.targets)], found[:, len(self.targets) :]
         misfits = np.zeros_like(values)
@@ -302,9 +302,9 @@ class _Search:
         return o.sound and all(self._met(o))
 
     def _trust(self, models: Sequence[Surrogate], before: int) -> float:
-        """Factor on the reach, by how well the surrogates foresaw the designs computed since.
+        """Factor on the reach, by the accuracy of the surrogates for designs computed since.
 
-        Their errors over the change that they foresaw from the nearest design known, as in any trust region.
+        Their errors over the predicted change from the nearest known design, as in any trust region.
         """
         sound = [o for o in self.observed[:before] if o.sound]
         places = np.array([self.places(o.design) for o in sound])
@@ -361,7 +361,7 @@ class _Search:
     def _proposed(
         self, models: Sequence[Surrogate], weights: Array, besides: Sequence[Values]
     ) -> Values | None:
-        """The design that the surrogate has for the best within reach, None where all near it are known."""
+        """Best design of the surrogate within reach, None where all near it are known."""
         sound = np.array([self.places(o.design) for o in self.observed if o.sound])
         failed = np.array([self.places(o.design) for o in self.observed if not o.sound]).reshape(
             -1, len(self.freedoms)
@@ -396,7 +396,7 @@ class _Search:
         return found
 
     def _around(self, centres: Array, width: float) -> Array:
-        """Places (SAMPLES, f) about some centres, a discrete freedom changed now and then."""
+        """Positions (SAMPLES, f) about some centres, a discrete freedom changed now and then."""
         chosen = centres[self.rng.integers(len(centres), size=SAMPLES)].copy()
         if self.continuous:
             steps = width * self.rng.standard_normal((SAMPLES, len(self.continuous)))
@@ -469,8 +469,7 @@ def _halvings() -> Iterator[float]:
 
 
 def pareto(costs: Array) -> Array:
-    """Numbers of the points (n, c), each cost to be small, that no other point is as good as and better in
-    one."""
+    """Numbers of the Pareto-optimal points (n, c): no other is as small in all costs and smaller in one."""
     found = []
     for number, cost in enumerate(costs):
         no_worse = (costs <= cost).all(axis=1)

@@ -1,4 +1,4 @@
-"""Quantities of the sensor: how far it disturbs the backbone, and how much its light changes by bending."""
+"""Quantities of the sensor: its disturbance of the backbone, and its light's change by bending."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ STATIONS = 51
 class Disturbance:
     """Deviation J_hat in mm of the backbone by the sensor along a path, the mean over some pressures in kPa.
 
-    With the rule `volume_fraction`, each pressure counting as much as another; `place` weighs them by the
-    time that its protocol spends there.
+    With the rule `volume_fraction`, pressures weighed alike; `place` weighs them by the time that its
+    protocol spends there.
     """
 
     name: str
@@ -63,7 +63,7 @@ class SensorSlope:
 
     By the fast law of the waveguide (`sensing.law`) through Model A's states at some pressures in kPa and at
     rest; the waveguide itself follows the lattice, as in `place`. The law is fitted to traced rays, whose
-    scatter would drown its change between two units a little apart: their difference is by one law.
+    scatter would exceed its change between two similar units: their difference is by one law.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Settings of a search for units, stated once: its file and Blender take them from here."""
+"""Settings of a search for units, used by its file and Blender."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ..design.quantity import described
 from ..meshing.settings import REFINE as REFINEMENT
 
 FINER = 1.5
-"""How much finer than the search's mesh that of a check is, unless the file says it."""
+"""Refinement of a check's mesh over the search's, unless the file gives it."""
 EVALUATIONS = described(
     "evaluations",
     40,

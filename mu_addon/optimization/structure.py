@@ -1,4 +1,4 @@
-"""A body for one choice of freedoms, and its equilibria under the pressures that quantities are read at."""
+"""A body for one choice of freedoms, and its equilibria under the pressures of its quantities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..fem.state import State, rest
 Array = np.ndarray[Any, Any]
 
 WALL_STEPS = 4
-"""Steps in which a tip is brought to the wall that holds it."""
+"""Number of steps in which a tip is moved to the wall that holds it."""
 WITHOUT = ""
 """Name of the body's materials without a sensor, Model A."""
 
@@ -46,8 +46,8 @@ class Structure:
     """A discretised body for one choice of freedoms.
 
     materials: by name, `WITHOUT` for the body alone, and the name of a sensor's path for the body with it;
-    about: what it was made of (a Unit), for quantities that are read off the design; shared: what was found
-    of its elements, whatever their nodes' places, and holds for bodies of the same elements too.
+    about: its origin (a Unit), for quantities of the design; shared: figures of its elements that do not
+    depend on the nodes' positions, valid for bodies of the same elements too.
     """
 
     model: Model
@@ -70,15 +70,15 @@ class Structure:
         return known[1]
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, 3) in mm of its untied nodes as this body has them, its tied nodes following.
+        """Displacements u (n, 3) in mm with tied nodes following by this body's ties.
 
-        A body near to another holds struts onto its wall by weights of its own.
+        A similar body ties struts to its wall by other weights.
         """
         mesh = self.model.mesh
         return np.asarray(mesh.following(u.copy())) if len(mesh.tied) else u
 
     def under(self, condition: Condition) -> Model:
-        """The model of a condition: the body's own, or one with the wall that holds its tip beside it."""
+        """Model of a condition: the body's own, or one with the wall that holds its tip."""
         if condition.wall_mm is None:
             return self.model
         # Made first, so that both have the same one.
@@ -89,31 +89,31 @@ class Structure:
 
 
 class Quantity(Protocol):
-    """Something to be read off a body in equilibrium; a quantity has one `name`, by which it is known.
+    """A figure of a body in equilibrium, identified by its `name`.
 
-    A quantity that has `slope(structure, states)`, its derivative (n, 3) by the displacements of each
-    condition, gets its gradient by one adjoint solution a condition, whatever the number of freedoms; its
-    difference between two bodies at the same displacements is `change(structure, states, plus, minus)` where
-    it has that, else that of its values. Any other quantity with conditions is read once more, with moved
-    displacements, for every freedom.
+    A quantity with `slope(structure, states)`, its derivative (n, 3) by the displacements of each condition,
+    gets its gradient by one adjoint solution a condition, whatever the number of freedoms; its difference
+    between two bodies at the same displacements is `change(structure, states, plus, minus)` if it has that,
+    else that of its values. Any other quantity with conditions is computed again, with moved displacements,
+    for every freedom.
     """
 
     @property
     def name(self) -> str:
-        """By which it is known."""
+        """Identifier of the quantity."""
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """The states it is read from, all under pressure."""
+        """States it is computed from, all under pressure."""
 
     def value(self, structure: Structure, states: States) -> float:
         """Its value."""
 
 
 def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[Condition, Array], int]:
-    """The displacements in every condition, each from those of smaller pressure, and the factorisations.
+    """Displacements in every condition, each from those of smaller pressure, and the factorisations.
 
-    Raises ConvergenceError where a pressure cannot be reached, and InputError for materials that remember.
+    Raises ConvergenceError where a pressure cannot be reached, and InputError for materials with history.
     """
     wanted = set(conditions)
     found: dict[Condition, Array] = {}
@@ -141,7 +141,7 @@ def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[C
 
 
 def _start(equilibrium: Equilibrium, wall_mm: float | None) -> State:
-    """The state without pressure, the tip brought to its wall; raises ConvergenceError."""
+    """State without pressure, with the tip moved to its wall; raises ConvergenceError."""
     model = equilibrium.model
     start = rest(model.mesh) if model.load is None else equilibrium.at_zero_pressure()
     if not wall_mm:

@@ -1,9 +1,9 @@
-"""A Gaussian process through values and slopes: what has been computed, continued between the designs.
+"""A Gaussian process through values and slopes, to predict between computed designs.
 
-A slope is an observation like a value, so that one simulation with its gradient tells as much as one more
-simulation for every freedom. Squared exponential covariance with a length for each coordinate, by the largest
-marginal likelihood over a few. Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006,
-ch. 5 and sec. 9.4.
+A slope is an observation like a value, so that one simulation with its gradient is worth one more simulation
+for every freedom. Squared exponential covariance with a length for each coordinate, by the largest marginal
+likelihood over a few. Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 5
+and sec. 9.4.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ Array = np.ndarray[Any, Any]
 
 LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 NOISE = 1e-4
-"""Standard error of a value and of a slope, as a share of their spread: mesh noise, and what keeps it
-definite."""
+"""Standard error of a value and of a slope, as a share of their spread: mesh noise, and a regularisation."""
 
 
 @attrs.frozen(eq=False)
 class Surrogate:
-    """A quantity over designs in the unit cube; `mean` and `deviation` continue it."""
+    """A quantity over designs in the unit cube; `mean` and `deviation` predict it."""
 
     x: Array
     lengths: Array
@@ -36,7 +35,7 @@ class Surrogate:
 
     @classmethod
     def of(cls, x: Array, y: Array, slopes: Array) -> Surrogate:
-        """The surrogate of values y (n,) and slopes (n, d) at x (n, d); slopes that are nan are not known."""
+        """Surrogate of values y (n,) and slopes (n, d) at x (n, d); nan slopes are unknown."""
         centre = float(y.mean())
         known = slopes[np.isfinite(slopes)]
         steepest = np.sqrt(np.mean(known**2)) if len(known) else 0.0

@@ -49,17 +49,17 @@ OF_SENSOR = ("deviation", "sensor_slope")
 """Kinds that need a sensor in the body."""
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
-"""A bound without a tolerance is missed by one unit of misfit where it is missed by this share of itself."""
+"""One unit of misfit of a bound without a tolerance, as a share of the bound."""
 HIGHEST_kPa = 500.0
 FARTHEST_WALL_MM = 200.0
 
 
 @attrs.frozen
 class Target:
-    """One quantity and what is asked of it.
+    """One quantity and its goal.
 
-    value with tolerance: within it; low, high: bounds, nan where there is none; goal: an objective.
-    tolerance: what one unit of `misfit` is, in the quantity's unit; line: place in its file.
+    value with tolerance: within it; low, high: bounds, nan without; goal: an objective. tolerance: one unit
+    of `misfit`, in the quantity's unit; line: in its file.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Target:
     def met(self, found: float, margin: float = 0.0) -> bool:
         """True if a value meets it: a target within its tolerance, a bound to a millionth of its own.
 
-        margin: so far to either side of the value too.
+        margin: also for values this far to either side.
         """
         least = 1.0 if not math.isnan(self.value) else 1e-6
         return all(abs(self.misfit(v)) <= least for v in (found - margin, found, found + margin))
@@ -118,8 +118,8 @@ class Target:
 class Supplies:
     """Further inputs of targets: elongation at break as a ratio, density in g/ml, a printer, paths.
 
-    has_gravity: whether the unit bears its weight, so that it is bent at 0 kPa. path_is_free: whether a
-    target may leave its path out, which is the free one then; body: in place of the lattice's box, or None.
+    has_gravity: the unit bends under its weight at 0 kPa. path_is_free: a target may omit its path, which is
+    then the free one; body: in place of the lattice's box, or None.
     """
 
     elongation: float
@@ -136,8 +136,8 @@ def read_targets(
 ) -> list[Target]:
     """The targets of [[target]] tables; where: file and line of each.
 
-    A curve of points is a target a point. `printable` brings the printer's least wall as a bound, so that the
-    search keeps it. Raises InputError that names key and line.
+    A curve of points is a target a point. `printable` adds the printer's least wall as a bound for the
+    search. Raises InputError that names key and line.
     """
     found: list[Target] = []
     for table, place in zip(tables, where, strict=True):
@@ -157,7 +157,7 @@ def read_targets(
 
 
 def _of_printer(printable: Target, supplies: Supplies) -> Target:
-    """The bound on the wall that the print check will judge by."""
+    """Bound on the wall that the print check uses."""
     least, name = supplies.printer["wall_mm"], f"{printable.name}: thinnest wall"
     return Target(
         name, "wall_thickness", "mm", WallThickness(name), tolerance=NARROW * least, low=least,
@@ -192,7 +192,7 @@ def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[T
 
 
 def _name(kind: str, table: Mapping[str, Any]) -> str:
-    """A name from what the quantity is read at: "angle at 30 kPa", "stiffness along x"."""
+    """A name from the quantity and its pressure or axis: "angle at 30 kPa", "stiffness along x"."""
     words = kind.replace("_", " ")
     if "region" in table:
         words += f" of {table['region']}"

@@ -13,7 +13,7 @@ from .freedoms import Freedom
 Array = np.ndarray[Any, Any]
 
 SURE = 2.0
-"""A unit is robust where it meets a target this many standard errors either way."""
+"""Number of standard errors either way within which a robust unit meets a target."""
 
 
 @attrs.frozen

@@ -1,4 +1,4 @@
-"""A unit as a body whose freedoms can be moved a little: its mesh, its materials, and pairs of neighbours."""
+"""A unit as a body with movable freedoms: its mesh, its materials, and pairs of neighbours."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STEP = 1e-4
 """Half step of a freedom's central differences, relative to its value (or its range, where that is
 smaller)."""
 RULE = "volume_fraction"
-"""How a sensor stiffens the homogenised lattice: the rule that converges with the mesh."""
+"""Inclusion rule of a sensor in the homogenised lattice: the one that converges with the mesh."""
 
 
 def _same(unit: Unit) -> Unit:
@@ -58,8 +58,8 @@ class Mechanics:
 
     as_printed: a drawn unit with the parts of the model that a unit has parameters for; materials, model: of
     such a unit and its mesh; load: dead forces (n, 3) in N, or None; newton: settings, None for the
-    fidelity's usual ones. body: a closed surface in place of the lattice's box; self_contact: whether walls
-    and struts of a resolved unit keep apart.
+    fidelity's usual ones. body: a closed surface in place of the lattice's box; self_contact: of walls and
+    struts of a resolved unit.
     """
 
     settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
@@ -88,12 +88,12 @@ class UnitBody:
 
     @cached_property
     def printed(self) -> Unit:
-        """The unit with the extended model in it."""
+        """The unit with the extended model applied."""
         return self.mechanics.as_printed(self.unit)
 
     @cached_property
     def mesh(self) -> Mesh:
-        """Its own mesh. Raises InputError and MeshingError."""
+        """The unit's own mesh. Raises InputError and MeshingError."""
         m = self.mechanics
         settings = m.settings.without_beams
         return mesh_of(self.printed, settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
@@ -137,7 +137,7 @@ class UnitBody:
     def pair(self, freedom: Freedom) -> Pair:
         """The two neighbours by one continuous freedom, and the difference between them in its unit.
 
-        One-sided where the unit may be moved to one side only. Raises InputError and MeshingError.
+        One-sided if the unit can be moved to one side only. Raises InputError and MeshingError.
         """
         value = float(freedom.value_of(self.unit))
         step = STEP * min(freedom.high - freedom.low, abs(value) or np.inf)
@@ -154,7 +154,7 @@ class UnitBody:
         return plus, minus, ends[0] - ends[1]
 
     def pairs(self, freedoms: Sequence[Freedom]) -> list[Callable[[], Pair]]:
-        """`pair` of every freedom, each made when it is called for."""
+        """`pair` of every freedom, each made on demand."""
         return [lambda freedom=freedom: self.pair(freedom) for freedom in freedoms]  # type: ignore[misc]
 
     def _structure(self, unit: Unit, printed: Unit, model: Model) -> Structure:

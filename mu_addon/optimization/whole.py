@@ -36,8 +36,7 @@ class Mass:
 
 @attrs.frozen
 class PrintTime:
-    """Time in h to print the unit upright: its layers times the time of one, taken as they are, not
-    rounded."""
+    """Time in h to print the unit upright: its layers, not rounded, times the time of one."""
 
     name: str
     printer: Printer
