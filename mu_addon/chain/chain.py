@@ -189,7 +189,7 @@ class Chain:
     # Equilibria.
 
     def joints_at(self, pressures_kPa: Array) -> list[JointAt]:
-        """Every joint at its pressure (n,) in kPa; raises InputError beyond what one was learned for."""
+        """Every joint at its pressure (n,) in kPa; raises InputError beyond the range of one."""
         p = np.asarray(pressures_kPa, float)
         if p.shape != (len(self.links),):
             raise InputError(

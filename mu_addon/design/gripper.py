@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 KIND = "gripper"
 ROOT = 0.1
-"""How far in mm the plate reaches into the fingers, one printed layer, so that all is one body."""
+"""Depth in mm of the plate in the fingers, one printed layer, so that all is one body."""
 
 
 @attrs.frozen

@@ -224,4 +224,4 @@ BODY_CENTRED = register(LatticeKind("body-centred", _CENTRE_AND_CORNERS, _HALF_D
 """Eight tapered half diagonals from the centre: the lattice of the source paper."""
 
 STRAIGHT = register(LatticeKind("body-centred-straight", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, constant))
-"""As body-centred, without taper."""
+"""The body-centred lattice without taper."""

@@ -193,7 +193,7 @@ class Fitter:
         return self.record.predict(self.simulator, values)
 
     def possible(self, values: Mapping[str, float]) -> Array | None:
-        """As `predict`; None where the model has no finite prediction (`Record.possible`)."""
+        """Return `predict`; None where the model has no finite prediction (`Record.possible`)."""
         return self.record.possible(self.simulator, values)
 
     def fit(

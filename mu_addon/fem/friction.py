@@ -15,10 +15,10 @@ _LEAST = 1e-6
 
 @attrs.frozen(eq=False)
 class Memory:
-    """What points (f, q) of a surface know of an obstacle from their last committed state, in its frame.
+    """Memory of points (f, q) of a surface of their last committed contact, in the obstacle's frame.
 
     place (f, q, 3) in mm; gap (f, q), their distance, in mm; normal (f, q, 3), its gradient, and pressure
-    (f, q) in MPa that bound friction; slip (f, q, 3), what the contact gives without sliding, in mm; slid
+    (f, q) in MPa that bound friction; slip (f, q, 3), elastic slip, in mm; slid
     (f, q), the length slid so far, in mm. lost_mJ: what sliding has cost so far.
     """
 
@@ -33,7 +33,7 @@ class Memory:
 
 @attrs.frozen(eq=False)
 class Lag:
-    """What friction takes from an earlier iterate: pressure (f, q), normal (f, q, 3), and `counts` (f, q).
+    """Values of friction from an earlier iterate: pressure (f, q), normal (f, q, 3), and `counts` (f, q).
 
     counts: the share of the way since the last committed state that is in contact, see `met`.
     """

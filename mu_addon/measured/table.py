@@ -392,7 +392,7 @@ def _check_switched(name: str, columns: dict[str, Array], rows: Array, path: Pat
 
 
 def _at_its_end(values: Array, time: Array) -> tuple[float, float] | None:
-    """What the line through the first rows of a column is at time 0, and its standard deviation.
+    """Value at time 0 of the line through the first rows of a column, and its standard deviation.
 
     Of as many as lie on a line, within their scatter or half of `EXACT`; None without.
     """

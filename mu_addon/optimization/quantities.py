@@ -45,11 +45,11 @@ class Angle:
         return _under_pressure(self.pressure_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
-        """In degrees."""
+        """Value in degrees."""
         return _tip(structure).angle_deg(states[self.conditions[0]])
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3), in degrees/mm.
+        """Derivative by the displacements (n, 3), in degrees/mm.
 
         With s and c the sums whose quotient is the tangent of the angle, d = -(c ds - s dc)/(c^2 + s^2); the
         places at rest are relative to their mean, so that the mean of the moved ones drops out.
@@ -88,11 +88,11 @@ class TipForce:
         return (Condition(WITHOUT, self.pressure_kPa, self.gap_mm),)
 
     def value(self, structure: Structure, states: States) -> float:
-        """In N."""
+        """Value in N."""
         return self._wall(structure).reading_N(states[self.conditions[0]])
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3), in N/mm: the wall's stiffness at the tip's edge."""
+        """Derivative by the displacements (n, 3), in N/mm: the wall's stiffness at the tip's edge."""
         wall = self._wall(structure)
         found = np.zeros_like(structure.model.mesh.nodes)
         found[wall.edge, 1] = wall.copies * wall.stiffness
@@ -116,11 +116,11 @@ class TipPosition:
         return _under_pressure(self.pressure_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
-        """In mm."""
+        """Value in mm."""
         return float(_tip_centre(structure, states[self.conditions[0]])[AXES.index(self.direction)])
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3), without unit: each node's share of the plane."""
+        """Derivative by the displacements (n, 3), without unit: each node's share of the plane."""
         return {self.conditions[0]: _tip_slope(structure, np.eye(3)[AXES.index(self.direction)])}
 
 
@@ -141,11 +141,11 @@ class Workspace:
         return tuple(Condition(WITHOUT, p) for p in sorted({0.0, *self.pressures_kPa}))
 
     def value(self, structure: Structure, states: States) -> float:
-        """In mm."""
+        """Value in mm."""
         return float(np.linalg.norm(self._steps(structure, states), axis=1).sum())
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3) in every state, without unit: along the path, back and ahead."""
+        """Derivative by the displacements (n, 3) in every state, without unit: along the path, back and ahead."""
         steps = self._steps(structure, states)
         # A unit that does not move has a path without direction.
         along = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
@@ -171,13 +171,13 @@ class AirVolume:
         return _under_pressure(self.pressure_kPa) if self.pressure_kPa else ()
 
     def value(self, structure: Structure, states: States) -> float:
-        """In ml."""
+        """Value in ml."""
         model = structure.model
         u = states[self.conditions[0]] if self.conditions else np.zeros_like(model.mesh.nodes)
         return _whole(model) * model.cavity_volume(u) / 1000.0
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3), in ml/mm: minus the nodal forces of unit pressure."""
+        """Derivative by the displacements (n, 3), in ml/mm: minus the nodal forces of unit pressure."""
         if not self.conditions:
             return {}
         return {self.conditions[0]: self._by_places(structure, states)}
@@ -223,7 +223,7 @@ class Stretch:
         return stretch if self.elongation is None else self.elongation / max(stretch - 1.0, 1e-9)
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """By the displacements (n, 3), in 1/mm: of a stretch n . F N along its direction N, n = F N/|F N|.
+        """Derivative by the displacements (n, 3), in 1/mm: of a stretch n . F N along its direction N, n = F N/|F N|.
 
         The set of points changes with the displacements, but not to first order in their mean.
         """
@@ -248,7 +248,7 @@ class Stretch:
         return structure.kept(name, lambda: self._sensitivity(structure, states)).between(first, second)
 
     def _sensitivity(self, structure: Structure, states: States) -> Sensitivity:
-        """By the mesh, at the displacements.
+        """Sensitivity to the mesh, at the displacements.
 
         The mean is t + the integral of (stretch - t) over the points above t, by 1 % of the volume; the
         points may be held, and t, for it is largest by t there.
@@ -342,7 +342,7 @@ class RestStiffness:
     conditions: tuple[Condition, ...] = ()
 
     def value(self, structure: Structure, states: States) -> float:
-        """In N/mm."""
+        """Value in N/mm."""
         model, weights = self._side(structure)
         moved = self._moved(structure, model, weights)
         return _whole(model) / float(weights.ravel()[model.free] @ moved)

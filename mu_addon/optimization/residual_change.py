@@ -82,7 +82,7 @@ class ResidualChange:
         return contact.by_places(self._u, self._along)
 
     def _by_gap(self, plus: Structure, minus: Structure) -> Array:
-        """By gap and stiffness of self-contact."""
+        """Change by gap and stiffness of self-contact."""
         sides = [s.model.self_contact for s in (plus, minus)]
         contact, mesh = self._model.self_contact, self._model.mesh
         found = np.zeros(len(self._along))

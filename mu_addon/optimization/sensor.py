@@ -42,7 +42,7 @@ class Disturbance:
         return tuple(Condition(m, p) for p in self.pressures_kPa for m in (WITHOUT, self.path))
 
     def value(self, structure: Structure, states: States) -> float:
-        """In mm."""
+        """Value in mm."""
         points = anchor_points(structure.about)
         monitor = probe(structure.model.mesh, points)
         lines = {
@@ -76,7 +76,7 @@ class SensorSlope:
         return tuple(Condition(WITHOUT, p) for p in self.pressures_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
-        """In 1/deg. Raises InputError where the path has no room for a waveguide."""
+        """Value in 1/deg. Raises InputError where the path has no room for a waveguide."""
         unit: Unit = structure.about
         mesh = structure.model.mesh
         chosen = window(unit, self.path)

@@ -27,7 +27,7 @@ class Mass:
     body: Body | None = None
 
     def value(self, structure: Structure, states: States) -> float:
-        """In g."""
+        """Value in g."""
         unit: Unit = structure.about
         body = None if self.body is None else envelope(self.body, unit.dimensions)
         struts = Stack().value("struts", StepInputs(unit, body=body))
@@ -43,7 +43,7 @@ class PrintTime:
     conditions: tuple[Condition, ...] = ()
 
     def value(self, structure: Structure, states: States) -> float:
-        """In h."""
+        """Value in h."""
         d = structure.about.dimensions
         height = d.height + d.inlet_length
         return print_time(height, self.printer) / 3600.0
@@ -63,5 +63,5 @@ class WallThickness:
     conditions: tuple[Condition, ...] = ()
 
     def value(self, structure: Structure, states: States) -> float:
-        """In mm."""
+        """Value in mm."""
         return float(structure.about.dimensions.thinnest_wall)

@@ -27,7 +27,7 @@ class MU_OT_assets(bpy.types.Operator):
 
 
 class MU_OT_assets_remove(bpy.types.Operator):
-    """Take what this extension put there out of the asset browser again; files that use it keep theirs"""
+    """Remove this extension's assets from the asset browser; files that use them keep theirs"""
 
     bl_idname = "mu.assets_remove"
     bl_label = "Remove from Asset Browser"

@@ -35,7 +35,7 @@ def _of(name: str) -> str:
 
 
 class MU_PT_results(UnitPanel, bpy.types.Panel):
-    """What the study has found"""
+    """Results of the study"""
 
     bl_idname = "MU_PT_results"
     bl_label = "Results"

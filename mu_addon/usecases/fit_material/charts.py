@@ -106,7 +106,7 @@ def _mark(fit: Fit, mode: str) -> str:
 
 
 def _styled(fits: Sequence[Fit], chosen: str) -> list[tuple[Fit, dict[str, Any]]]:
-    """Every law with its line: the chosen one thick and whole."""
+    """Every law with its line: the chosen one thick and solid."""
     styled = []
     for f, (color, dashes) in zip(fits, STYLES * (1 + len(fits) // len(STYLES)), strict=False):
         if f.form.name == chosen:

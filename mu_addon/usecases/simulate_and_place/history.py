@@ -108,7 +108,7 @@ class Run:
 
     @property
     def has_results(self) -> bool:
-        """Whether it has anything to show: it ended, or its motion is found."""
+        """True if there are results to show: it is complete, or its motion is found."""
         return self.complete or bool(self.angles)
 
     @property
