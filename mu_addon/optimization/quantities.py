@@ -145,7 +145,7 @@ class Workspace:
         return float(np.linalg.norm(self._steps(structure, states), axis=1).sum())
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """Derivative by the displacements (n, 3) in every state, without unit: along the path, back and ahead."""
+        """Derivative by the displacements (n, 3) in every state, unitless: along the path, both ways."""
         steps = self._steps(structure, states)
         # A unit that does not move has a path without direction.
         along = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
@@ -223,7 +223,7 @@ class Stretch:
         return stretch if self.elongation is None else self.elongation / max(stretch - 1.0, 1e-9)
 
     def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
-        """Derivative by the displacements (n, 3), in 1/mm: of a stretch n . F N along its direction N, n = F N/|F N|.
+        """Derivative by the displacements (n, 3), in 1/mm: n . F N along a direction N, n = F N/|F N|.
 
         The set of points changes with the displacements, but not to first order in their mean.
         """
