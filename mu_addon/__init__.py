@@ -17,5 +17,5 @@ def unregister() -> None:
 
 
 def _blender() -> Any:
-    # By name: whoever imports a part of the core must not be taken to import Blender's side.
+    # By name: importing a part of the core must not import Blender's side.
     return importlib.import_module(".blender", __package__)

@@ -129,7 +129,7 @@ def append_lines(stream: IO[bytes], lines: bytes) -> None:
         raise
 
 
-# What a changed byte can raise, depending on where in the archive it lies.
+# Errors that a changed byte can raise, depending on its position in the archive.
 _DAMAGED = (
     OSError, ValueError, EOFError, KeyError, IndexError, RuntimeError, OverflowError, MemoryError,
     SyntaxError, TypeError, struct.error, zipfile.BadZipFile, zlib.error, tokenize.TokenError,
@@ -185,7 +185,7 @@ def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
 
     They are compressed, unless so strongly that `read_npz` would refuse them.
     """
-    # Packed in memory: an archive on a full disk fails again when it is thrown away, with a traceback.
+    # Packed in memory: on a full disk an archive fails again when it is deleted, with a traceback.
     packed = io.BytesIO()
     np.savez_compressed(packed, **arrays)
     if sum(np.asarray(array).nbytes for array in arrays.values()) > _most_unpacked(packed.tell()) // 2:

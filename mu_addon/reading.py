@@ -169,7 +169,7 @@ def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> N
 def _short(error: Exception) -> str:
     if isinstance(error, RecursionError):
         return "brackets lie too deep in each other"
-    # Python's own words are about one of its settings.
+    # Python's message is about one of its settings.
     if "integer string conversion" in str(error):
         return "it holds a whole number of thousands of digits"
     return str(error)[:200]

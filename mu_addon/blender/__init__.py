@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 _MODULES = (
-    # What others read: properties, state, handlers.
+    # Read by others: properties, state, handlers.
     "unit.properties",
     "results.properties",
     "obstacles.state",
@@ -58,7 +58,7 @@ _MODULES = (
     "node_tree.operators",
     "scene.dropping",
     "simulate.timings",
-    # What draws; panels stand in the sidebar in this order, that of the work.
+    # Drawing; panels appear in the sidebar in this order, that of the work.
     "unit.panel",
     "steps.panel",
     "path.panel",

@@ -12,7 +12,7 @@ from .clock import is_clock
 from .notation import is_like_number, unit_behind
 
 DELIMITERS = ("\t", ";", ",", "|", "spaces")
-# Lines of the file by which its separator is judged, from its beginning and from its middle.
+# Number of lines by which a file's separator is judged, from its beginning and from its middle.
 _JUDGED = 400
 # Lines that a title in quotes may have.
 _MOST_LINES = 5

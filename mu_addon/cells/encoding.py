@@ -9,10 +9,10 @@ from collections.abc import Callable
 from ..errors import InputError
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-# What is no UTF-8, the most usual first: computers of western and central Europe, Cyrillic, Turkish, DOS and
-# Macintosh ones, Chinese, Japanese and Korean.
+# Encodings other than UTF-8, the most usual first: computers of western and central Europe, Cyrillic,
+# Turkish, DOS and Macintosh ones, Chinese, Japanese and Korean.
 _OTHERS = ("cp1252", "cp1250", "cp1251", "cp1254", "cp850", "mac_roman", "gb18030", "cp932", "cp949", "cp866")
-# What files begin with that are no text and no table, and what to do about them.
+# First bytes of files that are no text or table, and the remedy.
 _BINARY = (
     (b"%PDF", "a PDF", "export the data as CSV"),
     (b"\x1f\x8b", "compressed with gzip", "unpack it"),
@@ -32,7 +32,7 @@ _BINARY = (
     (b"\x89PNG", "a picture", "export the numbers as CSV"),
     (b"\xff\xd8\xff", "a picture", "export the numbers as CSV"),
 )
-# A text cut off by a logger's loss of power ends in bytes of zero; more of them are no text, nor are others.
+# A text cut off by a logger's loss of power ends in zero bytes; more of them are no text.
 _MOST_NUL = 0.5
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19]")
 

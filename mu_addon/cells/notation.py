@@ -13,7 +13,7 @@ Array = np.ndarray[Any, Any]
 
 DECIMALS = (".", ",")
 MISSING = ("", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---")
-# As typewriters and tables write them: minus signs, spaces and apostrophes.
+# ASCII substitutes of typographic minus signs, spaces and apostrophes.
 _SIGNS = str.maketrans(
     dict.fromkeys("\u2212\u2013\ufe63\uff0d\u2010\u2011", "-")
     | dict.fromkeys("\u00a0\u202f\u2009\u2007\u2006\u3000", " ")
@@ -41,7 +41,7 @@ _BOTH = {
 }
 _LIKE = re.compile(rf"{_SIGNED}(?:\d+(?:[.,' ]\d{{2,3}})*(?:[.,]\d*)?|[.,]\d+){_EXPONENT}")
 _WITH_UNIT = re.compile(r"([+-]? ?[\d.,' ]*\d[.,]?(?:[eE][+-]?\d+)?) ?([^\d\s.,+-][^\d\s]{0,9})")
-# What float() reads as the pattern of a decimal point does.
+# Numbers that float() reads like the pattern of a decimal point.
 _SIMPLE = re.compile(r"[-+0-9.eE\n]*")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-# A placement is reached in no smaller share of the way to it.
+# Smallest share of the way to a placement that is tried.
 _LEAST_SHARE = 1 / 4
 # A free state's Newton step is below this share of the largest allowed, in radians and unit lengths.
 _FREE = 1e-7

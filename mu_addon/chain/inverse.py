@@ -13,8 +13,8 @@ from .chain import Chain, ChainState
 
 Array = np.ndarray[Any, Any]
 
-# Of the sum that is minimised: how much 10 MPa count beside a millimetre, so that of many answers the one
-# with the lowest pressures is taken.
+# Weight in the minimised sum: 10 MPa against a millimetre, so that of many answers the one with the lowest
+# pressures is taken.
 _PER_KPA = 1e-4
 _MOST_STEPS = 60
 _CONVERGED_KPA = 1e-4
@@ -75,7 +75,7 @@ def reach_point(
         p = state.pressures_kPa
         matrix = np.vstack([chain.slope_of_tip(state)[3:], _PER_KPA * np.eye(len(p))])
         left = np.concatenate([point - state.tip_mm, -_PER_KPA * p])
-        # lsq_linear wants room between its bounds.
+        # lsq_linear needs room between its bounds.
         least, most = np.maximum(low - p, -radius), np.minimum(high - p, radius)
         change = lsq_linear(matrix, left, (least - 1e-9, most + 1e-9)).x
         wanted = np.clip(p + change, low, high)

@@ -15,11 +15,11 @@ from .body import PlateState
 
 Array = np.ndarray[Any, Any]
 
-# Up to this share of its range a joint is used with a warning, beyond it no equilibrium is reported.
+# Share of its range up to which a joint is used with a warning; beyond it no equilibrium is reported.
 MOST_RANGE = 1.5
-# The potential grows by this many times the range's own energy where its range is passed by so much.
+# Growth of the potential, in multiples of the range's own energy, beyond its range.
 _WALL = 50.0
-# Of the fit: how much the higher terms are held down, against what the states say.
+# Regularisation of the fit's higher terms, against the states' data.
 _RIDGE = 1e-6
 _DEGREES = (2, 3, 4)
 

@@ -22,7 +22,7 @@ Array = np.ndarray[Any, Any]
 AXES = ("bend_x", "bend_y", "twist", "shear_x", "shear_y", "stretch")
 # Sampled on both sides; the others' other side is the mirror image.
 _BOTH_SIDES = (0, 4, 5)
-# A state that is not reached is tried again nearer to the free one, so often.
+# Number of retries, nearer to the free state, for a state that is not reached.
 _TRIES = 3
 # Corners that take no part in the fit, as shares of the range: bent while loaded, so that terms mix.
 HELD_OUT = (

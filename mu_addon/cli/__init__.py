@@ -9,8 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-# In the order in which --help lists them; a module's name is its command's, with _ for -, and one more at
-# the end of a word that is Python's.
+# In the order in which --help lists them; a module's name is its command's, with _ for -, and a trailing _
+# for a keyword of Python.
 NAMES = (
     "presets",
     "design",

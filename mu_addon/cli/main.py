@@ -103,7 +103,7 @@ def _require_usable(options: argparse.Namespace) -> None:
 
 
 def _short_report(folder: Path, why: str) -> None:
-    # Only for a run that is asked to stop.
+    # Needed only by a run that is asked to stop.
     from ..report.stopped import write_stopped_report
 
     write_stopped_report(folder, why)
@@ -122,7 +122,7 @@ def main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments)
     command = all_commands()[options.command]
 
-    # Only now, so that --help answers at once.
+    # Imported late, so that --help answers at once.
     from ..run.context import run_to_end
     from ..run.progress import Progress, printable
 

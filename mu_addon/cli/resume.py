@@ -39,6 +39,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     require_out(options)
     solver = solver_of(options)
-    # The folder's own say, where the command says nothing else.
+    # The folder's own value, if the command gives none.
     given = {"workers": options.workers, "solver": None if solver == SolverChoice() else solver}
     resume(Path(options.out), context, {name: value for name, value in given.items() if value is not None})

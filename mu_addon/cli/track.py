@@ -74,7 +74,7 @@ def _tracker() -> Tracker:
                 "run it in Blender, blender -b -P headless/run.py -- track ..., or with the bpy wheel; or "
                 "give a CSV of pixel positions from another tracker",
             )
-        # By name: the command line knows the core, and Blender's side only where it is asked for.
+        # By name: the command line knows only the core, and imports Blender's side on request.
         return import_module("..blender.track.state", __package__).track_markers(clip, markers)
 
     return follow

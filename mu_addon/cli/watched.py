@@ -29,7 +29,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
     ends_with_input: end it once standard input ends, see `run.processes.end_with_input`.
     """
     at_once = not line or line[0] in _UNWATCHED or line[0].startswith("-") or {"-h", "--help"} & {*line}
-    # Blender has threads, whose locks a fork would find as they are.
+    # Blender has threads, whose locks a fork would copy as they are.
     if not at_once and "bpy" not in sys.modules:
         return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input)
     if ends_with_input:
@@ -41,7 +41,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
     """Report how the process of a command line ended, its stage and what to do, also in its folder."""
-    # Only now: as long as all goes well, this process needs none of it.
+    # Imported late: unless something fails, this process needs none of it.
     from ..run.context import asked_to_stop, has_ended, last_stage, record_crash
     from ..run.progress import Progress
     from .main import parser, sink_of
@@ -49,7 +49,7 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
     options = parser().parse_args(list(line))
     folder = Path(options.out) if getattr(options, "out", None) else None
     if crash.asked and folder is not None and has_ended(folder):
-        # It has said so itself, and was writing its report.
+        # It reported that itself, and was writing its report.
         return
     stage, made = last_stage(folder) if folder is not None else ("", [])
     error = asked_to_stop(crash.asked, folder) if crash.asked else _error(options, folder, stage, made, crash)
@@ -58,11 +58,11 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
     if folder is not None and crash.asked and getattr(options, "report", True):
         from ..report.stopped import write_stopped_report
 
-        # Whatever it is: the words below are still to be said.
+        # Whatever the error, the message below must be printed.
         with suppress(Exception):
             write_stopped_report(folder, error.what)
     if not getattr(options, "json", False) and not options.quiet and sys.stderr.isatty():
-        # Off the line in which its progress stood.
+        # Leave the line of its progress.
         sys.stderr.write("\n")
     Progress([sink_of(options)]).error(error)
 

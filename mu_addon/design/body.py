@@ -81,7 +81,7 @@ class Body:
             )
 
     def __repr__(self) -> str:
-        # Caches go by it: the same surface under any name, and each of its numbers counts.
+        # Caches use it: the same surface under any name, with every digit.
         return f"Body({self.hash})"
 
     @property
@@ -116,7 +116,7 @@ def body_of(vertices: ArrayLike, triangles: ArrayLike, name: str = "body") -> Bo
     """
     given = np.asarray(vertices, float).reshape(-1, 3), np.asarray(triangles, np.int64).reshape(-1, 3)
     if not (len(given[1]) and np.isfinite(given[0]).all() and np.abs(given[0]).max(initial=0.0) <= MOST_MM):
-        # Which says what is wrong; welding would turn such numbers into others.
+        # It reports the fault; welding would change such numbers.
         return Body(*given, name)
     points, faces = weld(*given, QUANTUM_MM)
     if len(faces) and not len(_odd_edges(faces)[0]) and volume(points, faces) < 0.0:
@@ -201,7 +201,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     low, high = body.bounds
     size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
     if not 0.3 < size / own < 3.0:
-        # Only what would pass the checks below is worth a guess, what fits best first.
+        # Only guesses that would pass the checks below, best first.
         by_size = sorted(_UNITS.items(), key=lambda item: abs(np.log(size * item[0] / own)))
         fits = {f: unit for f, unit in by_size if size * f / own < 3.0 and _spans(f * body.bounds, d)}
         if fits:
@@ -222,7 +222,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
                 np.array([[0.0, 0.0, z] for z in (low[2], high[2])]),
             )
         )
-    # A little less than its length: there the ends of both lie in one plane.
+    # A little less than its length: at its end faces would coincide.
     near = 2.0 * SLACK_MM
     between = shapes.box([-2.0 * d.R, -2.0 * d.R, near], [2.0 * d.R, 2.0 * d.R, d.height - near])
     outside = (shapes.revolved(outer_polygon(d, 6), AROUND) ^ between) - body.manifold

@@ -144,7 +144,7 @@ def nearest_fit(
 
 def _toward(bound: float, present: float, fits: Callable[[float], bool]) -> float | None:
     """Valid value nearest to `present` on the way to a valid bound, in whole micrometres."""
-    # Ever further apart: the first that fits is near, if any is.
+    # Increasingly far apart: the first valid one is near, if there is any.
     way = (bound - present) * np.linspace(0.0, 1.0, STEPS + 1) ** 2
     bad = present
     for value in np.round(present + way[1:], DIGITS).tolist():

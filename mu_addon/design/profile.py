@@ -173,7 +173,7 @@ def _inner(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
     radius, slope, bend = _outer(d, s)
     wall, change = d.wall_at(s)
     length = np.sqrt(1.0 + slope**2)
-    # 1 - wall * curvature, and what a wall that changes along the profile adds.
+    # 1 - wall * curvature, plus a term for a wall that changes along the profile.
     stretch = 1.0 + wall * bend / length**3 + change * slope / length
     return radius - wall / length, s + wall * slope / length, stretch
 

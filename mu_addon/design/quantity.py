@@ -12,7 +12,7 @@ import attrs
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    # The command line's --help reads settings, and must answer at once.
+    # The command line's --help reads settings, and must be fast.
     import numpy as np
 
 PAPER = "paper"

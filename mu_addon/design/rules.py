@@ -39,7 +39,7 @@ def check(d: Dimensions, allow_symmetric: bool = False) -> None:
     except RuleError as error:
         if d.scale != 1.0:
             try:
-                # The same rule, since rules are of shares: but its lengths are told as they are.
+                # The same rule, since rules are about ratios, with lengths at the unit's scale.
                 _check(attrs.evolve(d, scale=1.0), allow_symmetric)
             except RuleError as true:
                 error.true_size = true

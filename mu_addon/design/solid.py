@@ -190,7 +190,7 @@ def with_waveguide(
         thicker += [ball.translate(node.tolist()) for node in lattice.nodes[met]]
         parts.append(Manifold.batch_boolean(thicker, OpType.Add) ^ _envelope(d, offset))
     united = Manifold.batch_boolean(parts, OpType.Add)
-    united.num_tri()  # manifold3d evaluates late; without this it would be united again by each who asks
+    united.num_tri()  # manifold3d evaluates lazily; without this each use would unite it again
     return united
 
 

@@ -236,7 +236,7 @@ def _unknown(name: str) -> InputError:
     return InputError(f"there is no step {name!r}", "steps", f"choose one of {', '.join(STEPS)}")
 
 
-# What the steps do. Each reads only what its Step says, which a test checks by watching it.
+# Functions of the steps. Each reads only what its Step declares, which a test checks.
 
 
 def _profile(given: StepInputs) -> Array:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _GRID = 2**18
-# Half a cell is so many steps of the grid that its vertices lie on: its flat sides are exactly on the planes,
-# and images that meet there share their vertices exactly.
+# Half a cell is a whole number of steps of its vertices' grid: its flat sides are exactly on the planes, and
+# images that meet there share their vertices exactly.
 
 _STEPS = (4, 1, 16)
 # Steps of that grid that vertices are rounded to; the first that leaves every edge to two triangles is kept.

@@ -97,7 +97,7 @@ def stl_surface(content: bytes) -> tuple[Vertices, Triangles]:
     if len(content) != 84 + count * _STL.itemsize:
         raise InputError("the binary STL is truncated or malformed", "STL", "write the file again")
     corners = np.frombuffer(content, _STL, offset=84)["corners"].reshape(-1, 3)
-    # A damaged number may be a NaN that warns whoever converts it.
+    # A damaged number may be a NaN, whose conversion warns.
     with np.errstate(invalid="ignore"):
         vertices, index = _unique_rows(corners.astype(float))
     return vertices, index.reshape(-1, 3)

@@ -16,7 +16,7 @@ from .surface import Triangles, Vertices, stl_surface
 SUFFIXES = (".stl", ".obj", ".ply")
 _VERTEX = re.compile(r"(?<!\S)vertex(?!\S)")
 _CORNER = re.compile(_VERTEX.pattern + r"\s+(\S+)\s+(\S+)\s+(\S+)")
-# What meshio raises over a PLY file that is not what it says.
+# Errors by meshio for an invalid PLY file.
 _DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
 
 
@@ -132,7 +132,7 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
     from meshio.ply._ply import read_buffer
 
     head = content[: 1 << 16]
-    # meshio waits for the header's end for ever.
+    # meshio waits for the end of the header for ever.
     if b"end_header" not in head:
         raise _malformed(name, "the header of the PLY file does not end")
     if b"format ascii" in head:

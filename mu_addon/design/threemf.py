@@ -38,7 +38,7 @@ _RELATIONSHIPS = (
     '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
     f'<Relationship Target="/{_MODEL}" Id="rel0" Type="{RELATIONSHIP}"/></Relationships>\n'
 )
-# A zip's own clock begins here; a fixed one makes equal models equal files.
+# The earliest time of a zip; a fixed one makes equal models equal files.
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 

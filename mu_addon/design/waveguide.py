@@ -36,7 +36,7 @@ STRUT_GAP = 0.1
 ROOM = 1.0
 """Length in mm, beyond the part's own, that is kept clear before a seat to insert the part."""
 
-_STEP = 0.15  # of the points by which boxes are told from struts
+_STEP = 0.15  # of the points by which boxes are separated from struts
 _LONGER = 0.25  # steps in mm by which an end is made longer, until its seat has room
 _OVER = 0.03  # by which a cut passes the faces that it opens, so that none coincide
 _AXES = np.array([[0, 0, 1], [0, 0, -1], [0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]], float)
@@ -179,7 +179,7 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
     way = _directions(nodes)
     ends = [_end(d, struts, nodes[0], -way[0], "first"), _end(d, struts, nodes[-1], way[-1], "last")]
     points = np.stack([ends[0].face, *nodes, ends[1].face])
-    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9  # ends of no length are no legs
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9  # ends of zero length are no legs
     points = points[np.concatenate([[True], apart])]
     inner = 1 + np.flatnonzero(_bends(points) > 1e-6)
     points = points[np.concatenate([[0], inner, [len(points) - 1]])]

@@ -12,7 +12,7 @@ from .record import KNOWN
 
 Array = np.ndarray[Any, Any]
 
-# Gauss-Newton steps of the nuisances beside a curved reading; the last one moves nothing any more.
+# Gauss-Newton steps of the nuisances beside a curved reading; the last one changes almost nothing.
 STEPS = 4
 # Chi squared by which a curved reading must do better than one effect alone, whose law may be another.
 ONE_EFFECT = 9.2

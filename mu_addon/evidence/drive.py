@@ -24,10 +24,10 @@ WIDTHS = (1, 2, 4, 8, 16, 32, 64)
 # A wider window counts while its straight line agrees with those of all narrower ones, within so many
 # standard deviations: the rule of intersecting confidence intervals (Goldenshluger and Nemirovski 1997).
 AGREE = 2.5
-# Orders of differences that tell noise from signal: of noise all give one size, of a smooth signal the
+# Orders of differences that separate noise from signal: for noise all give one size, for a smooth signal the
 # higher ones give less.
 ORDERS = (2, 3, 4, 5, 6, 7, 8)
-# Noise smaller than this share of a record's range changes no verdict, and is not looked at.
+# Noise smaller than this share of a record's range changes no verdict, and is ignored.
 NEGLIGIBLE = 1e-6
 FEWEST = 9
 
@@ -78,7 +78,7 @@ def _widest(time_s: Array, values: Array, sd: float, before: bool, after: bool) 
         reach = AGREE * sd * np.sqrt(variance)
         low, high = np.maximum(low, found - reach), np.minimum(high, found + reach)
         agrees &= low <= high
-        # A line through two readings knows no more at its end than the reading.
+        # A line through two readings is no more certain at its end than the reading.
         better = agrees & (variance < spread)
         best, spread = np.where(better, found, best), np.where(better, variance, spread)
     return best, spread
@@ -129,7 +129,7 @@ def denoised_drives(
         once, twice = dict(e.columns), dict(e.columns)
         for c in drives:
             if dwell(e[c]) > STAYS and len(np.unique(e[c])) > FEWEST:
-                # Steps of the display, not of what was done.
+                # Steps of the display, not of the drive itself.
                 once[c] = between_steps(e["time_s"], e[c])
                 continue
             sd = reading_noise(e["time_s"], e[c])

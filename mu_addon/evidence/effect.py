@@ -10,13 +10,13 @@ from ..errors import InputError
 
 # Another modulus of one specimen: an effect of specimens alone, see `owned`.
 BATCH = "batch_variation"
-# A height that was mistyped, a change between two tests, what fast tests have: of some experiments alone.
+# A mistyped height, a change between two tests, a factor of fast tests: of some experiments alone.
 GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
-# Struts that are printed thicker or thinner than drawn, as another specimen's are not: see `owned`.
+# Struts printed thicker or thinner than drawn, unlike another specimen's: see `owned`.
 THICKNESS = "strut_thickness"
-# Effects that multiply the modulus in the experiments whose they are.
+# Effects that multiply the modulus in their experiments.
 SCALES = frozenset((BATCH, STEP, HEATING))
-# Another place of one marker from some moment on, see `prediction.marker_slip`.
+# A shift of one marker from some moment on, see `prediction.marker_slip`.
 SLIP = "marker_slip"
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
@@ -150,7 +150,7 @@ LIBRARY = {
     "mesh_error": ("the mesh of the model is too coarse", "the same simulation on a finer mesh"),
 }
 
-# Where an experiment of a kind shows an effect otherwise than `LIBRARY` has it.
+# Differences from `LIBRARY` in how an experiment of a kind shows an effect.
 SHOWN_BY = {
     ("viscoelasticity", "coupon"): "one coupon at two rates a decade apart, or held at a stretch",
     ("viscoelasticity", "lattice_compression"): "one block at two rates a decade apart, or held",

@@ -116,7 +116,7 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
 
     effects: dict[str, dict[str, Fitted]] = {}
     for e in fit.effects:
-        # A slip is of these records: in others the marker's zero is where it sits now.
+        # A slip belongs to these records: in others the marker's zero includes it.
         if not (e.whose or e.among or e.name == SLIP):
             # Two kinds of experiments may have one mechanism by parameters of their own.
             of_name = effects.setdefault(e.name, {})

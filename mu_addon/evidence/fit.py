@@ -19,9 +19,9 @@ from .simulator import Composite
 Array = np.ndarray[Any, Any]
 
 ITERATIONS = 25
-# A step that gains less of chi squared than this ends a fit.
+# Gain of chi squared below which a fit ends.
 GAIN = 1e-2
-# Group of what was known of values before any data.
+# Group of prior knowledge.
 PRIOR = "known before"
 
 
@@ -144,7 +144,7 @@ class Fitter:
         residual.
         """
         found = dict(self.whitening.log_dets)
-        # What was known before any data has a likelihood as well.
+        # Prior knowledge has a likelihood as well.
         found[PRIOR] = fit.chi2 - float(fit.residual @ fit.residual)
         for s in self.record.series:
             r = fit.residual[s.at]
@@ -225,7 +225,7 @@ class Fitter:
         keys = tuple(k for k, _ in free)
         measured = self.record.values
         known = [(i, p) for i, (_, p) in enumerate(free) if math.isfinite(p.spread)]
-        # Holding a value costs what is known against it.
+        # Holding a value costs its deviation from prior knowledge.
         held = sum(((p.null - fixed[p.name]) / p.spread) ** 2 for p in self.known if p.name in fixed)
 
         def at(x: Array) -> dict[str, float]:
@@ -247,7 +247,7 @@ class Fitter:
             for i in range(len(x)):
                 h = step[i] if x[i] + step[i] <= high[i] else -step[i]
                 shifted[:, i] = 0.0
-                # Beside values that have no prediction the other side may have one.
+                # Beside values without a prediction the other side may have one.
                 for side in (h, -h):
                     moved = x.copy()
                     moved[i] += side
@@ -288,7 +288,7 @@ class Fitter:
         measured: Array,
     ) -> Fit:
         values |= self.zeros(measured - f)
-        # Columns of unit length: which direction counts as none must not depend on units.
+        # Columns of unit length: the rank must not depend on units.
         length = np.linalg.norm(jacobian, axis=0)
         length[length == 0.0] = 1.0
         unit = jacobian / length

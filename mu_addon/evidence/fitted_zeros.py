@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import MuError
 from .fit import Fit, Fitter
 
-# Times as large an error must be with all zeros at 0 for the zeros to be told.
+# Factor by which the error must grow with all zeros at 0 for them to be reported.
 LARGER = 2.0
 
 

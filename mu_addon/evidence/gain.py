@@ -88,7 +88,7 @@ def gain(fitter: Fitter, base: Fit, extended: Fit, held_out: Sequence[Experiment
     unseen = _errors(fitter, record(known, fitter.simulator), base, extended) if known else {}
     every = {name: (errors, unseen.get(name)) for name, errors in fitted.items()}
     first = _best_served_group(base, extended, fitter.record)
-    # What was held out may be of another kind altogether.
+    # Held-out experiments may be of another kind altogether.
     held = unseen.get(first) or next(iter(unseen.values()), None)
     return Gain(fitted[first], held, every, refused)
 

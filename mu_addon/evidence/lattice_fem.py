@@ -24,7 +24,7 @@ from ..run.cache import Cache
 from ..toml_writer import toml_text
 from .prediction.lattice import KIND, ComputedCell, Scaling
 
-# Told of a block and the share that is done.
+# Gets a block and the finished share.
 Progress = Callable[[str, float], None]
 
 SHIPPED = "responses"

@@ -19,7 +19,7 @@ from .sensitivity import Sensitivity
 
 Array = np.ndarray[Any, Any]
 
-# By how much farther a load cell is put from the tip.
+# Additional distance of a load cell from the tip.
 FURTHER_mm = 2.0
 
 
@@ -69,7 +69,7 @@ def propose_experiment(
         own = {s.effect.name: s.effect.reveals for s in seen}
         plain = dict.fromkeys(n.partition(OF)[0].partition(" among ")[0] for n in names)
         tied = [n for n in (BATCH, GEOMETRY) if n in plain]
-        # What scales one specimen is untied from any other cause by another specimen.
+        # Another specimen separates a scale of one specimen from any other cause.
         asked = tied[:1] or list(plain)
         words = "; or ".join(dict.fromkeys(own.get(n, LIBRARY.get(n, ("", n))[1]) for n in asked))
         return Proposal(words, names, best.expected if best else 0.0)

@@ -88,7 +88,7 @@ class _Factor:
         """Whitened rows of x (n,) or (n, k)."""
         from scipy.linalg.lapack import dtbtrs
 
-        # Columns lie in memory one after the other, for LAPACK and for the loops before it.
+        # Columns are contiguous in memory, for LAPACK and for the loops before it.
         columns = np.ascontiguousarray(x.T).reshape(-1, len(x))
         y: Array = columns * self.inverse
         y[:, 1:] -= self.carried * columns[:, :-1]
@@ -98,7 +98,7 @@ class _Factor:
         return np.asarray(y.T if x.ndim == 2 else y[0])
 
 
-# Share of white noise that always wanders: the factor asks for some, and so little is not felt.
+# Share of white noise treated as slow: the factor needs some, and so little has no effect.
 LEAST_SLOW = 1e-4
 
 
@@ -119,10 +119,10 @@ class _Clocks:
         self._timed = np.repeat([not math.isnan(s.sample_s) for s in first.values()], lengths)
         self._step = np.repeat([s.sample_s for s in first.values()], lengths)
         self._count = np.concatenate([s.count for s in first.values()])
-        # A burst of noise is as good as an average of fewer samples.
+        # A burst of noise equals an average of fewer samples.
         louder = [s.count if s.louder is None else s.count / s.louder**2 for s in first.values()]
         self._averaged = np.concatenate(louder)
-        # Nothing persists into the first of a series, nor from value to value without a clock.
+        # Nothing carries over into the first of a series, nor between values without a clock.
         apart = [np.diff(s.time_s, prepend=-math.inf) for s in first.values()]
         self._apart = np.where(self._timed, np.concatenate(apart), math.inf)
 
@@ -133,7 +133,7 @@ class _Clocks:
         phi = np.exp(-self._apart / source.time_s)
         kept, first = _block(self._count, self._step / source.time_s)
         slow = max(source.slow, LEAST_SLOW * source.white)
-        # Noise that does not last from block to block is white; what of it persists has some variance still.
+        # Noise that does not last from block to block is white; the rest keeps some variance.
         variance = np.maximum(slow**2 * kept, 1e-12 * source.white**2 / self._averaged)
         # Without a clock each value stands alone.
         c = np.where(self._timed, variance, source.white**2)
@@ -153,7 +153,7 @@ class _Clocks:
         below[:-1] = factor[1, :-1] * diagonal[:-1]
         carried = np.concatenate([[0.0], phi[1:] * inverse[:-1]])
         if self._rows is not None:
-            # The last row of a clock has none below it: its series may be followed by any other.
+            # The last row of a clock has none below it: any series may follow it.
             below[self._ends - 1] = 0.0
             inverse, carried, below, diagonal = (v[self._rows] for v in (inverse, carried, below, diagonal))
         whole = np.stack([np.ones(len(below)), below])
@@ -309,7 +309,7 @@ def _deviance(
 
     dof = max(start - sum(many for _, many in places), 1)
     clocks = _Clocks(series)
-    # Columns that a series lacks are zero; a one on the diagonal keeps them out of what is solved.
+    # Missing columns of a series are zero; a one on the diagonal removes them from the solution.
     lacking = np.stack([np.diag(np.arange(k) >= many).astype(float) for _, many in places])
 
     def deviance(x: Array) -> tuple[float, float]:
@@ -355,7 +355,7 @@ def span(record: Record, signatures: Array) -> list[Array]:
         if cycle is not None:
             parts.append(_centred(cycle))
         every = np.hstack(parts)
-        # By the products of columns, of which there are fewer than rows: far more digits than are needed.
+        # By the products of columns, fewer than rows: with far more digits than needed.
         squares, vectors = np.linalg.eigh(every.T @ every)
         most = max(b // 5 - 1, 0) if not math.isnan(s.sample_s) else max(b // 2 - 1, 0)
         many = min(int((squares > 1e-4).sum()), most)
@@ -407,7 +407,7 @@ def repeated(time_s: Array, signal: Array) -> float | None:
     if n < 16 or not x.any():
         return None
     power = np.abs(np.fft.rfft(x, 2 * n)) ** 2
-    # Of overlapping parts, so that a whole number of cycles comes back to one.
+    # Of overlapping parts, so that whole cycles correlate fully.
     together = np.fft.irfft(power)[: n // 2 + 1] / (n - np.arange(n // 2 + 1)) * n
     together = together / together[0]
     low = int(np.argmax(together < 0.2)) if (together < 0.2).any() else n

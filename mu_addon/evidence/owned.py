@@ -31,7 +31,7 @@ from .selection import (
 )
 from .sensitivity import Sensitivity, sensitivities
 
-# What measures or holds a specimen may fail in one experiment, and does not go with the specimen.
+# Instruments and clamps may fail in one experiment, independent of the specimen.
 OF_THE_BENCH = CAMERA.union(
     (
         "pressure_offset",
@@ -51,11 +51,11 @@ OF_THE_BENCH = CAMERA.union(
         "contact",
     )
 )
-# What may come with a specimen or with the way in which it was held once.
+# Effects of the specimen or of the way it was clamped once.
 OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
-# Numerics and a machine's frame are alike for all, and a marker's slip says by its moment whose it is.
+# Numerics and a machine's frame are the same for all, and a marker's slip has its owner by its moment.
 OF_NONE = frozenset(("mesh_error", "gravity", "frame_compliance", SLIP))
-# Most effects fitted, those first that promise most.
+# Most effects fitted, the most promising first.
 MOST_FITS = 12
 CHANGE = Parameter("change", "", -0.8, 4.0, 0.0, (0.1,), "batches differ by 5 to 20 %, struts by more")
 BATCH_EFFECT = Effect(BATCH, (CHANGE,), ())
@@ -64,7 +64,7 @@ THICKER = Parameter(
 )
 THICKNESS_EFFECT = Effect(THICKNESS, (THICKER,), ("lattice_compression",))
 HEIGHT = Parameter("height", "", -0.2, 0.2, 0.0, (0.03,), "true over typed, less 1; misread or mistyped")
-# Kinds in a testing machine, whose force a specimen, its geometry and its clamping scale alike.
+# Kinds in a testing machine, whose force depends on specimen, geometry and clamping alike.
 MACHINE = ("coupon", "lattice_compression")
 # Rates of tests are two where they differ by more than this factor.
 FASTER = 1.5
@@ -174,18 +174,18 @@ def select_owned(
             continue
         best = pool[0]
         if cost(best) >= min(cost(found.chosen), *(cost(f) for f in found.singles)):
-            # What all have explains more.
+            # A common effect of all explains more.
             continue
         rivals = [f for f in singles if len(f.effects) == len(best.effects) and f is not best]
         same = [f for f in [*pool[1:], *rivals] if f.names == best.names]
         if any(f.chi2 - best.chi2 < RIVAL_DELTA_CHI2 and _owner(f) != _owner(best) for f in same):
-            # Whose it is cannot be told.
+            # The owner cannot be determined.
             continue
         p = false_alarm_probability(fitter, seed, every, gain_of(fitter, seed, best))
         if p >= FALSE_ALARM_RATE or at_a_bound(best) or loss(fitter, seed, best) <= 0.0:
             continue
         table = tuple(strict_table(fitter, best))
-        # An effect of the last experiment alone is like something that broke before it.
+        # An effect of the last experiment alone looks like a failure before it.
         margin = 0.0 if best.names[-1] == STEP else RIVAL_DELTA_CHI2
         if sudden(found.table_base, found.base, best, margin):
             continue
@@ -197,7 +197,7 @@ def select_owned(
             found, chosen=best, causes=causes, table=table, singles=singles, doubted="", p_best=p
         )
         if chosen.left:
-            # It may be the same of one more specimen; of several it is what differs among them, see `pooled`.
+            # One more specimen may have the same effect; for several see `pooled`.
             chosen = further_owners(fitter, chosen, progress)
             if chosen.left or len(chosen.chosen.effects) > len(best.effects) + 1:
                 continue
@@ -216,7 +216,7 @@ def coinciding(
     """
     chosen = found.chosen
     scales = [e for e in fitter.simulator.effects if e.name == "force_scale"]
-    # A standard deviation that is stated has in it by how much specimens differ.
+    # A stated standard deviation includes the spread of specimens.
     single = [e for e in fitter.record.experiments if "stress_sd_kPa" not in e.columns]
     owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
     if not owned or not found.causes or found.left or found.doubted:
@@ -237,7 +237,7 @@ def coinciding(
                 near.append(fit)
         near = ranked(near)
         if c.effect.among and near and cost(near[0]) < cost(chosen):
-            # One size for some does what a size of each does.
+            # One size for some replaces a size of each.
             found, near = attrs.evolve(found, chosen=near[0]), near[1:]
             c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
         rivals = dict.fromkeys((*c.rivals, *(f.effects[-1].title for f in near)))

@@ -26,13 +26,13 @@ from .selection import (
 
 Array = np.ndarray[Any, Any]
 
-# Of fewer owners a spread is not estimated: two that differ are one and another.
+# Least number of owners for an estimate of the spread.
 FEWEST = 3
-# Names of drifts: of each experiment they would be another law of the same instrument.
+# Names of drifts: separate for each experiment they would imitate another law of the same instrument.
 DRIFTS = "_drift"
 # Rounds of spread, values and slopes about them, and the change of the spread that ends them.
 ROUNDS, SETTLED = 4, 0.02
-# Shapes (times of a drift, inertia of a leak) that a fit begins from: those that promise most.
+# Number of shapes (times of a drift, inertia of a leak) that a fit starts from, the most promising ones.
 SHAPES = 2
 # Rise of -2 log L that a 95 % interval of one number allows.
 RISE = 3.84
@@ -135,7 +135,7 @@ def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str
     if name in OF_THE_BENCH:
         named = {"session": [e.session for e in experiments]}
         named["experiment"] = [e.name for e in experiments]
-    # Where a group has some without a name, nothing says whose they are.
+    # Where some of a group have no name, their owners are unknown.
     whole = {k: tuple(dict.fromkeys(v)) for k, v in named.items() if all(v)}
     if any(len(whole[k]) == len(experiments) for k in whole if k != "experiment"):
         # Each experiment is the only one of its owner.
@@ -182,13 +182,14 @@ def select_pooled(
     table = tuple(strict_table(fitter, best))
     if structure(table) or sudden(found.table_base, found.base, best):
         return found
-    # Smooth structure may pass for slow noise; then what all owners share explains more than what differs.
+    # Smooth structure may pass for slow noise; then a common effect of all owners explains more than a
+    # spread.
     if any(single.chi2 < best.chi2 for single in found.singles):
         return found
-    # Nor is what leaves as little as an error of their law would.
+    # Nor does a fit with as small a residual as an error of their law.
     margin = max(RIVAL_DELTA_CHI2, LAW**2 * gain)
     near = [f.effects[0] for g, f in fits[1:] if gain - g < margin]
-    # Whatever differs among specimens can do so among their experiments, and another law is the same cause.
+    # Any difference among specimens is also one among their experiments, and another law is the same cause.
     rivals = dict.fromkeys(
         e.title for e in near if e.name != best.names[0] or len(sizes_of(e)) < len(sizes_of(best.effects[0]))
     )

@@ -81,7 +81,7 @@ class Series:
         best.
         """
         if self._spread is not None:
-            # The whole record lies too high or too low together: it is one number, in units of its spread.
+            # The whole record is offset together: it is one number, in units of its spread.
             return np.asarray(values @ self._spread / (self._spread @ self._spread))[..., None]
         if len(self._first) == values.shape[-1]:
             return values if self._kept.all() else values[..., self._kept]
@@ -176,7 +176,7 @@ class Record:
         return found
 
 
-# Columns that may say what was done, where they are not predicted.
+# Columns that may be drives, unless they are predicted.
 DRIVES = ("pressure_kPa", "angle_deg", "strain", "displacement_mm")
 # Share of its range by which a drive may differ between repeats.
 ALIKE = 0.05

@@ -24,7 +24,7 @@ from .ringing import modes, ringing
 
 Array = np.ndarray[Any, Any]
 
-# Share of clean sets in which any structure at all may be seen.
+# Share of clean data sets in which any structure may be reported.
 FALSE_ALARM = 0.003
 BANDS = 16
 # The pitch of chambers at 1.0x.
@@ -32,9 +32,9 @@ PITCH_MM = Chambers().cell_mm
 ANGLE = "angle_deg"
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
-# A column of which what was fitted anyway leaves no more than this share tells nothing.
+# A column of which less than this share remains after projection has no information.
 ABSORBED = 1e-3
-# Periods of the slowest ringing that is looked for in the longest record: what is slower is no vibration.
+# Periods of the slowest ringing sought in the longest record: slower motion is no vibration.
 PERIODS = 10.0
 
 
@@ -302,10 +302,10 @@ def _marker_places(record: Record) -> dict[str, float]:
     try:
         seen = at_rest(bent)
     except InputError:
-        # Without a moment of rest nothing says where they sit.
+        # Without a moment of rest the markers' positions are unknown.
         return {}
     scale = {e.name: e.scale for e in bent}
-    # To half a chamber: where markers were glued is not known better.
+    # To half a chamber: positions of glued markers are no more accurate.
     chamber = {n: round(2 * z / (PITCH_MM * scale[name])) / 2 for n, (_, (*_, z), name) in seen.items()}
     channels = _channels(record)
     return {c: chamber[n] for c in channels for n in chamber if c.startswith(f"marker{n}_")}
@@ -322,7 +322,7 @@ def _tested(
 
     if columns is None:
         return []
-    # Series are whitened apart, so one pass does for all channels.
+    # Series are whitened separately, so one pass serves all channels.
     every = fitted.fitter.whitened(columns)
     joint, total, best, groups = [], 0, (1.0, "", 0.0, 0), set()
     for channel, rows in fitted.rows.items():
@@ -605,7 +605,7 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
     if not moments:
         return []
     places = [[k for k, m in enumerate(moments) if m[0] == i] for i in range(len(record.experiments))]
-    # Of experiments after that of a moment all of the response counts: eight moments' columns, and that one.
+    # For experiments after the moment the whole response counts: eight moments' columns, and that one.
     eighth = np.zeros((len(record), 9))
     for s in _clocked(record):
         eighth[s.at, 0] = response[s.at]
@@ -698,7 +698,7 @@ def _outliers(record: Record, r: Array) -> list[Dependence]:
         return []
     worst, where, tried = 0.0, "", 0
     for s in clocked:
-        # In a burst how far a reading may be is not known.
+        # In a burst the size of errors is unknown.
         z = np.abs(r[s.at]) if s.louder is None else np.where(s.louder > 1.0, 0.0, np.abs(r[s.at]))
         tried += len(z)
         if z.max() > worst:

@@ -15,20 +15,20 @@ from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
 
-# Digits behind the point that a gauge may have; what has more was not read off a display.
+# Largest number of decimals of a gauge; a number with more was not read from a display.
 DIGITS = 9
-# Of a step, by which written readings may lie off a multiple of it; readings without steps lie anywhere. And
-# levels over readings: where nearly every reading has a level of its own there is no step to see.
+# Share of a step by which written readings may deviate from a multiple of it; readings without steps deviate
+# by any. Also levels over readings: if nearly every reading has its own level there is no visible step.
 OFF_LEVEL, MOST_LEVELS = 0.05, 0.95
 # A reading is set aside if it is so many deviations from all that its neighbours predict.
 WRONG = 8.0
-# Of a record so few readings may stand alone: what happens more often is no accident, as corners of a fast
-# cycle are none. Beside a prediction, which has such corners, more may be wrong.
+# Share of a record's readings that may be isolated: more are no accident, such as corners of a fast cycle.
+# Beside a prediction, which has such corners, more may be wrong.
 MOST_ALONE, MOST_WRONG = 0.02, 0.1
 MANY = 100
 FEWEST = 9
-# Readings around one of which the median is what it should be off by; a change is as fast as another one from
-# this share of it on, and so many times more readings of such changes must be right.
+# Number of readings whose median residual is the reference; a change counts as equally fast from this share
+# of it on, and this many times more readings of such changes must be right.
 AROUND_ONE, ALIKE, TIMES_MORE = 9, 0.7, 10
 # Readings that stay so many samples before each change come in steps coarser than their noise.
 STAYS = 2.0
@@ -36,7 +36,7 @@ STAYS = 2.0
 CLIPPED = 5
 # Readings around such a stretch are lost with it where this share of them is at the end: their noise is cut.
 AROUND, SHARE = 11, 0.2
-# Beyond this share nothing of a record would be left to judge.
+# Beyond this share too little of a record would be left.
 MOST_CLIPPED = 0.6
 
 
@@ -68,7 +68,7 @@ def _any_step(seen: Array, values: Array) -> float:
     if len(seen) < FEWEST:
         return 0.0
     away = seen - seen[0]
-    # Written digits end somewhere: what differs by no more is one reading.
+    # Written digits are finite: smaller differences are one reading.
     apart = np.diff(seen)
     written = 1e-6 * float(away[-1])
     apart = apart[apart > written]
@@ -179,7 +179,7 @@ def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
     size = max(size, max(quantum(y), step) / math.sqrt(12.0), 1e-9 * float(np.ptp(y)))
     low, high = np.nanmin(away, axis=0), np.nanmax(away, axis=0)
     alone = (low > WRONG * size) | (high < -WRONG * size)
-    # Beyond the ends nothing says how it goes on.
+    # Beyond the ends the course is unknown.
     alone[:2] = alone[-2:] = False
     if np.count_nonzero(alone) <= max(1, MOST_ALONE * n):
         found[known[alone]] = True
@@ -262,7 +262,7 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
         alike = fast >= ALIKE * fast[i]
         if np.count_nonzero(alike & ~alone) < TIMES_MORE * np.count_nonzero(alike & alone):
             return found
-    # Of a short record so many are no accident beside a prediction either.
+    # In a short record as many are no accident beside a prediction either.
     most = MOST_WRONG if len(off) >= MANY else MOST_ALONE
     if np.count_nonzero(alone) <= max(1, most * len(off)):
         found[known[alone]] = True
@@ -287,7 +287,7 @@ def without_unpredicted_readings(
         except MuError:
             if e.role == "fit":
                 raise
-            # What was held out and has no prediction is told where its gain would be.
+            # Held-out experiments without a prediction are reported with their gain.
             found.append(e)
             continue
         for row, channel in enumerate(channels):
@@ -295,7 +295,7 @@ def without_unpredicted_readings(
                 (c for c in channels[:row] if np.array_equal(e[c], e[channel], equal_nan=True)), None
             )
             if copied is not None:
-                # It counts no second time, and stays the same so that the record sees it.
+                # It does not count twice, and stays equal so that the record detects it.
                 columns[channel] = columns[copied]
                 continue
             wrong = unpredicted_readings(e[channel], predicted[row], steps[e.kind, channel])

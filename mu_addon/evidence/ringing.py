@@ -71,7 +71,7 @@ def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array
     stays = np.where(small, h * (1.0 + x / 2.0 + x**2 / 6.0), (keeps - 1.0) / rate)
     grows = np.where(small, h * (0.5 + x / 6.0 + x**2 / 24.0), h * (keeps - 1.0 - x) / safe**2)
     driven = still[:, :-1] * stays + np.diff(still, axis=1) * grows
-    # z_k - keeps z_(k-1) = what drives it: a band with ones on its diagonal.
+    # z_k - keeps z_(k-1) = drive: a band with ones on its diagonal.
     band = np.ones((2, len(time_s)), complex)
     band[1, :-1] = -keeps
     driven = np.concatenate([-still[:, :1] / rate, driven], axis=1)

@@ -16,27 +16,28 @@ from .resolution import divided
 
 Array = np.ndarray[Any, Any]
 
-# Noise may be so many times what readings scatter from one to the next: slow noise of an instrument is some
-# two to three times its fast part (3.1 at most in 42 clean sets of a second code).
+# Noise may be this many times the scatter of readings: slow noise of an instrument is some two to three times
+# its fast part (3.1 at most in 42 clean sets of a second code).
 TIMES = 4.0
 # Share by which an estimate of scatter from n readings is low, times the root of n.
 FEW = 4.0
-# What gauges and load cells are accurate to where nothing is stated, as a share of the largest reading: slow
-# noise up to this needs no fast part beside it.
+# Assumed accuracy of gauges and load cells, as a share of the largest reading: slow noise up to this needs no
+# fast part.
 ACCURACY = 0.002
-# Of fewer than `FEWEST` readings no scatter is seen: a model that misses by this share of them is no model.
+# With fewer than `FEWEST` readings no scatter is seen: a model off by this share of them is wrong.
 UNSEEN = 0.1
-# Nor may noise be so many times what repeats differ by: slow noise of two records may be alike by chance.
+# Noise may be at most this many times the differences of repeats, as slow noise of two records may agree by
+# chance.
 REPEATED = 3.0
 # Of the largest reading: gauges and load cells repeat no better.
 REPEATABLE = 2e-4
-# What is left of readings and is less than so many times their scatter decides nothing for anyone.
+# A residual below this many times the scatter is of no importance.
 NEAR = 2.0
 # Blocks in a window of a burst, and times the usual scatter: less happens by chance.
 WINDOW, LOUD = 15, 2.5
-# Deviations from those around it beyond which a block is a burst of its own, as so many may be.
+# Deviations from those around it beyond which a block is a separate burst; largest share of such blocks.
 ALONE, MOST = 5.0, 0.2
-# A block that is louder still does not count any more.
+# A louder block does not count any more.
 LOUDEST = 1e3
 
 

@@ -22,37 +22,37 @@ from .sensitivity import ABSORBED, Sensitivity
 
 Array = np.ndarray[Any, Any]
 
-# Chance of naming an effect, any of the library, that is not there.
+# False-positive probability of naming any effect of the library.
 FALSE_ALARM_RATE = 5e-4
 # Rivals within this delta chi squared (99 % for two parameters) cannot be told apart.
 RIVAL_DELTA_CHI2 = 9.2
 MOST_EFFECTS = 3
-# Models that the next effect is added to: the best one may be wrong while two effects are seen as one.
+# Number of models that the next effect is added to: the best may be wrong while two effects pass for one.
 SEEDS = 4
 DRAWS = 20000
-# Faults of one camera, of which it has one at most: two of them imitate many pairs of physical effects.
+# Faults of one camera, which has one at most: two of them imitate many pairs of physical effects.
 CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
 # Between the titles of two effects that are one rival together.
 TOGETHER = " with "
-# What the model's own mesh does: there in every set of data, seen or not.
+# Error of the model's own mesh: present in every set of data, seen or not.
 NUMERICS = "mesh_error"
-# An effect rests on one experiment alone where this share of what is known of it comes from there.
+# An effect rests on one experiment alone if this share of the information on it comes from there.
 ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
 # part of what `FALSE_ALARM_RATE` asks for.
 PROMISING = 4.0
-# Share of an effect's amplitude by which another right law of its mechanism may differ from the library's:
-# what gains no more beside it is not named.
+# Share of an effect's amplitude by which another valid law of its mechanism may differ from the library's: an
+# effect with a smaller gain beside it is not named.
 LAW = 0.05
-# How many times what a first effect takes may be taken by scales of single tests before no second is tried.
+# Ratio of the gain by scales of single tests to a first effect's, above which no second is tried.
 ELSEWHERE = 4.0
-# Rivals of a cause that are fitted by all laws of their mechanisms: so many, that take this share of
-# what the cause takes by their first law.
+# Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's
+# gain that they need by their first law.
 NEAREST, WORTH_LAWS = 3, 0.2
-# Share of a misfit that one effect must take to be named though structure is left, and how many times as
-# much any other one in its place must leave.
+# Share of a misfit that one effect must take to be named although structure is left, and the factor by which
+# any other one's residual must exceed its own.
 MAINLY, APART = 0.99, 10.0
-# Share from which on the best explanation is told as such, and how many times as much any other must leave.
+# Share from which the best explanation is reported as such, and the factor for any other's residual.
 GRADED, CLEAR = 0.9, 4.0
 
 
@@ -125,7 +125,7 @@ def select(
     alone = False
     while (level := len(levels)) < min(MOST_EFFECTS, len(effects)):
         if level and ELSEWHERE * (base.chi2 - chosen.chi2) < taken_by_scales(fitter, base):
-            # Tests differ in scale by far more than what all have in common: see `owned`, `pooled`.
+            # Tests differ in scale by far more than by a common effect: see `owned`, `pooled`.
             break
         if level:
             pool = _extended(fitter, effects, levels[-1][:1], progress)
@@ -133,7 +133,7 @@ def select(
             break
         p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
-        # What looked best alone may be neither of two that act together.
+        # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
             # Cameras' faults lead where each of two physical effects does little alone.
             physical = [f for f in levels[-1] if not CAMERA.intersection(f.names)]
@@ -150,14 +150,14 @@ def select(
         if p >= FALSE_ALARM_RATE or _of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
-            # Against those found before it says nothing; what it would take is left as structure.
+            # It cannot be compared with earlier ones; its part is left as structure.
             doubted = "" if level else f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         if level == 1 and not alone:
             alone = True
             others = by_all_laws(fitter, levels[0], progress, every=True)
             if cost(others[0]) < min(cost(pool[0]), cost(chosen)):
-                # One mechanism by another law does what two do.
+                # One mechanism by another law replaces two.
                 levels[0], chosen, singles = others, others[0], tuple(others)
                 taken = base.chi2 - chosen.chi2
                 continue
@@ -407,7 +407,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     left = max(1.0 - share_taken(fitter, base, best), 1e-6)
     sure = left <= 1.0 - MAINLY
     if left > 1.0 - GRADED or (not sure and base.chi2 < 2.0 * len(fitter.record)):
-        # Of a misfit that is less than the noise shares say nothing.
+        # Shares are meaningless for a misfit below the noise.
         return None
     others: dict[str, float] = {}
     for f in [*found.singles, *found.wider]:
@@ -474,7 +474,7 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
         if left > (1.0 - GRADED) * c.loss:
             return False
         others = [e for e in chosen.effects if e is not c.effect]
-        # So near a rival would have been told (`causes_of`).
+        # So near a rival would have been reported (`causes_of`).
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
         if CLEAR * left > near and _any_within(fitter, found, others, CLEAR * left):
             return False
@@ -514,7 +514,7 @@ def size_at_bound(fit: Fit) -> bool:
 
 def _bounded(p: Parameter, value: float) -> bool:
     if not p.plausible[0] <= value <= p.plausible[1]:
-        # What no specimen has is no cause, though a fit may go there.
+        # An implausible value is no cause, though a fit may reach it.
         return True
     ends = [b for b in (p.low, p.high) if b != p.null]
     if logarithmic(p):
@@ -636,7 +636,7 @@ def false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity
     if not columns:
         return 1.0
     u = np.stack(columns, axis=1)
-    # What is known of nuisances is uncertain as the data are, and effects may come with such knowledge too.
+    # Prior knowledge of nuisances is uncertain like the data, and may imitate effects too.
     q = np.vstack([fit.jacobian, fit.prior])
     u = np.vstack([u, np.zeros((len(q) - len(u), u.shape[1]))])
     q = np.linalg.qr(q)[0] if q.shape[1] else q
@@ -728,13 +728,13 @@ def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
             folds.append(rows)
             continue
         if not timed:
-            # Readings without a clock stand alone: every other one foretells those between.
+            # Readings without a clock are independent: every second one predicts those between.
             folds += [rows & (np.cumsum(rows) % 2 == k) for k in (0, 1)]
             continue
         clock = np.zeros(len(record))
         for s in record.series:
             if s.experiment == i:
-                # A record that counts as one number has no moment of its own.
+                # A record that counts as one number has no time.
                 clock[s.at] = s.time_s if s.group != KNOWN else s.time_s.mean()
         edges = np.quantile(clock[rows], [0.25, 0.5, 0.75])
         part = np.digitize(clock, edges)
@@ -770,12 +770,12 @@ def causes_of(
         tried = _with_their_laws(fitter, chosen, less, tried)
         rivals: dict[str, float] = {}
         for f in tried:
-            # What a search gives to a rival by noise is no fit.
+            # A rival's gain by its search is no fit.
             if f.chi2 + by_search(f) - chosen.chi2 - by_search(chosen) < near:
                 name = f.effects[-1].title
                 rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
         if NUMERICS not in rivals:
-            # Where the mesh alone does in its place, anything beside the mesh would.
+            # Where the mesh alone replaces it, anything beside the mesh would.
             rivals |= _by_numerics(
                 fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
             )

@@ -17,14 +17,14 @@ from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
 
-# Delta chi squared of 16: seen in nearly every set of data, once a library of some 25 effects is paid for.
+# Delta chi squared of 16: detected in nearly every data set, corrected for a library of some 25 effects.
 SEEN = 4.0
-# Root of delta chi squared below which an effect, at its largest, explains nothing that is seen.
+# Root of delta chi squared below which an effect, at its largest, explains nothing visible.
 WORTH = 2.0
 # Below this share an effect is a nuisance by another name.
 ABSORBED = 2e-3
 
-# A zero that wanders is what slow noise is: nothing would be left to tell the noise by.
+# A drifting zero equals slow noise: nothing would be left to estimate the noise by.
 WANDERING = ("pressure_drift", "force_drift", "angle_drift")
 
 
@@ -41,7 +41,7 @@ def signatures(
     columns: list[Array] = []
 
     def slope(key: str, at: float, step: float, by: float, beside: Mapping[str, float]) -> None:
-        # A value without a prediction tells of no slope.
+        # A value without a prediction gives no slope.
         found = record.possible(simulator, {**values, **beside, key: at + step})
         if found is not None:
             columns.append((found - base) / by)
@@ -120,12 +120,12 @@ def sensitivities(
     names: list[Parameter] = []
     for p in simulator.nuisances:
         column = _slope(fitter, values, p.name, p)
-        # One at its bound went as far as it may, and hides nothing more.
+        # A nuisance at its bound cannot absorb more.
         if column.any() and p.low < values.get(p.name, p.null) < p.high:
             nuisances.append(column)
             names.append(p)
     n = fitter.project(np.stack(nuisances, axis=1), zeros=False) if nuisances else np.zeros((len(base), 0))
-    # A nuisance of which something is known does not move for nothing.
+    # A nuisance with prior knowledge moves at a cost.
     prior = np.zeros((len(fitter.known), n.shape[1]))
     for row, known in enumerate(fitter.known):
         if known in names:

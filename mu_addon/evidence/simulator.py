@@ -75,7 +75,7 @@ class Composite:
         self._known = dict(known)
         self._kept: OrderedDict[Any, tuple[Experiment, Array]] = OrderedDict()
         self.calls = 0
-        # Names of experiments by what they are called together, where that is no specimen or session.
+        # Common names of experiments other than specimen or session.
         self.groups: dict[str, frozenset[str]] = {}
         self.refused: dict[str, str] = {}
         nuisances: dict[str, Parameter] = {}
@@ -99,12 +99,12 @@ class Composite:
             kind: {p.name for p in s.nuisances} | {key for e in s.effects for key in e.keys}
             for kind, s in self._simulators.items()
         }
-        # Another law of a mechanism that is in the model already would have it twice.
+        # Another law of a mechanism already in the model would duplicate it.
         there = {(k.partition(".")[0], kind) for kind, names in self._knows.items() for k in names & {*known}}
         offered = [e for e in effects.values() if not {(e.name, kind) for kind in e.kinds} & there]
         self.effects = tuple(e for e in offered if not e.refines)
         self.refinements = tuple(e for e in offered if e.refines)
-        # An effect's values are passed on whole, with what was stated of it besides its parameters.
+        # An effect's values are passed on completely, with entries beside its parameters.
         for kind, names in self._knows.items():
             names |= {k for k in known if (k.partition(".")[0], kind) in there}
         seen = {name for name, _ in there}
@@ -134,7 +134,7 @@ class Composite:
         found = simulator.predict(_of_height(experiment, own.pop(HEIGHT, 0.0)), own)
         found.flags.writeable = False
         self.calls += 1
-        # With the experiment, whose identity would otherwise be given to another one.
+        # Stored with the experiment, whose identity could otherwise be reused.
         self._kept[key] = experiment, found
         if len(self._kept) > self._remembered:
             self._kept.popitem(last=False)

@@ -14,7 +14,7 @@ from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
 
-# So many rows of a record are judged: thirty for each block of readings that a fit sees (`record.BLOCKS`).
+# Most rows of a record: thirty for each block of readings in a fit (`record.BLOCKS`).
 MOST = 20_000
 
 

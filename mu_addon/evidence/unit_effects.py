@@ -28,7 +28,7 @@ from .prediction import beam, coupon, lattice
 from .prediction.flat_obstacle import NAME as CONTACT
 
 if TYPE_CHECKING:
-    # Where an effect is only named, sized or drawn, nothing of the solver is loaded.
+    # To name, size or draw an effect, nothing of the solver is loaded.
     from ..fem.lattice_law import LatticeLaw
     from ..fem.materials import Layer, Materials
     from ..fem.model import Model
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-# A skin of this depth stands for every skin of the same depth times excess modulus.
+# A skin of this depth represents every skin of the same depth times excess modulus.
 SKIN_MM = 0.1
-# Of a foam that resists one side only, its share on the other: laws ask for more than none.
+# Share of a one-sided foam on its other side: laws require more than none.
 NEXT_TO_NOTHING = 1e-3
-# A size whose path ends before the last pressure is of no use: it need not be followed to its very end.
+# A size whose path ends before the last pressure is useless: it need not be followed to its end.
 SMOOTH = NewtonSettings(min_step_MPa=1e-3)
 # Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
 KINKED = NewtonSettings(predictor_tolerance=3.0)
@@ -272,7 +272,7 @@ def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Material
     stiffer = []
     for layer in wall:
         if layer.law is not NeoHooke:
-            # What makes its layers differ: it stays in proportion to stretch.
+            # The law that makes its layers differ stays proportional to stretch.
             stiffer.append(layer)
             continue
         # The unit's membrane is neo-Hookean, which is Yeoh's law with c1 = mu/2 alone.
@@ -402,7 +402,7 @@ EFFECTS = {
     )
 }
 
-# A load cell farther from the tip than was said, in runs of a held tip.
+# A load cell farther from the tip than stated, in runs of a held tip.
 HELD = UnitEffect(
     "seating",
     Parameter("tip_gap_mm", "mm", 0.0, 3.0, 0.0, (0.2, 1.0), "a cell run up by eye stands off by tenths"),
@@ -412,8 +412,7 @@ HELD = UnitEffect(
     larger=(4.5,),
 )
 
-# How a flat obstacle enters a run; where it stands depends on how far the free unit gets, see
-# prediction/flat_obstacle.
+# A flat obstacle in a run; its position depends on the free unit's range, see prediction/flat_obstacle.
 FLAT_OBSTACLE = UnitEffect(
     CONTACT,
     Parameter("gap_mm", "mm", -1e3, 1e3, 1e3, (), "signed: toward +y, below 0 toward -y"),

@@ -42,14 +42,14 @@ FREE = (KIND, step.KIND, pose.KIND)
 ROUND = 0.06
 # Fewer pressures make no cubic spline.
 FEWEST = 4
-# Along the meridian as fine as the default: there a coarser mesh misses most.
+# Along the meridian as fine as the default: there a coarser mesh is least accurate.
 COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 # Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
 FINE = MeshSettings(meridian_mm=1.0)
 # A printed unit's struts need five layers each, and finer ones as much time again.
 STRUTS = MeshSettings(fidelity=SOLID)
 STRUTS_FINE = MeshSettings(fidelity=SOLID, refine=1.2)
-# Share of the progress that walls take.
+# Share of the progress for walls.
 CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
 REACHES = (0.2, 0.5, NEAREST)
@@ -212,7 +212,7 @@ def _computed(
         )
         found |= more
     responses = _counted_alike([r for plan in plans for r in plan.responses(settings, found)])
-    # Whoever asks for the channels of all looks at the first.
+    # A request for the channels of all uses the first.
     return tuple(sorted(responses, key=lambda r: -len(r.channels)))
 
 
@@ -469,7 +469,7 @@ class _Plan:
                 _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
         if len(sizes) < 2:
             return None
-        # Beyond a size that could not be computed nothing is known of what the effect does.
+        # Beyond a size that could not be computed the effect is unknown.
         low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
@@ -506,7 +506,7 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Prog
 
 def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterator[tuple[str, Result]]:
     keys, cases = list(missing), list(missing.values())
-    # One run here first: it compiles what the processes then find compiled.
+    # One run here first: it compiles the kernels for the other processes.
     first = 1 if workers > 1 else len(cases)
     for key, case in zip(keys[:first], cases[:first], strict=True):
         yield key, run(case, cache)

@@ -138,7 +138,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
             for at, state in _states(equilibrium, np.array(case.pressures_kPa), start):
                 values[0, at] = held.reading_N(state.u)
             return Result(values)
-        # Out of reach, it only lends the points at which the unit would touch.
+        # Out of reach, it only supplies the points at which the unit would touch.
         outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(2, 2 + 3 * len(case.points))
         whole, rest = 2 ** len(mesh.symmetry), model.cavity_volume(np.zeros_like(mesh.nodes))

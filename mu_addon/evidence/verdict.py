@@ -58,17 +58,17 @@ from .thinning import thinned
 Array = np.ndarray[Any, Any]
 
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
-# What may belong to one specimen, or differ among them, where nothing that all have explains it.
+# Effects that may belong to one specimen, or differ among them, if no common one explains the data.
 OPEN = ("unexplained", "unidentifiable")
-# A nuisance this many spreads from what was known of it is no longer only a nuisance.
+# A nuisance this many spreads from its prior value is no longer only a nuisance.
 UNLIKELY = 3.0
-# So many, and it stands in for what differs among owners: three leaks as one, with valves shut late.
+# This many effects stand in for one that differs among owners: three leaks as one, with valves shut late.
 STRAINED = 5.0
-# Noise around the causes this many times larger or smaller than around the base model is believed instead.
+# Noise around the causes larger or smaller than around the base model by this factor replaces it.
 RENEWED = 1.5
 # Times that causes are selected anew under noise that is quieter around those found before.
 QUIETER = 2
-# Times that readings which alone stand out are set aside.
+# Number of times that isolated outliers are set aside.
 ROUNDS = 3
 
 
@@ -244,15 +244,15 @@ def diagnose(
         renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
         if not any(_total(sources[g]) > RENEWED * _total(renewed[g]) for g in sources):
             break
-        # Around the base model a large cause is not what its slope says: it had counted as noise, behind
-        # which a second cause, or another first one, is not seen.
+        # Around the base model a large cause differs from its slope: it had counted as noise, which hides a
+        # second cause, or another first one.
         progress("selection under quieter noise")
         sources, fitter = renewed, Fitter(measured, simulator, renewed)
         base = fitter.fit()
         seen = _seen(fitter, base)
         chosen = select(fitter, seen, progress)
     if chosen.causes and _kind(fitter, chosen) == "unexplained":
-        # Beside a large misfit readings that stand alone are not seen.
+        # Beside a large misfit isolated readings are not seen.
         experiments, more = without_unpredicted_readings(experiments, simulator, chosen.chosen.values)
         if more:
             set_aside = [*set_aside, *more]
@@ -267,7 +267,7 @@ def diagnose(
     chosen = further_owners(fitter, chosen, progress)
     if chosen.causes and not chosen.causes[0].effect.among:
         progress("noise around the causes")
-        # What is left of a large cause once its linear part is set aside had counted as noise.
+        # The nonlinear rest of a large cause had counted as noise.
         owned = [e for e in chosen.chosen.effects if e.whose]
         renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
         if any(_apart(sources[g], renewed[g]) for g in sources):
@@ -295,7 +295,7 @@ def diagnose(
         seen = _seen(fitter, base)
         chosen = reselected(fitter, seen, chosen) if chosen.causes else select(fitter, seen, progress)
     if chosen.left or chosen.doubted:
-        # They were not all that was wrong.
+        # There were more faults than these.
         experiments, set_aside, fitter, base, seen, chosen = before
     if chosen.causes and _kind(fitter, chosen) != "unexplained":
         louder = _loud_alone(fitter, seen, chosen, progress)
@@ -337,7 +337,7 @@ def diagnose(
     ]
     proposal = propose_experiment(fitter, chosen, seen)
     known = chosen.chosen if chosen.causes else chosen.base
-    # Of what is no cause the curvature will do.
+    # For an effect that is no cause the curvature suffices.
     sure = kind != "unexplained"
     bounds = {k: interval(fitter, known, k) if sure else _by_curvature(known, k) for k in known.keys}
     identifiability = _identifiability(seen, chosen)

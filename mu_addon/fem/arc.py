@@ -130,7 +130,7 @@ class Arc:
             raise ConvergenceError("a branch can only be followed from a converged state")
         self._linearise(z)
         per_MPa = self._per_MPa
-        # Where pressure moves nothing, any weight does.
+        # Where pressure moves nothing, any weight is valid.
         self._metric[-1] = (per_MPa @ per_MPa) / self._size or 1.0
         return self._node(z, np.append(per_MPa, 1.0), self._start.residual, 0, 1)
 
@@ -240,7 +240,7 @@ class Arc:
         begun, before = self.inertia.factorisations, np.inf
         if not self._linear:
             self._linearise(near.z)
-        # Whatever stops this must not leave a factor of some state in between.
+        # An interruption must not leave a factor of an intermediate state.
         self._linear = False
         steps: list[Array] = []
         self._check_way(near.z, z)

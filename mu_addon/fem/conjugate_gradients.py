@@ -19,7 +19,7 @@ Array = np.ndarray[Any, Any]
 # Systems that one thread carries through the matrix together.
 WIDTHS = (1, 4, 16)
 
-# Iterations between two looks at the residuals, for each of which the device must finish.
+# Iterations between two checks of the residuals, each of which waits for the device.
 LOOK = 10
 
 MAX_ITERATIONS = 20000

@@ -88,7 +88,7 @@ def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
             step = (moved - u).ravel()[model.free]
             found = model.potential(moved, pressure_MPa, parameters)
             after, new_scale = _force(model, parameters, moved, pressure_MPa)
-            # What the two ends' forces say of the decrease, where the energy's own difference is rounding.
+            # Decrease by the two ends' forces, where the energy's own difference is rounding.
             by_forces = -0.5 * float((force + after) @ step)
             decrease = potential - found if abs(by_forces) > _ROUNDING * abs(potential) else by_forces
             expected = -float(force @ step)

@@ -26,9 +26,9 @@ Array = np.ndarray[Any, Any]
 # How much friction may still change with its lagged bound, as a share of it, and how often it may lag.
 FRICTION_TOLERANCE = 1e-4
 MOST_LAGS = 40
-# In how many steps a weight is put on, where fewer are not enough.
+# Number of steps in which a weight is applied, where fewer do not suffice.
 WEIGHT_STEPS = (1, 4, 16)
-# Of the way to a predicted state, after which it is looked whether surfaces met on it.
+# Share of the way to a predicted state after which contact on it is checked.
 SHARES_OF_WAY = (1 / 16, 1 / 4)
 
 
@@ -183,14 +183,15 @@ class Equilibrium:
                 if factorisations == s.max_factorisations:
                     break
                 convex = touches and search.residual > EXACT_BELOW
-                # A little less than the last time may do now; from nothing on each try costs a factorisation.
+                # A little less than the last time may suffice now; starting from none costs a factorisation
+                # each.
                 definite, added = self._factorise(search.u, pressure, convex, max(added - 1, 0))
                 factorisations += 1
                 search.forget()
             try:
                 shrunk = search.move(search.direction(self.factor.solve))
             except IndefiniteError:
-                # Iterative solvers may find out only here.
+                # Iterative solvers may detect it only here.
                 raise ConvergenceError("the tangent is not definite") from None
             stale = not definite or shrunk > s.keep_factor
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")

@@ -57,7 +57,7 @@ def _load_cvxopt() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     name, chosen = "OPENBLAS_CORETYPE", "OPENBLAS_CORETYPE" in os.environ
     if not chosen:
-        # Its version, 0.3.15, takes processors younger than itself for one of 2004.
+        # Its version, 0.3.15, treats processors younger than itself as one of 2004.
         os.environ[name] = _kernels()
     try:
         import cvxopt.cholmod  # noqa: F401
@@ -139,7 +139,7 @@ class Cholesky:
         # Through a memoryview, which keeps the memory that cvxopt's matrices lend.
         columns = cholmod.getfactor(self._factor).CCS
         indptr, indices, values = (np.asarray(memoryview(a)).ravel() for a in columns)
-        # What it leaves behind would be factorised column by column, without dense blocks.
+        # Otherwise leftover columns would be factorised singly, without dense blocks.
         self._analyse()
         return Lower(order, indptr, indices.astype(np.int32), values)
 

@@ -105,7 +105,7 @@ def tangent(e: Array, bound: Array, stiffness: float, normal: Array) -> Array:
     along = e / np.maximum(size, 1e-300)[..., None]
     plane = np.eye(3) - normal[..., :, None] * normal[..., None, :]
     share = kept(e, bound, stiffness)
-    # What slides resists a turn of its direction only.
+    # A sliding point resists only a turn of its direction.
     turning = (
         plane - np.where(share < 1, 1.0, 0.0)[..., None, None] * along[..., :, None] * along[..., None, :]
     )

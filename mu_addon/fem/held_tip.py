@@ -12,8 +12,8 @@ from .obstacle import Obstacle
 
 Array = np.ndarray[Any, Any]
 
-# N/mm: a unit at 1.0x moves its tip by some 10 mm for what the load cell reads, so that the cell's own way,
-# force over this, is some hundredths of a per cent of it.
+# N/mm: a unit at 1.0x moves its tip by some 10 mm for the load cell's reading, so that the cell's own
+# deflection, force over this, is some hundredths of a per cent of it.
 STIFFNESS = 500.0
 # Nodes this near to the outermost one of the tip, as a share of the tip's width, lie on its edge.
 EDGE = 1e-3

@@ -56,7 +56,7 @@ class _Symmetric:
         np.cumsum(np.bincount(rows, minlength=n), out=start[1:])
         self.whole = sparse.csr_matrix((np.empty(len(order)), columns[order], start), shape=(n, n))
         self._diagonal = np.flatnonzero(np.repeat(np.arange(n), np.diff(start)) == self.whole.indices)
-        # Rows of about as many entries; scipy lets go of the interpreter while it multiplies.
+        # Rows of about as many entries; scipy releases the interpreter while it multiplies.
         cuts = np.searchsorted(start, np.linspace(0, len(order), threads + 1)[1:-1])
         self._slices = [slice(a, b) for a, b in itertools.pairwise([0, *cuts, n])]
         self._parts = [self._rows(s) for s in self._slices]

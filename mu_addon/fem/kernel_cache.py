@@ -24,7 +24,7 @@ NEEDED_BYTES = 20_000_000
 """Free disk space required for the kernels of a run, several times their size."""
 _SEAL = "sha256.json"
 """File of an entry that holds the SHA-256 of each other one, by name."""
-# Where a process builds an entry, before it gets its name.
+# Where a process builds an entry, before renaming it.
 _BEING_BUILT = re.compile(r"_p\d+_t\d+$")
 
 

@@ -92,7 +92,7 @@ def mean_dilatation(
         cofactor = dV[e, q] * cofactors(F)
         for a in range(tets.shape[1]):
             slope[e, a] = slope[e, a] + cofactor * G[e, q, a]
-    # What a waveguide takes the place of has no volume, and no mean.
+    # Elements replaced by a waveguide have no volume, and no mean.
     mean_J[e] = f64(1.0)
     if total > f64(0.0):
         mean_J[e] = swept / total

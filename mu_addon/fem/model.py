@@ -146,10 +146,10 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
         self._least_force = self._beam_forces = 0.0
-        # Where forces were found last, and they: they turn with the sections that they act on.
+        # Position of the last forces, and these: they rotate with their sections.
         self._seen: tuple[Array, float, MaterialData, Array] | None = None
         self.reference = Reference(mesh, device)
-        # Now, since it raises MeshingError.
+        # Evaluated now, since it raises MeshingError.
         _ = self.reference.at
         put = self._put
         n, m, f = len(mesh.nodes), len(mesh.tets), len(mesh.cavity)
@@ -214,7 +214,7 @@ class Model:
             ends.append(np.stack([cells[:, a].ravel(), cells[:, b].ravel()], axis=1))
         self._element_blocks = len(ends[0])
         pairs = np.vstack(ends)
-        # What beams stand for has no stiffness of its own.
+        # Elements replaced by beams have no stiffness of their own.
         resists = np.repeat(mesh.solid, ends[0].shape[0] // max(len(mesh.tets), 1))
         acting = np.flatnonzero(np.append(resists, np.ones(len(ends[1]), bool)))
         parts = len(pairs)
@@ -357,7 +357,7 @@ class Model:
         if self.solver == "conjugate gradients":
             return ConjugateGradients(indptr, indices, order, self.device)
         if self.solver == "two levels":
-            # Newton's tolerance of 1e-9 is relative to all forces, this one to what is left of them.
+            # Newton's tolerance of 1e-9 is relative to all forces, this one to the rest of them.
             return TwoLevel(indptr, indices, self.mesh, self.free, self.threads)
         return make_factor(indptr, indices, order)
 

@@ -26,10 +26,10 @@ class NewtonSettings:
     # many.
     easy_factorisations: int = 12
     max_backtracks: int = 6
-    # Shares of the undeformed body's tangent added, in turn, to one that is not definite.
+    # Shares of the undeformed body's tangent added, in turn, to an indefinite one.
     regularisation: tuple[float, ...] = (0.03, 0.3, 3.0, 30.0)
-    # Whether a path that ends at a limit point goes on with the state that the body snaps to: the minimum of
-    # the potential that damped motion from the limit point leads to.
+    # Continue a path beyond a limit point with the state that the body snaps to: the minimum of the potential
+    # reached by damped motion from the limit point.
     follow_snaps: bool = False
     # A state may lie this much of the predicted move away from its prediction.
     predictor_tolerance: float = 0.5

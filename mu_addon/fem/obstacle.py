@@ -108,7 +108,7 @@ class Obstacle:
         tangents = np.einsum("fni,qnk->kfqi", mesh.nodes[self.faces], derivative)
         bare = outer.bare[:, points.argmax(axis=1)]
         self._area = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1) * weight * bare
-        # What is all inside another part of the body is out of reach.
+        # Points inside another part of the body are out of reach.
         self._out_of_reach = np.where(bare > 0, 0.0, np.inf)
         self._pairs = np.stack(np.triu_indices(self.faces.shape[1]), axis=1)
         self.begin()
@@ -205,7 +205,7 @@ class Obstacle:
         elastic: Array = (
             e * friction.kept(e, self.friction * self.lag.pressure, self.stick_stiffness)[..., None]
         )
-        # What leaves loses what it had stored, and does not slide on.
+        # A point that leaves loses its elastic slip, and does not slide on.
         elastic[~touches], e[~touches] = 0.0, old.slip[~touches]
         slid = e - elastic
         # Friction has changed within the step: its mean is that of both ends.

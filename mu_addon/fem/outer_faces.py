@@ -12,7 +12,7 @@ from .self_intersection import with_middles
 
 Array = np.ndarray[Any, Any]
 
-# What is filled by less is cut away: a resolved mesh keeps this much of it, so that no motion is without
+# Parts filled by less are cut away: a resolved mesh keeps this much of them, so that no motion is without
 # stiffness.
 _CUT_AWAY = 0.02
 

@@ -48,7 +48,7 @@ def _ipctk() -> Any:
             "self-contact",
             "pip install ipctk, or simulate without self-contact",
         ) from None
-    # It takes every core otherwise, and its sums would depend on how many.
+    # By default it uses every core, and its sums would depend on their number.
     ipctk.set_num_threads(1)
     return ipctk
 
@@ -289,7 +289,7 @@ class SelfContact:
         other._potential, other._wider = (
             self._ipctk.BarrierPotential(reach, stiffness_MPa, True) for reach in (gap_mm, _ROOM * gap_mm)
         )
-        # Made when they are asked for.
+        # Computed on demand.
         for name in ("_surface", "_planes"):
             other.__dict__.pop(name, None)
         other._planes_near = self._planes
@@ -314,7 +314,7 @@ class SelfContact:
         if self._friction is not None:
             energy += self._friction.energy_mJ(found.places)
         for plane in self._planes:
-            # Half of what the whole body has there, as of everything else.
+            # Half of the whole body's, like everything else.
             energy += 0.5 * plane.area @ self._barrier(plane.distance(self._rest + u))[0]
         return float(energy)
 
@@ -591,7 +591,7 @@ def _parts(mesh: Mesh) -> Array:
 def _free_facets(mesh: Mesh) -> Array:
     """Triangles (t, 3) of a mesh's surface that can touch: not the base's, mirror planes', or buried ones."""
     faces, _ = free_boundary(mesh)
-    # Of parts that overlap, what is tied lies inside another.
+    # Tied nodes of overlapping parts lie inside another part.
     faces = faces[~np.isin(faces, mesh.tied).any(axis=1)]
     if not len(mesh.beams):
         return facets_of(faces)

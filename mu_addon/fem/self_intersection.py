@@ -105,7 +105,7 @@ class _Boundary:
             whole = mirror(whole, axis)
         faces, owner = boundary_faces(whole.tets)
         if whole.resolved:
-            # Struts reach into the wall as drawn; what of them is outside it is surface.
+            # Struts reach into the wall as drawn; their parts outside it are surface.
             outside = (whole.filled[owner] == 1.0).all(axis=1)
             faces, owner = faces[outside], owner[outside]
         cavity = {tuple(f) for f in np.sort(whole.cavity_corners, axis=1).tolist()}

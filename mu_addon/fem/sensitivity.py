@@ -63,7 +63,7 @@ def of_residual(
     F = np.eye(3) + slope_u
     J, cofactor = np.linalg.det(F), _cofactors(F)
     whole = dV.sum(axis=1)
-    # What a waveguide takes the place of has no volume, and no mean.
+    # Elements replaced by a waveguide have no volume, and no mean.
     share = np.divide(dV, whole[:, None], out=np.zeros_like(dV), where=whole[:, None] > 0.0)
     excess = J - ((share * J).sum(axis=1) if model._takes_means else np.ones(len(J)))[:, None]
     mean = J[:, 0] - excess[:, 0]

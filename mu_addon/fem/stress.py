@@ -48,7 +48,7 @@ def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] 
                     f"{layer.law.name}: its stress depends on how the state was reached",
                     remedy="give what the materials remember of it",
                 )
-            # A step of no time from a state that is remembered already leaves it and its stress as they are.
+            # A step of zero time from a committed state leaves it and its stress unchanged.
             rows = np.hstack([rows, own.reshape(len(rows), -1), np.zeros((len(rows), 1))])
         found = stress(layer.law, F[layer.elements].reshape(-1, 3, 3), rows).reshape(-1, points, 3, 3)
         P[layer.elements] += layer.weight[:, None, None, None] * found
@@ -141,7 +141,7 @@ class NodalMean:
         self._to_nodes = corners if mesh.order == 1 else np.vstack([corners, middles])
         volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
         if mesh.resolved:
-            # What is cut away follows its neighbours: it counts only where nothing else is.
+            # Cut parts follow their neighbours: they count only without others.
             volumes *= np.maximum(mesh.filled[elements].mean(axis=1), _CUT_AWAY)
         self.nodes, place = np.unique(tets, return_inverse=True)
         self._place = place.reshape(tets.shape)

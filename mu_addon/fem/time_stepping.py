@@ -22,7 +22,7 @@ Array = np.ndarray[Any, Any]
 LEAP = 4.0
 # Below this share of an interval a step is not halved again.
 SMALLEST = 1e-4
-# Nor below this share of the largest step where the settings follow snaps: what takes a smaller one is one.
+# Nor below this share of the largest step where the settings follow snaps: a smaller step is a snap.
 SNAPS_BELOW = 1 / 16
 
 
@@ -149,7 +149,7 @@ def _step(eq: Equilibrium, last: Instant, time: float, pressure: float) -> Insta
     except ConvergenceError:
         if last.rate is None:
             raise
-        # Pressure may have turned round: the rate so far says nothing of what comes.
+        # Pressure may have reversed: the rate so far predicts nothing.
         guess = _along_tangent(eq, u, pressure)
         state = eq.newton(eq.start(u, guess), pressure, _reach(eq, u, guess))
     eq.model.commit(state.u, m)
@@ -164,7 +164,7 @@ def _step_or_snap(eq: Equilibrium, last: Instant, time: float, pressure: float) 
     except ConvergenceError:
         state = eq.snapped(last.state, pressure)
     eq.model.commit(state.u, eq.parameters)
-    # The fall says nothing of how fast it goes on.
+    # The snap gives no rate for the next step.
     return Instant(time, state)
 
 

@@ -274,7 +274,7 @@ class Evaluation:
         cause = error.node if isinstance(error, NodeError) else ""
         self._set(name, State(FAILED, seconds, key=key, error=error, because=cause))
         if cause in self.states and cause != name:
-            # What is to be mended stands there.
+            # There is the fault to be repaired.
             found = self.states[cause]
             self._set(cause, attrs.evolve(found, state=FAILED, error=error, because=""))
 
@@ -328,7 +328,7 @@ class Evaluation:
             if self._is_made(s.node)
         ]
         files = [_content(s.path, settings[s.name]) for s in definition.settings if s.path]
-        # Outputs that tell the node's name, as the cause of an error, are those of that node alone.
+        # Outputs that contain the node's name, as the cause of an error, belong to that node alone.
         own = name if definition.named else ""
         return hashed(node.kind, node.muted, sorted(settings.items()), links, files, own)
 
@@ -347,7 +347,7 @@ def _content(path: str, value: str) -> Any:
                 (p.name, p.stat().st_size, p.stat().st_mtime_ns) for p in place.iterdir() if p.is_file()
             )
     except OSError:
-        # Whoever reads it says so.
+        # Its reader reports the error.
         return "unreadable"
     return ""
 

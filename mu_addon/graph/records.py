@@ -63,7 +63,7 @@ def _record(table: Any, folder: Path) -> Record | None:
         return None
     if run is None:
         return Record(remark, cost, numbers)
-    # A name alone: what leads out of the folder is no run of this tree.
+    # A name alone: a path out of the folder is no run of this tree.
     if not isinstance(run, str) or Path(run).name != run or not (folder / FOLDER / run).is_dir():
         return None
     return Record(remark, cost, numbers, folder / FOLDER / run)

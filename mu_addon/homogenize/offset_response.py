@@ -83,7 +83,7 @@ class OffsetResponse:
 
 def _through(x: Array, y: Array) -> Any:
     """The cubic spline through y (k,) at x (k,)."""
-    # Only now: what merely names an effect must not load it.
+    # Imported late: naming an effect must not load it.
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(x, y)

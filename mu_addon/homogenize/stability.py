@@ -71,7 +71,7 @@ class SymmetryBreakingModes:
         self.held = held
         self.model = Model(self.mesh, threads=threads, mean_dilatation=mean_dilatation)
         self.parameters = self.model.parameters(specimen.materials)
-        # What was lost last is asked first.
+        # The one lost last is tested first.
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:

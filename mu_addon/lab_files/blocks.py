@@ -38,7 +38,7 @@ _JUDGED = 30
 # What begins a line that is a comment, titles included.
 _COMMENT = re.compile(r"^(#+|%+|//+|;+)\s*")
 _LONGEST_UNIT = 10
-# Letters of a line that are shown where it is listed.
+# Letters of a line shown in a list.
 _LONGEST_SHOWN = 50
 
 

@@ -214,7 +214,7 @@ class _Proposing:
             read = f" [{one.unit}]" if one.unit else ""
             source = f"{one.title or f'column {one.place}'!r}{read}"
             target = named("displacement" if one.quantity == "position" else one.quantity)
-            # A clock beside a time in numbers says no more; a machine's position no more than an extension.
+            # A clock beside a numeric time adds nothing; nor does a machine's position beside an extension.
             first = self.places.get(target)
             if one.quantity == "position":
                 position = position or (k, values, source)

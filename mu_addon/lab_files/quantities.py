@@ -160,9 +160,9 @@ _WORDS = tuple(
         ),
     )
 )
-# What a quantity is read in; a machine's position is a displacement, a count is nothing that is read.
+# Units that quantities are read in; a machine's position is a displacement, a count is not read.
 READ_IN = {**UNITS, "position": "mm", "count": ""}
-# Never concluded from a unit: there is a more usual quantity of it.
+# Never concluded from a unit, which suggests a more usual quantity.
 _ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
 _UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
 _BRACKETED = re.compile(_UNIT)

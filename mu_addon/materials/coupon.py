@@ -21,7 +21,7 @@ Array = np.ndarray[Any, Any]
 
 MODES = ("uniaxial", "equibiaxial", "pure_shear")
 _FREE = {"uniaxial": (1, 2), "equibiaxial": (2,), "pure_shear": (2,)}
-# Lateral stress that passes for none, as a share of the shear and bulk modulus together.
+# Lateral stress taken as zero, as a share of the shear and bulk modulus together.
 TOLERANCE = 1e-12
 _DIAGONAL = np.array([0, 4, 8])
 

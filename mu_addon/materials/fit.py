@@ -15,7 +15,7 @@ from .intervals import Parameter, intervals
 from .regression import Problem, best_exponents
 from .stability import Stability, check_stability, whole_ranges
 
-# Coupons do not see the bulk modulus; this ratio is what a nearly incompressible law is given.
+# Coupons do not determine the bulk modulus; this ratio is used for a nearly incompressible law.
 POISSON = 0.499
 # A law fails a mode whose stresses it misses by more than this share, norm over norm.
 TOLERANCE = 0.10

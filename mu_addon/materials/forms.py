@@ -45,7 +45,7 @@ class Form:
         row = np.zeros(len(self.law.parameter_names))
         if self.exponents:
             order = np.argsort(-np.asarray(factors), kind="stable")
-            # A term that is not there needs some exponent, which has no effect.
+            # An absent term needs some exponent, which has no effect.
             row[1:6:2] = 1.0
             row[1 : 2 * self.exponents : 2] = exponents[order]
             row[0 : 2 * self.exponents : 2] = 2 * factors[order] / exponents[order]

@@ -21,7 +21,7 @@ from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
 
 FILE = "experiments.toml"
-# Strain and displacement over length may differ by this share of the largest strain before it is told.
+# Share of the largest strain by which strain and displacement over length may differ without a remark.
 ATMOSPHERE_kPa = 101.325
 PRESSURES = ("gauge", "absolute")
 # A unit under little vacuum, and at most at twice the atmosphere's pressure: soft walls bear no more.
@@ -29,7 +29,7 @@ LIKE_ABSOLUTE_kPa = (90.0, 200.0)
 DISAGREE = 0.02
 # Spread of a weighed mass whose mass_sd_g is not given, as a share of it.
 MASS_SPREAD = 0.01
-# Stress without strain, as a share of the largest stress, that is told.
+# Stress without strain, as a share of the largest stress, that is remarked.
 PRELOAD = 0.05
 
 

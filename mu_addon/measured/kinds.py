@@ -54,7 +54,7 @@ STEADY = {
     "lattice_compression": ("force_N", "stress_kPa"),
     "pressure_hold": ("pressure_kPa",),
 }
-# What a camera or a voltmeter can miss for a moment; a gap in anything else leaves rows without meaning.
+# Columns with possible gaps, by a camera or a voltmeter; a gap in any other makes its row meaningless.
 MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker", "volume_mm3")
 
 _MARKER = re.compile(r"marker([1-9]\d*)_([xyz])_mm")

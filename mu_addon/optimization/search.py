@@ -245,7 +245,7 @@ class _Search:
         misfits = [t.misfit(v) for t, v in zip(self.targets, best.values, strict=True)]
         return all(abs(m) <= 0.1 for m in misfits) and all(self._met(best))
 
-    # How good values are.
+    # Quality of values.
 
     def _met(self, o: Observed) -> list[bool]:
         """True for each target that is met, within its margin."""

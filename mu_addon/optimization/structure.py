@@ -81,7 +81,7 @@ class Structure:
         """Model of a condition: the body's own, or one with the wall that holds its tip."""
         if condition.wall_mm is None:
             return self.model
-        # Made first, so that both have the same one.
+        # Made first, so that both share it.
         _ = self.model.factor
         found = copy.copy(self.model)
         found.obstacles = (*self.model.obstacles, HeldTip(self.model.mesh, condition.wall_mm))

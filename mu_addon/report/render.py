@@ -380,7 +380,7 @@ class _Sky:
         center = 0.5 * (used.min(axis=0) + used.max(axis=0))
         scale = 0.48 * SKY_MAP_PIXELS / float(np.linalg.norm(used - center, axis=1).max())
         towards = _directions(SKY_DIRECTIONS) @ camera.axes
-        # What lies behind the picture lights nothing that the viewer sees.
+        # Parts behind the picture light nothing visible.
         towards = towards[towards @ camera.axes[2] > -0.7]
         aside = np.where(np.abs(towards[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
         right = np.cross(aside, towards)

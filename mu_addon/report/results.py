@@ -63,8 +63,8 @@ class RuleResult:
     stiffened_mm3: Floats  # volume that got E_sens
     cylinder_mm3: Floats  # volume of the sensor itself
     chosen: str  # name of the best path
-    tied: Sequence[str] = ()  # paths that the mesh cannot tell from the chosen one
-    uncertainty_mm: float | None = None  # how far the mesh may move a J_hat
+    tied: Sequence[str] = ()  # paths tied with the chosen one within the mesh uncertainty
+    uncertainty_mm: float | None = None  # mesh uncertainty of J_hat
 
 
 @attrs.frozen(eq=False)
@@ -287,4 +287,4 @@ class ReportData:
     gates: Sequence[Gate] = ()
     seconds: Mapping[str, float] = attrs.field(factory=dict)
     versions: Mapping[str, str] = attrs.field(factory=dict)
-    files: Mapping[str, str] = attrs.field(factory=dict)  # name in the run's folder -> what it holds
+    files: Mapping[str, str] = attrs.field(factory=dict)  # name in the run's folder -> its content

@@ -29,7 +29,7 @@ Depth = Callable[[Array], Array]
 
 # An element is divided this often along each edge to tell which part of it lies outside the actuator.
 _STEPS = 6
-# What is filled by less is left out.
+# Elements filled by less are left out.
 _LEAST = 1e-3
 # Least share of a quadrature point of an element of which anything is filled.
 _FLOOR = 0.01
@@ -171,5 +171,5 @@ def support(mesh: Mesh) -> Array:
         np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))
         for v in (volumes, volumes * mesh.filled)
     )
-    # Nodes without elements are held by none.
+    # Nodes without elements are free.
     return np.divide(solid, whole, out=np.ones(len(whole)), where=whole > 0)

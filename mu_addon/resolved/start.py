@@ -10,7 +10,7 @@ from ..fem.elements import reference_gradients
 from ..fem.equilibrium import Equilibrium
 from ..meshing.mesh import Array, Mesh
 
-# How much the surroundings' rotation counts beside the legs of a path.
+# Weight of the surroundings' rotation beside the legs of a path.
 _TWIST = 0.05
 _MIRROR = np.array([-1.0, 1.0, 1.0])
 # A displacement in mm whose forces are linear in it, and how many times as stiff what is held is made.

@@ -35,7 +35,7 @@ def _digest(parts: Iterable[Any]) -> hashlib._Hash:
     return digest
 
 
-# The array of an entry that tells whether it is the one that was put there.
+# Array of an entry that identifies it as the one stored.
 SEAL = "seal"
 
 

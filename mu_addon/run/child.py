@@ -107,7 +107,7 @@ class Child:
         if self.state != RUNNING:
             return False
         self.seconds = time.monotonic() - self.started
-        # Asked first: what an ended child has said is then all there.
+        # Asked first: all messages of an ended child are then there.
         status = self._process.poll()
         new = self._read()
         if self._asked is not None and status is None and time.monotonic() - self._asked > PATIENCE_S:
@@ -128,7 +128,7 @@ class Child:
     def send(self, words: str) -> None:
         """Write a line to its standard input, held open by `ends_with_parent`; no effect after its end."""
         if self.state == RUNNING and self._process.stdin is not None:
-            # It ended this moment: the next poll says so.
+            # It has just ended: the next poll reports it.
             with suppress(OSError):
                 self._process.stdin.write(f"{words}\n".encode())
                 self._process.stdin.flush()

@@ -29,11 +29,11 @@ DONE, UNEXPECTED = 0, 70
 SUMMARY = "summary.json"
 STOPPED = "<!-- of a run that stopped early -->"
 """Last line of a report written on a stop, which the run's next start therefore removes."""
-# What libraries say that were refused memory, in other errors than MemoryError: Warp, the loader, C++.
+# Messages of libraries without memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
-# What a disk refuses to whoever writes.
+# Errors of a disk on writing.
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
-# Bytes that the summary of a run that goes on takes up: room for its last one where the disk is full by then.
+# Bytes reserved for the summary of a running run: room for its last one on a full disk.
 RESERVED = 1 << 14
 KEEP_EVERY_S = 2.0
 
@@ -96,7 +96,7 @@ class RunContext:
                 "do not start another run with the same folder",
             )
         elif _says_running(folder / SUMMARY):
-            # Nobody has the lock, so that run is gone, and could not say so itself.
+            # Nobody holds the lock, so that run is gone, and could not report it.
             self.progress.warning(
                 "the last run in this folder was interrupted: it was killed, or the computer stopped",
                 str(folder),
@@ -174,7 +174,7 @@ def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
     found = _read_summary(folder / SUMMARY)
     if found.get("status") != "running":
         return
-    # What cannot be written, or is another's, is left: the error is told all the same.
+    # Files that cannot be written, or belong to another run, are left: the error is reported all the same.
     with suppress(MuError):
         lock = FolderLock(folder)
         try:
@@ -268,7 +268,7 @@ def _failure(context: RunContext, error: Exception) -> MuError:
     if isinstance(error, MemoryError) or any(words in str(error) for words in _REFUSED):
         return _out_of_memory(context)
     if isinstance(error, OSError) and error.errno in _DISK:
-        # Of a library that writes by its own means.
+        # From a library that prints by itself.
         return output_error(error, Path(error.filename or context.folder or "a file"))
     _log_traceback(context, error)
     return _unexpected(context, error)
@@ -294,12 +294,12 @@ def _stop(context: RunContext, error: MuError) -> None:
     context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
     partial = _ended_early(error) | {"reason": reason}
-    # The reason for stopping may be that nothing can be written any more.
+    # The reason for stopping may be that writing is impossible.
     with suppress(MuError):
         _write_summary(context, partial)
     context.hurried = isinstance(error, (_Interrupted, _Terminated))
     if context.hurried:
-        # For what follows who watches may not wait.
+        # The watcher may not wait for the rest.
         if context.folder is not None and context.short_report is not None and context.wants_report:
             with suppress(Exception):
                 context.short_report(context.folder, error.what)
@@ -332,7 +332,7 @@ def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
     context.summary = {**state, **context.summary, **state, **seconds}
     if context.folder is None:
         return
-    # Without room for all that was found, a run that stops says at least why.
+    # Without room for all results, a stopped run at least states the reason.
     stopped = [state] if "reason" in state else []
     _replace_summary(context.folder / SUMMARY, [context.summary, *stopped])
 
@@ -384,7 +384,7 @@ def _signals_raise() -> Iterator[list[int]]:
         yield asked
     finally:
         for number, handler in before.items():
-            # None: a handler that Python did not set and cannot put back.
+            # None: a handler that was not set from Python and cannot be restored.
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 
 

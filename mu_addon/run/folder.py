@@ -24,7 +24,7 @@ ALWAYS = ("summary.json", "log.ndjson")
 OWN = ("cache", "stale", LOCK)
 
 
-# A table of a file of inputs for what decides no result: where other files lie, how many processes work.
+# A table of a file of inputs for keys that decide no result: paths of other files, number of processes.
 RUN = "run"
 
 

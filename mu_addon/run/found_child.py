@@ -48,7 +48,7 @@ class FoundChild(Child):
         if self.state != RUNNING:
             return False
         self.seconds = time.monotonic() - self.started
-        # Asked first: what an ended run has said is then all there.
+        # Asked first: all messages of an ended run are then there.
         number = holder(self.run)
         new = self._read()
         finished = self.result is not None or self.error is not None

@@ -35,7 +35,7 @@ class FolderLock:
     def __init__(self, folder: Path) -> None:
         """Lock `folder`; raises InUseError that names the process holding it, and OutputError."""
         self.path = make_folder(folder) / LOCK
-        # A link would be followed to a file of somebody else's.
+        # A link would lead to another user's file.
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
         try:
             self._handle = os.open(self.path, flags, 0o644)
@@ -72,7 +72,7 @@ class FolderLock:
     def _sign(self) -> None:
         mine = {
             "process": os.getpid(),
-            # Who watches it hears a request to stop also while a library keeps this process busy.
+            # Its watcher receives a request to stop even while a library keeps this process busy.
             "watcher": watcher(),
             "machine": socket.gethostname(),
             "since": time.strftime("%Y-%m-%d %H:%M:%S"),

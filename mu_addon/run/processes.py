@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from ..errors import MuError
 
-# With less memory, of their own or of addresses, libraries end a process by a signal or wait for ever.
+# With less memory or address space, libraries end a process by a signal or wait for ever.
 _LEAST_MB = {"RLIMIT_DATA": 500, "RLIMIT_AS": 2000}
 # Simulating a unit takes half a gigabyte a process; more processes than this wait for memory, not for cores.
 MOST_WORKERS = 16
@@ -29,7 +29,7 @@ def end_with_parent() -> None:
 
 
 def _wait_for_parent() -> None:
-    # Only here: the command line begins with this module, and loads little.
+    # Imported late: the command line begins with this module, and loads little.
     import multiprocessing
 
     parent = multiprocessing.parent_process()

@@ -298,7 +298,7 @@ class _PlainLines(_Lines):
 def _left(message: Message, before: str) -> str:
     """Time left in words, of the whole run if that was planned, and why it grew; or ""."""
     left = message.get("whole_seconds_left", message["seconds_left"])
-    # Less is nothing that one could wait for, and would stand there for longer.
+    # Shorter stages need no display, and would leave it standing.
     if left is None or left < 1.0:
         return ""
     why = f" ({message['why']})" if message.get("why") else ""

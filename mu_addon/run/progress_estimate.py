@@ -84,7 +84,7 @@ class ProgressEstimate:
         if stage not in self._expected:
             added = stage
             self._add(stage)
-        # What was passed over was in the cache, or not asked for.
+        # Skipped stages were in the cache, or not asked for.
         self._stage = stage
         seconds, left = message.get("seconds"), message.get("seconds_left")
         self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0
@@ -93,7 +93,7 @@ class ProgressEstimate:
         if self._planned and self._share < SURE:
             # At the pace of what is done, as the stages to come, else it would jump where one begins.
             expected = self._expected[stage] * self._pace()
-            # Of the last one beyond its time nothing is known, and a time that grows and grows is none.
+            # The end of an overdue last stage is unknown, and an ever growing time is useless.
             last = stage == [*self._expected][-1]
             by_plan = max(expected - self._spent, 0.0 if last else OVERDUE * self._spent)
             if not self._share:
@@ -135,7 +135,7 @@ class ProgressEstimate:
         before = sum(self._expected[name] for name in names[:here])
         whole = sum(self._expected.values())
         done = before + self._share * self._expected[self._stage]
-        # One that has not ended is not done, however short the rest is expected to be.
+        # An unfinished stage is not complete, however short the rest is expected to be.
         self.fraction = max(self.fraction, min(done / whole if whole else 0.0, 0.999))
         own = self._own_left
         if own is None:

@@ -67,7 +67,7 @@ def supervised(
     ends = *os.pipe(), *os.pipe(), *os.pipe()
     alive, keep_alive, group_alive, keep_group, status_read, status_write = ends
     passed_on = {getattr(signal, name) for name in _PASSED_ON}
-    # Until each of the two has its own handlers, none of them may come.
+    # Until both have their own handlers, neither may receive a signal.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
     try:
         worker = os.fork()
@@ -128,7 +128,7 @@ def _outcome(report: bytes, ended: int, usage: Any, asked: int, tell: Callable[[
     if report.startswith(b"status "):
         return int(report.split()[1])
     if ended == INTERRUPTED:
-        # By Ctrl-C before its run began, which it has said.
+        # By Ctrl-C before its run began, which it has reported.
         return ended
     # Kilobytes, but on macOS, where they are bytes.
     memory = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
@@ -227,7 +227,7 @@ def _pass_on_signals(worker: int, asked: list[int]) -> dict[int, Any]:
             os.killpg(worker, signal.SIGCONT)
 
     handlers = {signal.SIGINT: stop, signal.SIGTERM: stop, signal.SIGALRM: end}
-    # Where nobody could bid it go on, nobody pauses it.
+    # Without anyone to resume it, it must not pause.
     if signal.getsignal(signal.SIGTSTP) is not signal.SIG_IGN:
         handlers[signal.SIGTSTP] = pause
     return {number: signal.signal(number, handler) for number, handler in handlers.items()}

@@ -33,7 +33,7 @@ VERSION = 1
 _DEGREE = 3
 _INTERVALS = (1, 2, 3, 4, 6, 8, 12)
 _TABLE = 2001
-# Beyond this the light has faded to nothing within a day.
+# At a larger drift the light would be gone within a day.
 _MOST_DRIFT_PER_H = 1.0
 _FEWEST = 8
 # Singular values of the spline's basis: 0.2 of the largest or more where angles are swept, however many

@@ -12,7 +12,7 @@ ENOUGH = 3
 """Number of pieces or names from which a format, a header or a channel is trusted."""
 SURE = 8
 """Number of first lines from which anything that most of them lack is rare or damaged."""
-# The format is told by the latest lines: what a device says while it starts is soon past.
+# The latest lines determine the format: a device's output at its start is soon past.
 _LATEST_LINES = 20
 
 TEXT_READERS: dict[str, Callable[[str], Pairs | list[float] | None]] = {

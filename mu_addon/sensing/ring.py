@@ -84,7 +84,7 @@ class Ring:
         kept = rows[-capacity:]
         places = np.arange(count + len(rows) - len(kept), count + len(rows)) % capacity
         self.rows[places] = kept
-        # Counted after they are there, so that who looks sees whole rows.
+        # Counted after they are written, so that readers see complete rows.
         struct.pack_into("<Q", self._map, _COUNT_AT, count + len(rows))
 
     def since(self, row: int) -> tuple[Array, int]:

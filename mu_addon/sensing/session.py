@@ -114,7 +114,7 @@ def run_session(
         return status
     finally:
         control.stop.set()
-        # What cannot be written now was told when it first could not.
+        # A failure to write now was reported when it first occurred.
         with suppress(OutputError):
             recorder.close()
         view.close()
@@ -163,7 +163,7 @@ def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, c
         source.close()
     except EndOfStream:
         pieces.put(_Piece(clock.now(), event="ended"))
-    # Whatever else stops the reading ends the session with its own words.
+    # Any other error of the reading ends the session with its message.
     except Exception as error:  # noqa: BLE001 - handed to the thread that can raise it
         pieces.put(_Failure(clock.now(), error=error))
 

@@ -114,7 +114,7 @@ class SerialLine:
         except (OSError, ValueError) as error:
             raise ConnectionLost(str(error)) from None
         if port is not None and port.identity is not None:
-            # From now on it is this device that is meant, not the place where it was plugged in.
+            # From now on this device is meant, not its socket.
             self.name = port.identity
         return device if port is None else f"{device} ({port.description})"
 

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..run.context import RunContext
 from ..run.usecase import UseCase
 
-# By the first file of inputs: whose modules hold `USE_CASE`, imported where one is wanted.
+# Modules with `USE_CASE` by the first file of inputs, imported on demand.
 MODULES = {
     "study.toml": ".simulate_and_place.run",
     "check.toml": ".check_print.run",
@@ -42,7 +42,7 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
     if cases:
-        # One whose first line is another's is read all the same: its reader says best what is wrong with it.
+        # A file whose first line is another's is read all the same: its reader reports the fault best.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
     raise InputError(
         "this folder contains no study and no other run",

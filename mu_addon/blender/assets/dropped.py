@@ -72,7 +72,7 @@ def _take_resin(root: Any, resin: Any) -> None:
 def _restore_slots(root: Any) -> None:
     """Remove resins from a unit's slots, which hold the colours of its parts."""
     usual = drawing.SLOTS if root.data == root.mu_unit.preview else ()
-    # Struts have their colour from nodes: over them Blender makes a slot more.
+    # Struts get their colour from nodes: after them Blender appends a slot.
     while usual and len(root.data.materials) > len(usual) and root.data.materials[-1].get(RESIN):
         root.data.materials.pop()
     for number, slot in enumerate(root.material_slots):

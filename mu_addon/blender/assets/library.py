@@ -50,7 +50,7 @@ def write() -> Path:
         write_units(folder / UNITS_FILE)
         write_resins_and_printers(folder / MADE_FILE)
     finally:
-        # What this file does not use is not left in it.
+        # Unused data are not left in this file.
         for tree in set(bpy.data.node_groups) - before:
             bpy.data.node_groups.remove(tree)
         for material in set(bpy.data.materials) - materials:
@@ -109,7 +109,7 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
             try:
                 unit = presets.load(name)
             except MuError:
-                continue  # a file of the user's that is no preset any more; loading it says why
+                continue  # a user's file that is no valid preset; loading it reports why
             root = unit_object.create(context, unit)
             roots.append(root)
             root.name = root.data.name = title
@@ -119,7 +119,7 @@ def _write_units(target: Path, titles: dict[str, str]) -> None:
                 f"Monolithic Unit, {unit.chambers.count} chambers, scale {unit.scale:g}"
             )
             _picture(root, section_pixels(unit, _PIXELS))
-        # The groups that units use lie in the file as well, and are assets of the other one.
+        # The node groups of the units are saved too, and are assets of the other file.
         with nodes.no_assets():
             _write(target, set(roots))
     finally:

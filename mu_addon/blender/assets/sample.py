@@ -51,7 +51,7 @@ def _overview(context: Any) -> list[Any]:
     context.view_layer.objects.active = bodied
     context.view_layer.update()
     bpy.ops.mu.body()
-    # Beside the units, which land beside what stands at the cursor.
+    # Beside the units, which are placed beside objects at the cursor.
     curve = _curve(context, whole.location + _beside(context, 3))
     context.view_layer.objects.active = whole
     viewports.frame([*roots, curve])

@@ -33,7 +33,7 @@ def surface_pixels(points: Array, triangles: Array, colours: Array, size: int) -
     first, second, third = (points[triangles[:, k]] for k in range(3))
     normals = np.cross(second - first, third - first)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
-    # The side that is seen, whatever way round a triangle's corners run.
+    # The visible side, whatever the order of a triangle's corners.
     normals *= np.where(normals @ _TOWARDS < 0.0, -1.0, 1.0)[:, None]
     light = _AMBIENT + (1.0 - _AMBIENT) * np.clip(normals @ _LIGHT / np.linalg.norm(_LIGHT), 0.0, 1.0)
     shaded = np.clip(colours * light[:, None], 0.0, 1.0) ** (1.0 / 2.2)

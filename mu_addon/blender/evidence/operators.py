@@ -87,7 +87,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
 
     @reports_errors
     def execute(self, context):
-        # Only now: it brings in the simulator's packages, which a Blender may lack.
+        # Imported late: it needs the simulator's packages, which a Blender may lack.
         from ...usecases.simulate_and_place.extended_unit import read_extended
 
         root, found, _ = _current(context)
@@ -102,7 +102,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
         evidence.mark_applied(root, "; ".join(own), "; ".join(beside))
         with updates.paused():
             from_unit(root.mu_unit, extended.unit)
-        # The diagnosis knew nothing of effects that the simulation had before: its own take their place.
+        # The diagnosis ignored the simulation's earlier effects: its own replace them.
         effects.keep(root, extended.kept.text() if extended.effects else "")
         unit_object.rebuild(root)
         self.report({"INFO"}, f"Applied: {'; '.join(extended.applied)}")

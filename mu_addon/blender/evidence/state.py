@@ -48,7 +48,7 @@ class MU_PG_evidence(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=BESIDE_BLEND_FILE,
     )
-    # Model that the unit was given last, the unit before it, and what it and its simulation got in words.
+    # Last model given to the unit, the unit before it, and the changes in words.
     applied: StringProperty(options={"HIDDEN"})
 
 
@@ -100,7 +100,7 @@ def measured_data(root: Any) -> MeasuredFolder | None:
     if not root.mu_evidence.folder:
         return None
     folder = Path(bpy.path.abspath(root.mu_evidence.folder))
-    # Without its first file there is nothing to keep: the error says what is missing.
+    # Without its first file nothing is cached: the error names what is missing.
     files = [folder / FILE, *sorted(folder.glob("*.csv"))]
     return _data.read(files, lambda: _read_data(folder)) or _read_data(folder)
 
@@ -144,7 +144,7 @@ def _read_run(
 
 def write_inputs(root: Any, folder: Path) -> None:
     """Write the inputs of the unit's diagnosis into its folder; raises InputError and OutputError."""
-    # Only now: it brings in the solver's packages, which a Blender may lack.
+    # Imported late: it needs the solver's packages, which a Blender may lack.
     from ...usecases.diagnose.job import LAYOUT, Job
 
     measured = read_folder(Path(bpy.path.abspath(root.mu_evidence.folder)))
@@ -169,7 +169,7 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
         now = shape_hash(to_unit(root.mu_unit))
     except MuError:
         now = ""
-    # Without a unit's own file the verdict does not rest on the unit.
+    # Without a unit's own file the verdict does not depend on the unit.
     return "it belongs to other parameters" if unit and now != unit else ""
 
 
@@ -190,7 +190,7 @@ def applied(root: Any) -> str:
         now = ""
     if not model or model != _model(root) or now == before:
         return ""
-    # What the simulation was given may have been taken from it again.
+    # Effects of the simulation may have been removed since.
     return "; ".join(words for words in (to_unit_, effects.inputs(root) and to_simulation) if words)
 
 

@@ -111,7 +111,7 @@ def _draw(root: Any, gripper: Gripper) -> None:
     cube = put_box(root, "cube", -half, half, "MU Obstacle")
     if first:
         cube.location.z = gripper.unit.dimensions.height + BEYOND_MM
-        # Fingers and cube are solved as mirror images: it may be moved between them, along them alone.
+        # Fingers and cube are solved as mirror images: the cube moves between them, along them only.
         cube.lock_location[2] = False
 
 
@@ -120,7 +120,7 @@ def beyond_mm(root: Any) -> float:
     cube = part(root, "cube")
     if cube is None:
         return BEYOND_MM
-    # Digits beyond a nanometre are single precision's.
+    # Digits beyond a nanometre come from single precision.
     return round(exact(cube.location.z) - to_gripper(root.mu_gripper).unit.dimensions.height, 6)
 
 

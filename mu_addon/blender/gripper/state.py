@@ -36,7 +36,7 @@ GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", h
 
 def job_of(root: Any) -> Job:
     """Grasp job from a gripper's properties; raises InputError."""
-    # Only now: they bring in the solver's packages, which a Blender may lack.
+    # Imported late: they need the solver's packages, which a Blender may lack.
     from ...meshing.settings import HOMOGENISED, RESOLVED
     from ...usecases.grip.grasp import Cube, Grip
     from ...usecases.grip.job import Job, detailed

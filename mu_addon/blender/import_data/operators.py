@@ -65,7 +65,7 @@ class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
         try:
             return _import(self, root)
         except MuError:
-            # The answers that were refused can be corrected.
+            # Rejected answers can be corrected.
             for one in root.mu_import.answers:
                 one.answered = False
             raise
@@ -110,7 +110,7 @@ def _folder(root):
 
 def _import(operator, root):
     """Import the experiments without open questions; the panel shows the questions left."""
-    # Only now: charts bring in matplotlib.
+    # Imported late: charts need matplotlib.
     from ...usecases.import_data.run import write, write_page
     from ...usecases.import_data.understood import understand
 

@@ -47,7 +47,7 @@ def _provide_gmsh():
 
 _provide_package()
 _provide_gmsh()
-# A study of a parameter study is a process of its own, which is to begin here, too.
+# Each study of a parameter study is a separate process that also starts here.
 os.environ["MU_ENTRY"] = str(Path(__file__).resolve())
 
 
@@ -113,6 +113,6 @@ def run(arguments):
 
 
 if __name__ == "__main__":
-    # Blender hands over its own arguments, too.
+    # Blender passes on its own arguments, too.
     own = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     sys.exit(main(own))

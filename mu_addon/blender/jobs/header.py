@@ -118,7 +118,7 @@ def _jobs(layout) -> None:
 
 def _running(layout, keys: list[str]) -> None:
     row = layout.row(align=True)
-    # First in a row of fixed width: it stays under the mouse whatever the bar says.
+    # First in a row of fixed width, so that it stays under the mouse.
     row.operator("mu.job_cancel", text="", icon="CANCEL").key = keys[0]
     more = row.row(align=True)
     more.ui_units_x = 3

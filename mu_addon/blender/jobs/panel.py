@@ -71,7 +71,7 @@ def _running(layout, child, prefix: str) -> None:
     layout.progress(factor=fraction, text=text)
     details = [str(child.progress.get("detail", "")), child.estimate.why and f"Longer: {child.estimate.why}"]
     latest = textwrap.wrap(next((text for text in reversed(details) if text), ""), CHARACTERS)
-    # Always two lines, so that what is below them stays where it is.
+    # Always two lines, so that nothing below them moves.
     wrapped(layout, "\n".join([*latest, "", ""][:2]))
     for warning in child.warnings[-2:]:
         wrapped(layout, in_panel(warning), "ERROR")

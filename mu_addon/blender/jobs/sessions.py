@@ -77,7 +77,7 @@ def _of_session(folder: Path) -> Iterator[Record]:
     try:
         lock = FolderLock(folder)
     except InputError:
-        # That Blender is still there.
+        # Blender is still running.
         return
     except MuError:
         return

@@ -185,7 +185,7 @@ def forget(key: str) -> None:
 
 def watch(key: str, child: Child, title: str = "") -> Child:
     """Let the timer read a child's messages, as the job of that key; title: in the header."""
-    # Anew at the end: jobs are listed in the order in which they were started.
+    # Appended again: jobs are listed in the order in which they were started.
     forget(key)
     _children[key] = child
     if title:
@@ -220,7 +220,7 @@ def _poll() -> float | None:
     before = running()
     news = poll()
     if news or before:
-        # The bar each time: the time left counts down between messages.
+        # Redraw the bar each time: the time left counts down between messages.
         viewports.redraw_status()
         if news:
             viewports.redraw()
@@ -250,7 +250,7 @@ def _take_up() -> None:
         try:
             child = FoundChild(record.run, record.run / OWN_FOLDER, record.plan, record.started_s)
         except MuError:
-            # Its folder is gone, and with it what could be said.
+            # Its folder is gone, and its messages with it.
             continue
         if record.heavy:
             _heavy.add(record.key)

@@ -240,7 +240,7 @@ def _property(s: Setting):
             name=label(d), description=sentence(d.text), items=items, default=d.default, update=_changed
         )
     if d.type is float:
-        # Lengths stay millimetres, whatever unit a scene has: the tree is of no scene.
+        # Lengths stay in millimetres, whatever unit a scene has: the tree belongs to no scene.
         unit = f" ({d.unit})" if d.unit and f"({d.unit})" not in label(d) else ""
         return FloatProperty(
             name=label(d) + unit,

@@ -59,7 +59,7 @@ class _Flat:
             if inner is None or node.mute:
                 return ()
             ends = [n for n in inner.tree.nodes if n.bl_idname == "NodeGroupOutput"]
-            # Blender tells which is active in trees of its own kinds only.
+            # Blender marks the active one only in trees of its own kinds.
             ends.sort(key=lambda n: not n.is_active_output)
             return inner.sources(ends[0], socket.identifier) if ends else ()
         return (Source(self.prefix + node.name, socket.identifier),)
@@ -209,7 +209,7 @@ def _link(tree: Any, before: Any, output: str, after: Any, key: str) -> None:
 
 def _set(new: Any, node: Node) -> None:
     """Set a node's fields; a value of another type or choice is refused as by the core."""
-    # As they are: one that a rule ties to another one may differ in a file, and is then told.
+    # Unchanged: a tied parameter may differ in a file, which is then reported.
     with updates.paused():
         for s in new.definition.settings:
             if s.name in node.settings:

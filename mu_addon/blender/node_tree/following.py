@@ -59,7 +59,7 @@ def give_back(root: Any) -> bool:
     changed = {path: value for path, value in _values(root.mu_unit).items() if value != before[path]}
     if not changed:
         return False
-    # A pair that a rule ties comes as one: the second is then the node's already.
+    # Tied parameters change together: the second is then already set.
     with updates.paused():
         refused = [path for path, value in changed.items() if not _write(node, path, value)]
     before |= {path: value for path, value in changed.items() if path not in refused}

@@ -52,7 +52,7 @@ def make_group(tree, nodes):
         if a and b:
             inner.append(ends)
         elif b:
-            # What enters from one socket is one input of the group, however many nodes take it.
+            # Links from one socket become one input of the group, however many nodes use it.
             if ends[0] not in entering:
                 entering[ends[0]] = _item(group, link.to_socket, link.from_socket, "INPUT")
             outer_in.append((ends, entering[ends[0]]))

@@ -22,7 +22,7 @@ from . import conversion, following, state
 from .classes import TREE
 from .groups import TreeOperator, active_tree
 
-# What templates are for; others are shown by their names.
+# Purpose of each template; others are shown by their names.
 _TEXTS = {
     "unit": "A unit by the steps of its design, with a waveguide",
     "three-walls": "Three walls of one unit, simulated and compared",

@@ -11,7 +11,7 @@ import bpy
 from ...graph.definition import NUMBER
 from ...usecases.graph.definitions import definitions
 
-# A type that is not listed gets a colour of its own by its name.
+# A type that is not listed gets a colour by its name.
 _COLOURS = {
     "number": (0.63, 0.63, 0.63),
     "profile": (0.85, 0.75, 0.35),

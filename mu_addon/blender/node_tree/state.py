@@ -123,7 +123,7 @@ def _follow(tree: Any, evaluation: Evaluation) -> None:
     for node in tree.nodes:
         root = getattr(node, "follower", None)
         design = evaluation.outputs.get(node.name, {}).get("unit")
-        # What the sidebar changed meanwhile is the tree's first, which is then refreshed again.
+        # Changes in the sidebar are written to the tree first, which is then refreshed again.
         if root is None or not root.mu_unit.uuid or following.give_back(root) or design is None:
             continue
         try:
@@ -269,7 +269,7 @@ def _driven(scene: Any, *_: Any) -> None:
         data = tree.animation_data
         if data is None or not (data.drivers or data.action):
             continue
-        # A refresh may itself have Blender evaluate the scene again: not without end.
+        # A refresh may itself make Blender evaluate the scene: do not loop.
         if now - _refreshed.get(tree.session_uid, 0.0) > 2 * WAIT_S:
             _refreshed[tree.session_uid] = now
             schedule(tree)

@@ -101,7 +101,7 @@ def rigid_bodies(root: Any, unit: Unit) -> tuple[RigidBody, ...]:
     for number, obj in enumerate(of_unit(root), 1):
         body = placed(root, obj).body
         require_sound(body, examined(root, obj, unit), "an obstacle")
-        # What reports call it.
+        # Its name in reports.
         name = re.sub(r"[^A-Za-z0-9._-]+", "-", obj.name)
         name = f"{name}-{number}" if f"{name}.obj" in found else name
         found[f"{name}.obj"] = RigidBody(

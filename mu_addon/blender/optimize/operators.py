@@ -40,7 +40,7 @@ class MU_OT_optimize_list(UnitOperator, bpy.types.Operator):
             return {"FINISHED"}
         taken = {freedom.parameter for freedom in props.freedoms}
         free = next((name for name in FIRST if name not in taken), FIRST[0])
-        # Set, not left at its default: so its range is that of the unit.
+        # Set explicitly, so that its range is that of the unit.
         props.freedoms.add().parameter = free
         return {"FINISHED"}
 

@@ -136,7 +136,7 @@ def _freedoms(layout, root, props) -> None:
             unit = f"{d.unit} at scale 1" if name == "values" and scale != 1.0 else d.unit
             column.prop(freedom, name, text=f"{title} ({unit})" if unit else title)
         words = f"now {scale * present(root, freedom.parameter):.4g} {d.unit}".rstrip()
-        # Below the fields, as their own words are beside them.
+        # Below the fields, which have their own labels beside them.
         below = column.split(factor=LABELS)
         below.label(text="")
         below.label(text=words)
@@ -206,7 +206,7 @@ def labelled(text: str) -> str:
 def target_line(target) -> str:
     """A target in a line: its name, the value with its standard error, and the goal."""
     if target["value"] is None:
-        # The print check's answer, or that of a unit that does not bear the pressure.
+        # The print check's result, or that of a unit that cannot carry the pressure.
         return f"{target['name']}: {'yes' if target['met'] else 'no'}"
     unit = f" {target['unit']}" if target["unit"] else ""
     error = target["standard_error"]

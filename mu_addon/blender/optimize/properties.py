@@ -288,7 +288,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
         description="The unit bears its weight; then an angle may be asked for at 0 kPa",
         default=False,
     )
-    # Level, since a weight matters most there.
+    # Horizontal, where weight matters most.
     orientation_deg: blender_property(
         ORIENTATION._replace(default=90.0), name="Turned by (deg)", precision=1, step=100
     )

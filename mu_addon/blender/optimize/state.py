@@ -174,7 +174,7 @@ def document(root: Any) -> dict[str, Any]:
 
 def job_of(root: Any) -> Job:
     """Optimisation job from a unit's properties; raises InputError."""
-    # Only now: it brings in the solver's packages, which a Blender may lack.
+    # Imported late: it needs the solver's packages, which a Blender may lack.
     from ...optimization.design_file import parse_design
     from ...toml_writer import toml_text
     from ...usecases.optimize.job import Job, job_from

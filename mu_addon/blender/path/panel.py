@@ -45,7 +45,7 @@ def _list(layout, context, root) -> None:
     row.use_property_split = False
     row.enabled = bool(ranked)
     row.prop(context.window_manager, "mu_path_order", expand=True)
-    # As high either way: a click on a run that has no ranking moves nothing.
+    # Same height in both cases, so that a click on a run without a ranking moves nothing.
     wrapped(layout, BETTER if ranked else "Simulate to rank them: with Place the Sensor")
     column = layout.column(align=True)
     for window in in_order(root, ranked, context.window_manager.mu_path_order):
@@ -66,7 +66,7 @@ def in_order(root, ranked, order: str):
     found = windows(root.mu_unit.chambers.count)
     if order == "name":
         return found
-    # A sort keeps the order of what it finds equal.
+    # Sorting is stable.
     return sorted(found, key=lambda window: ranked.get(window.name, (float("inf"), 0))[0])
 
 

@@ -65,7 +65,7 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
         tube = candidates[name]
         modifier = tube.modifiers[0]
         doubt = "?" if found.stale else ""
-        # Below the name: side by side the tubes have no room for more.
+        # Below the name: the tubes are too close for more beside it.
         set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n#{rank}{doubt}")
         if name != root.mu_unit.path and not found.stale:
             j_colour = field_colours.of_map(found.share(name))

@@ -20,7 +20,7 @@ from ..unit.properties import to_unit
 MATERIALS = ("MU Layer", "MU Enclosed")
 FACTS = ("height_mm", "whole_mm", "area_mm2", "enclosed_mm2")
 
-# The solid whose layers were last asked for: slicing it again takes milliseconds, making it one a second.
+# The last sliced solid: slicing it again takes milliseconds, making it a second.
 _kept: dict[tuple[Any, ...], Layers] = {}
 
 
@@ -40,7 +40,7 @@ def put(root: Any) -> Any:
     if shown is None:
         shown = displays.lock(displays.add(root, displays.LAYER, "1", bpy.data.meshes.new("Layer"), "Layer"))
         shown.hide_render = True
-        # Over the part, which would hide a section of itself.
+        # In front of the part, which would hide a section of itself.
         shown.show_in_front = True
     _draw(root, shown)
     return shown
@@ -67,7 +67,7 @@ def _draw(root: Any, shown: Any) -> None:
     except MuError:
         shown.data.clear_geometry()
         raise
-    # A plane at either end touches the part only: half a layer within it there is one.
+    # A plane at either end only touches the part: half a layer within it there is a section.
     height = float(np.clip(settings.layer * layers.height_mm, 1e-3, layers.height_mm - 1e-3))
     found = layers.filled(height)
     slots = np.repeat([0, 1], [len(found.material), len(found.enclosed)])

@@ -161,7 +161,7 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
     bl_label = "Show Finding"
     bl_options = {"REGISTER", "UNDO"}
 
-    # Not kept from the last call: a click on a row is about that row alone.
+    # Not kept from the last call: a click on a row concerns that row alone.
     finding: IntProperty(
         name="Finding", description="Its number in the list, from 0", min=0, options={"SKIP_SAVE"}
     )

@@ -135,7 +135,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
         subtype="FACTOR",
         update=lambda settings, context: layer.follow(settings.id_data),
     )
-    # Which finding is looked at, and which of its places; -1: none.
+    # The finding in view, and its location in view; -1: none.
     finding: IntProperty(default=-1, options={"HIDDEN"})
     place: IntProperty(options={"HIDDEN"})
 

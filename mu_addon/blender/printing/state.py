@@ -103,7 +103,7 @@ def _printer(root: Any) -> Printer:
             "no file with the printer's limits was chosen", "Print", "choose one, or a shipped printer"
         )
     path = bpy.path.abspath(settings.printer_file)
-    # Panels ask often: read again only when the file changes, or to say what is wrong with it.
+    # Panels ask often: read only when the file changes, or to report its fault.
     return _printers.read([Path(path)], lambda: load_printer(path)) or load_printer(path)
 
 
@@ -164,7 +164,7 @@ def write_inputs(root: Any, command: str, folder: Path) -> None:
     write_run(folder, layout, job.texts())
 
 
-# The core's jobs only where they are made: they bring in packages that a Blender may lack.
+# Imported late: the core's jobs need packages that a Blender may lack.
 
 
 def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:

@@ -57,7 +57,7 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
                 motion_parts.hide(root, *pair)
         settings = root.mu_motion
         settings.field, settings.on_unit = self.field, True
-        # They would lie over the colours, in the place of the unit at rest.
+        # They would cover the colours, at the position of the unit at rest.
         root.mu_unit.candidates = False
         motion_parts.show(root, name, motion_parts.MESH)
         if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
@@ -138,7 +138,7 @@ def frame_in_view(context, root) -> None:
         if root.mu_motion.cut and toward.x < 0.5:
             view.view_rotation = inward
         view.view_location = Vector((low + high) / 2.0)
-        # A distance at which an upright sphere around it would fill the height.
+        # Distance at which an upright sphere around it would fill the height.
         lens = area.spaces.active.lens
         view.view_distance = ROOM * float(np.linalg.norm(high - low)) / 2.0 * lens / 18.0
 

@@ -25,7 +25,7 @@ BAR, HEAD, TICK = "bar", "head", "tick"
 """Roles of the legend's objects: its bar, the text above it, or a value beside it."""
 WIDTH, TEXT = 0.08, 0.065
 """Width of the bar and height of its letters, in heights of the bar."""
-# Read from +x with z up: the side from which a unit that is cut open shows its inside.
+# Read from +x with z up: the side from which a cut unit shows its inside.
 _FACING_X = Matrix(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))).to_4x4()
 
 

@@ -160,7 +160,7 @@ def arrange(root: Any) -> None:
 def _see(root: Any) -> None:
     """Let a unit show its result if there is one in its place, else its design."""
     there = bool(displays.on_unit(root))
-    # Candidates lie on the unit at rest: while they are seen, so is that.
+    # Candidates lie on the unit at rest: while they are visible, the unit is shown at rest.
     if there and root.mu_unit.show != unit_object.RESULT and not root.mu_unit.candidates:
         root.mu_unit.show = unit_object.RESULT
     elif not there and root.mu_unit.show == unit_object.RESULT:
@@ -423,7 +423,7 @@ def _write(root: Any, scene: Any) -> None:
                 field_colours.write_colours(root, part.data, now)
         if root.mu_motion.field not in found.fields:
             left = part.data.attributes.get(root.mu_motion.field)
-            if left is not None:  # of the run that was shown before
+            if left is not None:  # of the run shown before
                 part.data.attributes.remove(left)
             field_colours.write_colours(root, part.data, None)
         part.data.update()
@@ -431,7 +431,7 @@ def _write(root: Any, scene: Any) -> None:
 
 @persistent
 def _before_frame(scene, *_):
-    # Before Blender evaluates the frame, so that positions and fields are of the same one.
+    # Before Blender evaluates the frame, so that positions and fields belong to the same one.
     for root in unit_object.roots():
         if parts(root) and root.mu_motion.live:
             _write(root, scene)
@@ -459,7 +459,7 @@ def _chosen(root: Any) -> None:
     """Show a result: if none is in the unit's place yet, that of Model A."""
     if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
         return
-    # They lie on the unit at rest; shown again, they bring that back.
+    # They lie on the unit at rest, which is shown with them.
     root.mu_unit.candidates = False
     if displays.on_unit(root):
         return

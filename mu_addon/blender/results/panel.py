@@ -41,7 +41,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
     bl_label = "Results"
 
     def show(self, layout, context, root):
-        # First what never changes its height: a click on a run moves nothing under the mouse.
+        # First the parts of fixed height, so that a click on a run moves nothing under the mouse.
         run_panel.draw_runs(layout, root)
         found = studies.findings(root)
         if found is None:

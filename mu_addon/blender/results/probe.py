@@ -87,7 +87,7 @@ class MU_OT_probe(MotionOperator, bpy.types.Operator):
         if self.ended or root is None or event.type in {"ESC", "RIGHTMOUSE"}:
             self.end(context)
             return {"CANCELLED"}
-        # Everything else goes on as ever: orbit, play, other fields.
+        # All other input works as usual: orbit, play, other fields.
         if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
             self.look(context, root, event)
         return {"PASS_THROUGH"}

@@ -27,7 +27,7 @@ def _surface(settings, context):
     try:
         motion_parts.rebuild(settings.id_data)
     except MuError as error:
-        # A property cannot refuse: the panel says so instead.
+        # A property cannot refuse a value: the panel reports it instead.
         settings.trouble = error.what
     else:
         settings.trouble = ""

@@ -101,7 +101,7 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
             props.study.detail = run.detail
         unit_object.rebuild(root)
         if studies.design_of(root) != run.design:
-            # Bodies, obstacles and named effects are the scene's own, and are left as they are.
+            # Bodies, obstacles and named effects belong to the scene, and stay.
             self.report(
                 {"WARNING"},
                 "The run had another body, other obstacles or other effects: those are not restored",
@@ -123,7 +123,7 @@ class MU_OT_run_remove(RunOperator, bpy.types.Operator):
         found = studies.run_by_key(root, self.key) if self.key else studies.shown_run(root)
         if found is None:
             return self.execute(context)
-        # The one that is asked about, whatever is shown once the answer comes.
+        # The run that was asked about, whatever is shown when the answer comes.
         self.key = found.key
         return context.window_manager.invoke_confirm(
             self,

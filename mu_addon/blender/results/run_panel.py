@@ -35,7 +35,7 @@ class MU_UL_runs(bpy.types.UIList):
             layout.label(text="")
             return
         row = layout.row(align=True)
-        # Of other parameters than the unit has: still to be seen, and greyed.
+        # Runs with other parameters than the unit: still listed, and greyed out.
         row.active = run.design == studies.design_of(root)
         star = "SOLO_ON" if run.starred else "SOLO_OFF"
         row.prop(item, "starred", text="", icon=star, emboss=False)

@@ -37,7 +37,7 @@ def _labelled(entry, **changes) -> None:
     try:
         history.label(run, changes.get("name", run.name), changes.get("starred", run.starred))
     except MuError:
-        # A property cannot refuse: the entry goes on saying what the file says.
+        # A property cannot refuse a value: the entry keeps showing that of the file.
         return
     viewports.redraw()
 

@@ -35,7 +35,7 @@ def _owners() -> list[tuple[Any, Any, Any, Path]]:
 @persistent
 def _before_save(path: str = "", *_: Any) -> None:
     _homes.clear()
-    # Nothing for the startup file, which has no place.
+    # Nothing for the startup file, which has no path.
     if not isinstance(path, str) or not path:
         return
     blend = Path(bpy.path.abspath(path))
@@ -48,7 +48,7 @@ def _before_save(path: str = "", *_: Any) -> None:
 
 @persistent
 def _after_save(*_: Any) -> None:
-    # A copy is saved elsewhere, and this file goes on from its own place.
+    # A copy is saved elsewhere, and this file keeps its path.
     for _root, props, named, _home in _owners():
         home = _homes.get(props.uuid)
         if home is not None:
@@ -65,7 +65,7 @@ def _moved(root: Any, old: Path, blend: Path) -> Path:
         if not history.move_home(old, new):
             return old
     except MuError:
-        # The file is saved all the same; the runs stay where they were and are found there.
+        # The file is saved all the same; the runs stay in place and are found there.
         return old
     for part in root.children:
         modifier = _cache_of(part)

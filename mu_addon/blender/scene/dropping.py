@@ -21,7 +21,7 @@ from ..unit import object as unit_object
 from . import landing
 
 SURFACES = ".stl;.obj;.ply"
-# Far more than a unit's file or a tree's has.
+# Far longer than any file of a unit or a tree.
 _LONGEST = 10_000_000
 
 
@@ -103,7 +103,7 @@ class _Surface(_Dropped, UnitOperator):
         try:
             done = self.use()
         except RuntimeError as error:
-            # The surface stays in the scene, selected, to be mended.
+            # The surface stays in the scene, selected, to be repaired.
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"FINISHED"}
         return done

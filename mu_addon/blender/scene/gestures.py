@@ -38,7 +38,7 @@ def look() -> None:
     _looking = True
     try:
         roots, shown, touched, overrides = [], [], [], []
-        # In a scene of thousands of objects most are neither: what tells them is asked for first.
+        # In a scene of thousands of objects most are neither: the distinguishing property is tested first.
         for obj in bpy.data.objects:
             if obj.get(displays.OWNER):
                 found = shown
@@ -142,7 +142,7 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
         own = obj.mu_obstacle.mm
         if own and abs(own - wanted) <= 1e-6 * wanted:
             continue
-        # A file of an older extension does not say for which unit: that of the scene, as it is found.
+        # A file of an older extension does not record the unit: the scene's is assumed.
         if own and not moved & set(_above(obj)):
             obj.location *= wanted / own
             obj.scale *= wanted / own
@@ -213,7 +213,7 @@ def _after_import(imported: Any) -> None:
         if displays.editable(obj) and displays.uuid_of(obj):
             own(obj)
             if obj.mu_unit.uuid and obj.type == "MESH":
-                # Blender may reuse a mesh that it brought in before.
+                # Blender may reuse a mesh that it imported before.
                 unit_object.separate(obj)
     look()
     live_update.catch_up()

@@ -35,7 +35,7 @@ def clear(low: Any, high: Any, boxes: list[Box], gap: float) -> float:
         aside = any(
             other_low[axis] > high[axis] + gap or low[axis] > other_high[axis] + gap for axis in (1, 2)
         )
-        # By start along x: whoever begins beyond the present place leaves room for it.
+        # By start along x: later boxes leave room at the present position.
         if not aside and other_low[0] <= x + width + gap and other_high[0] >= x - gap:
             x = max(x, float(other_high[0]) + 1.001 * gap)
     return x - start

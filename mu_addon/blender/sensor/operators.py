@@ -139,7 +139,7 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context):
-        # One line: the next would be another order.
+        # One line: a second would be another command.
         words = " ".join(self.words.split())
         sensor.of(unit_object.active_root(context)).child.send(f"mark {words}")
         return {"FINISHED"}
@@ -202,7 +202,7 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
             raise InputError(
                 f"a sweep over {len(set(angles))} angle(s)", remedy="take a smaller step or a wider range"
             )
-        # What an earlier sweep marked in this recording no longer counts.
+        # Marks of an earlier sweep in this recording no longer count.
         session.child.send(f"mark {SWEEP}")
         session.guide = Guide(angles)
         return {"FINISHED"}

@@ -51,7 +51,7 @@ def _draw() -> None:
     if twin.parts(root):
         _over_twin(context, root, scale)
     session = sensor.of(root)
-    # It ends with its connection or the file that is replayed: what stands there is always of this moment.
+    # It ends with its connection or the replayed file, so that it always shows the present.
     if session is None or not session.running or not root.mu_sensor.plot:
         return
     traces = session.frozen or session.traces
@@ -165,7 +165,7 @@ def _between(kind: str, x: Any, low: Any, high: Any, runs: list[slice], colour: 
 
 def _shape(kind: str, points: Any, colour: Any) -> None:
     """Draw points (n, 2) in pixels as lines, a strip of lines or of triangles."""
-    # Each time: writing text ends blending.
+    # Each time, since drawing text ends blending.
     gpu.state.blend_set("ALPHA")
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", colour)

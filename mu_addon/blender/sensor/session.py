@@ -136,7 +136,7 @@ class Session:
 
 
 def _light(calibration: Any, channels: tuple[str, ...], values: Any) -> Any:
-    # Where it is used: it brings scipy, which a Blender without the wheels lacks.
+    # Imported late: it needs scipy, which a Blender without the wheels lacks.
     from ...sensing.calibration import light_of
 
     return light_of(calibration, channels, values)

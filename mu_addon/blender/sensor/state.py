@@ -162,12 +162,12 @@ CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibr
 
 def calibrate(root: Any, data: Path) -> None:
     """Calibrate from a folder in a separate process, and then apply the result; raises MuError."""
-    # Only now: it brings in scipy, which a Blender without the wheels lacks.
+    # Imported late: it needs scipy, which a Blender without the wheels lacks.
     from ...usecases.sensor.calibrate import LAYOUT, input_texts
 
     folder = _unused(studies.assign_folder(root) / CALIBRATIONS)
     light, dark = chosen(root)
-    # Its samples are counted by the process that calibrates: until then more of them may have come.
+    # The calibrating process counts its samples: more may arrive until then.
     inputs = input_texts([data], light or None, str(dark) if dark else None)
     CALIBRATION.start(root, folder, lambda folder: write_run(folder, LAYOUT, inputs))
     _calibrating[CALIBRATION.key(root)] = folder
@@ -281,7 +281,7 @@ def _tick() -> None:
 
 @persistent
 def _render_began(*_: Any) -> None:
-    # While a render reads the scene, nothing of it may change.
+    # While a render reads the scene, it must not change.
     global _rendering
     _rendering = True
 

@@ -12,7 +12,7 @@ from ..unit.broken import broken, description
 from ..unit.fields import field, label, shown_value
 from ..unit.object import active_root
 
-# Where a section's parameters are shown. A section that the core gains appears under Design by itself.
+# Panel place of each section's parameters. A new section of the core appears under Design.
 PLACES = {
     "chambers": "design",
     "lattice": "lattice",

@@ -60,7 +60,7 @@ SIMULATION = JobKind(
 
 def job_of(root: Any) -> Job:
     """Study job from a unit's properties; raises InputError."""
-    # Only now: they bring in the solver's packages, which a Blender may lack.
+    # Imported late: they need the solver's packages, which a Blender may lack.
     try:
         from ...fem.solver import SolverChoice
         from ...meshing.settings import QUICK, RESOLVED, MeshSettings
@@ -76,7 +76,7 @@ def job_of(root: Any) -> Job:
     if settings.command == "place":
         extra["paths"] = settings.paths
     if settings.detail == "quick":
-        # The homogenised unit on a mesh of half the fineness, one rule, no second mesh.
+        # The homogenised unit on a mesh of half the refinement, one rule, no second mesh.
         extra["mesh"] = QUICK
         if settings.command == "place":
             extra |= {"rules": ("volume_fraction",), "mesh_check": False}

@@ -46,7 +46,7 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         root = unit_object.active_root(context)
         study = root.mu_unit.study
         job = job_of(root)
-        # Now: it comes with the solver's packages.
+        # Imported late, with the solver's packages.
         from ...usecases.simulate_and_place.job import write_study
 
         folder, job = history.place_of(studies.assign_folder(root), job)

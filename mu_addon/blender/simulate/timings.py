@@ -53,7 +53,7 @@ def _ended(key: str) -> None:
         if isinstance(seconds, dict):
             note(run.detail, {str(name): float(s) for name, s in seconds.items()})
     except (MuError, *UNREADABLE):
-        # What cannot be kept is not announced; the results are there.
+        # A failure to store the timings is not reported; the results are there.
         return
 
 

@@ -31,7 +31,7 @@ def _annotations(step: Step) -> dict:
                 continue
             found[d.name] = blender_property(d, options={"SKIP_SAVE"})
             if d.unit == "mm":
-                # Scripts set it in mm at scale 1; the redo panel has it as it is.
+                # Scripts set it in mm at scale 1; the redo panel shows the true length.
                 shared = {"name": label(d), "description": tooltip(d), "options": {"SKIP_SAVE"}}
                 found[d.name + TRUE] = millimetres(step_of(d.high), **shared)
     if step.muting:
@@ -65,7 +65,7 @@ class _OfStep(UnitOperator):
             if true or self.properties.is_property_set(name):
                 value = getattr(self, name)
                 if true:
-                    # What is dragged past a bound ends there.
+                    # Values dragged past a bound are clamped.
                     d = stack.description(section, name)
                     value = getattr(self, name + TRUE) / true_scale(props, d)
                     value = min(max(value, d.low), d.high)

@@ -41,7 +41,7 @@ def can_be_muted(name: str) -> bool:
 
 def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
     """Inputs of the steps of a unit in the scene; raises InputError for a body that does not fit."""
-    # A unit of fewer chambers has fewer paths: the chosen one waits until it is there again.
+    # A unit of fewer chambers has fewer paths: the chosen one is kept until it exists again.
     path = root.mu_unit.path
     known = path in {window.name for window in windows(unit.chambers.count)}
     body = bodies.envelope_in(root, unit)

@@ -46,7 +46,7 @@ class MU_OT_track(bpy.types.Operator):
         tracking.prepare(chosen, clip.mu_bench.marks)
         for track in chosen:
             track.select = True
-        # Blender's tracker stops at the scene's end, and beyond the clip's it loses what it has.
+        # Blender's tracker stops at the scene's end, and loses its markers beyond the clip's.
         end = clip.frame_start + clip.frame_duration - 1
         if scene.frame_end > end:
             self.report({"INFO"}, f"The scene ended at frame {scene.frame_end}, and ends with the clip now")

@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...measured.video import Tracks
 from ...usecases.track_video.run import MarkerSettings
 
-# Crosses show how they turn; a dot does not, and a tracker that looks for its turn walks off.
+# Crosses show their rotation; a dot does not, and a tracker that fits its rotation drifts off.
 MODELS = {"crosses": "LocRot", "dots": "Loc"}
 CORRELATION = 0.75
 

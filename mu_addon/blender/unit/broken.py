@@ -98,10 +98,10 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
             return Broken(words(error), places)
         scale = exact(props.scale)
         fits = {place: nearest_fit(sections, scale, *place) for place in places}
-        # What was changed and could mend nothing is not to blame: its field would be red for no reason.
+        # A changed parameter that cannot repair anything is not blamed: its field would be red for no reason.
         fits = {place: value for place, value in fits.items() if value is not None or place in named}
         mending = repairs(sections, scale)
-        # Every fault is red in its field, whose button sets what the one in the panel's head does.
+        # Every fault is red in its field, with the same button as in the panel's head.
         fits |= {(r.section, r.name): r.value for r in mending if r.value is not None}
         return Broken(words(error), fits, mending)
     return Broken(props.trouble, {})

@@ -31,7 +31,7 @@ def schedule(root) -> None:
         return
     _pending.add(root.mu_unit.uuid)
     if not bpy.app.timers.is_registered(_rebuild_pending):
-        # The first change is followed at once, those that come after it while a slider moves at intervals.
+        # The first change is followed at once, later ones during a drag at intervals.
         wait = max(0.0, INTERVAL_S - (time.monotonic() - _rebuilt_at))
         bpy.app.timers.register(_rebuild_pending, first_interval=wait)
 
@@ -40,7 +40,7 @@ def _rebuild_pending():
     global _rebuilt_at
     pending, names = set(_pending), []
     _pending.clear()
-    # By UUID: undo may have deleted the object that asked, or brought back another in its place.
+    # By UUID: undo may have deleted the object, or restored another in its place.
     for root in unit_object.roots():
         if root.mu_unit.uuid in pending:
             unit_object.rebuild(root)
@@ -69,7 +69,7 @@ def catch_up() -> None:
 
 
 def _job_ended(_key) -> None:
-    # What the study has found shows on the candidate paths.
+    # The study's results appear on the candidate paths.
     catch_up()
 
 

@@ -98,7 +98,7 @@ def new_root(context: Any, title: str) -> Any:
     context.collection.objects.link(root)
     root.location = context.scene.cursor.location
     root.scale = (scene_units.mm(context.scene),) * 3
-    # Its size is the design's: scaled by hand it would show another unit than the one that is simulated.
+    # Its size is the design's: scaled by hand it would differ from the simulated unit.
     root.lock_scale = (True, True, True)
     return root
 
@@ -229,7 +229,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     mesh["mu_body"] = bodies.fingerprint(root)
     mesh["mu_quality"] = solid.quality
     mesh["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
-    # One that is shown is removed by `show`, and then no more to be asked for its users.
+    # A shown one is removed by `show`, after which its users must not be read.
     beside = old if old != root.data else None
     with updates.paused():
         root.mu_unit.solid, root.mu_unit.show = mesh, SOLID

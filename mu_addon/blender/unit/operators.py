@@ -69,7 +69,7 @@ class MU_OT_add(bpy.types.Operator):
         description="Also set the scene's unit of length, one Blender unit a millimetre",
         default=False,
     )
-    # The preset that the scale belongs to: another one, chosen in the redo panel, brings its own scale.
+    # The preset that the scale belongs to: another one chosen in the redo panel sets its own scale.
     scaled: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     frame: BoolProperty(name="Frame in View", description="Bring the new unit into view", default=True)
 

@@ -35,7 +35,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        # Where only a gripper is there, its own panel has the word.
+        # With a gripper alone, its own panel has this note.
         return unit_object.active_root(context) is not None or gripper_object.active(context) is None
 
     def draw(self, context):
@@ -114,7 +114,7 @@ def _head(layout, root) -> None:
         return
     if len(mending) > 1:
         row = row.split(factor=0.8, align=True)
-    # Beside each other two have room for their words, and a third button for how many it mends.
+    # Two buttons side by side have room for their words, and a third for the number of repairs.
     grid = row.grid_flow(columns=min(len(mending), 2), align=True, row_major=True, even_columns=True)
     for repair in mending:
         fix_button(grid, root, repair.section, repair.name, repair.value, found.text)

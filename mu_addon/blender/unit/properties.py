@@ -38,7 +38,7 @@ def _changed(group, context):
 
 def _candidates_changed(unit, context):
     if unit.candidates and unit.show == "result":
-        # They lie on the unit at rest: beside one that is bent they would lie beside its lattice.
+        # They lie on the unit at rest: beside a bent one they would lie beside its lattice.
         unit.show = "preview"
     PARAMETERS_CHANGED.send(unit.id_data)
 
@@ -208,12 +208,12 @@ class MU_PG_unit(bpy.types.PropertyGroup):
             default="preview",
             update=_view_changed,
         ),
-        # What the object's mesh is, one or the other, and the envelope of the user's own.
+        # Meshes that the object shows, one or the other, and the user's envelope.
         **{
             name: PointerProperty(type=bpy.types.Mesh, options={"HIDDEN"})
             for name in ("preview", "solid", "envelope")
         },
-        # What the preview was last built from, and why it could not follow the parameters.
+        # Inputs of the last preview, and why it could not follow the parameters.
         "built": StringProperty(options={"HIDDEN"}),
         "trouble": StringProperty(options={"HIDDEN"}),
     }

@@ -118,7 +118,7 @@ def check(
         found += against_nominal(vertices, triangles, nominal)
     figures["volume_ml"] = solid.volume() / 1e3
     figures["mass_g"] = figures["volume_ml"] * printer["density_g_per_ml"]
-    # Grids see no more of a surface than their cells: what is simplified is less than they tell.
+    # Grids resolve no more than their cells: details simplified here are smaller than that.
     simple = solid.simplify(0.01).to_mesh64()
     seen = np.asarray(simple.vert_properties)[:, :3], np.asarray(simple.tri_verts).astype(np.int64)
 

@@ -157,7 +157,7 @@ def cups(grid: VoxelRows, free: Regions) -> Cups:
         if one == two:
             continue
         for closed, other in ((one, two), (two, one)):
-            # A region of this layer alone, closed to the side but open to below, is no cup.
+            # A region of this layer alone, closed at the sides but open below, is no cup.
             if is_open[other] and not is_open[closed] and start[closed] < level:
                 found.append((weight[closed], False, lowest[closed], highest[closed]))
         parent[two] = one

@@ -182,7 +182,7 @@ def _widest_ball(solid: Any, way: Opening, step: float) -> tuple[Points, float]:
         wider = size
         for at in around:
             if np.linalg.norm(at - way.place) < 1.5 * step:
-                # The line that tells inside from outside goes through the whole part, so it comes last.
+                # The line that distinguishes inside from outside crosses the whole part, so it comes last.
                 found = radius(at, wider)
                 if found > wider and _free(solid, at):
                     best, wider = at, found

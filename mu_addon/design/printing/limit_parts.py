@@ -15,13 +15,13 @@ from .printer import MEANING, Printer
 
 # Sizes of a row, over the limit that the printer's file gives.
 RATIOS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5)
-# Of all parts, in mm: thickness of the foot that features stand on, distance between them, their height and
-# depth, and thickness of what only holds something.
+# Of all parts, in mm: thickness of the foot under the features, distance between them, their height and
+# depth, and thickness of supporting walls.
 _FOOT, _APART, _HIGH, _DEEP, _SOLID = 2.0, 4.0, 10.0, 10.0, 3.0
 # Legs under a cup, in mm, so that it stands off the platform.
 _LEG = 6.0
 _FACETS = 32
-# Side in mm of the cube that is weighed, and what its density may be, over that of the printer's file.
+# Side in mm of the weighed cube, and its possible density, relative to that of the printer's file.
 _WEIGHED = 20.0
 _DENSITIES = (0.7, 1.3)
 

@@ -172,7 +172,7 @@ def _vent(solid: Any, outside: Any, start: Array, up: Array, ml: float) -> Vent:
         seen.append(wall)
         if not THINNEST_MM <= wall <= THICKEST_MM:
             continue
-        # Nothing but the wall itself may be in the way, a strut behind it least of all.
+        # Only the wall itself may be in the way, no strut behind it.
         taken = solid ^ _bore(inner, outer, radius, 2.0)
         if len(taken.decompose()) != 1 or taken.volume() > 1.3 * np.pi * radius**2 * wall:
             continue

@@ -31,8 +31,8 @@ MODULUS = Parameter(
     "soft silicones to hard rubber",
     plausible=(20.0, 1e7),
 )
-# Of the clamp, or of what was taken for no sag. A sag of its own weight and a tilt look alike: only what is
-# known of clamps tells them apart, and it belongs to the uncertainty of the weight.
+# Of the clamp, or of the zero of sag. Sag under its own weight and a tilt look alike: only prior knowledge of
+# clamps separates them, as part of the weight's uncertainty.
 TILT = Parameter("tilt_deg", "deg", -10.0, 10.0, 0.0, (), "clamps set by eye or level", spread=1.0)
 
 EFFECTS = (
@@ -123,7 +123,7 @@ def cantilever(
     load = np.asarray(tip, float)[:, None] + weight * (1 - s)
     identity = np.eye(NODES + 1)
     a = np.full_like(load, tilt)
-    # Large loads are come to in steps.
+    # Large loads are reached in steps.
     steps = max(1, int(np.ceil(np.sqrt(load.max() / 2)))) if load.size else 1
     for share in np.linspace(1 / steps, 1, steps):
         for _ in range(60):

@@ -32,7 +32,7 @@ Array = np.ndarray[Any, Any]
 
 KIND = "blocked_force"
 FORCE = "force_N"
-# Of the largest force: what a cell's sheet allows its zero to wander, and hands to miss it.
+# Of the largest force: drift allowed by a cell's data sheet, and errors of zeroing by hand.
 ZERO_SHARE = 0.01
 ACTING = (
     "viscoelasticity",
@@ -46,7 +46,8 @@ ACTING = (
 )
 GAP = "seating.tip_gap_mm"
 STAND = Parameter("stand_mm_per_N", "mm/N", 0.0, 1.0, 0.0, (0.05,), "beams of load cells, printed stands")
-# Rounds in which the stand's way and the force agree: each takes the stand's share of the unit's stiffness.
+# Iterations until the stand's deflection and the force agree: each gains the stand's share of the unit's
+# stiffness.
 ROUNDS = 8
 
 

@@ -17,9 +17,9 @@ Array = np.ndarray[Any, Any]
 ANGLE = "angle_deg"
 # Length of a unit at 1.0x, from base to tip.
 LENGTH_mm = Chambers().cell_mm * Chambers().count
-# A camera that stands well turns less than this while it records.
+# Largest rotation of a stable camera during a record.
 TURN_deg = 20.0
-# Unit lengths from which a camera looks, where nothing is known of it.
+# Assumed distance of a camera, in unit lengths.
 AWAY = 3.0
 # What is nearer is larger, by this share at half a unit's length from the middle: of a camera that far away
 # which is turned by 20 degrees, the sine over six half lengths.
@@ -174,7 +174,7 @@ def _angle_misread(angle: Array, view: tuple[Array, Array] | None, lens: float, 
         away, farther = view
         place, way = np.stack([y, z]), np.stack([sine, cosine])
         depth = 1.0 + farther @ place
-        # Up to a factor that leaves a direction as it is: the square of the depth.
+        # Up to a factor that keeps a direction: the square of the depth.
         to_y, to_z = away @ (way * depth - place * (farther @ way))
         y, z = away @ place / depth
     grown, along = 1.0 + lens * (y**2 + z**2), 2.0 * lens * (y * to_y + z * to_z)

@@ -64,8 +64,8 @@ EFFECTS = (
 )
 
 
-# What another right code of the same law finds at the largest strain, over it: a solid whose bulk modulus is
-# 200 shear moduli in place of an incompressible one is off by 0.1 %, in proportion to the strain.
+# Difference of another correct code of the same law at the largest strain, relative: a solid whose bulk
+# modulus is 200 shear moduli instead of an incompressible one is off by 0.1 %, in proportion to the strain.
 DISCREPANCY = Parameter(
     "coupon_discrepancy", "", -0.03, 0.03, 0.0, (), "between codes of the same physics", spread=0.002
 )

@@ -16,7 +16,7 @@ Array = np.ndarray[Any, Any]
 # Times of a law's course in s, and where fits of it begin, as shares of the longest record.
 SHORTEST_s, LONGEST_s, NULL_s = 0.5, 1e4, 30.0
 EARLY = (0.02, 0.2)
-# Of the largest reading: a gauge whose zero is farther off is seen to be so before anything is measured.
+# Of the largest reading: a gauge with a larger offset of its zero is noticed before any measurement.
 OFFSET_SHARE, LEAST_OFFSET_kPa = 0.1, 1.0
 
 

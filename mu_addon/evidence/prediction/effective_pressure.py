@@ -82,7 +82,7 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
 
     a, b0, b1 = lag_weights(h, time_s)
     driven = np.concatenate([p[:1], b0 * p[:-1] + b1 * p[1:]])
-    # x_k - a x_(k-1) = what drives it: a band with ones on its diagonal.
+    # x_k - a x_(k-1) = drive: a band with ones on its diagonal.
     band = np.zeros((2, len(p)))
     band[1, :-1] = -a
     found, _ = dtbtrs(band, driven[:, None], uplo="L", diag="U")
@@ -120,7 +120,7 @@ def play_operator(p: Array, threshold: float) -> Array:
     at = np.flatnonzero(moves)
     turned = np.flatnonzero(np.diff(np.sign(moves[at])))
     turns = at[turned + 1]
-    # Between two turns what happened before is one number.
+    # Between two turns the history is one number.
     x = float(p[0])
     before = [x]
     for v in p[turns].tolist():

@@ -15,7 +15,7 @@ from ..effect import Effect, Parameter
 Array = np.ndarray[Any, Any]
 
 NAME = "contact"
-# A wall nearer than this share of the way that the free unit goes is not computed.
+# A wall nearer than this share of the free unit's way is not computed.
 NEAREST = 0.9
 
 
@@ -68,7 +68,7 @@ class ObstacleResponse:
     def _changed(self) -> Any:
         from scipy.interpolate import CubicSpline
 
-        # Nothing changes without a wall, nor at the moment that one is met.
+        # No change without a wall, nor at first contact.
         reaches = np.concatenate([[0.0], self.reaches_mm])
         shares = np.concatenate([[0.0], self.shares])
         changes = np.pad(self.changes, ((1, 0), (1, 0), (0, 0)))
@@ -106,7 +106,7 @@ def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> 
     computed walls. kind: of the experiments.
     """
     farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
-    # Nearer walls than were computed are not guessed.
+    # Walls nearer than the computed ones are not extrapolated.
     nearest = {
         s: max((side.reaches_mm[-1] + side.spare_mm for t, side in sides if t == s), default=0.0)
         for s in (1, -1)

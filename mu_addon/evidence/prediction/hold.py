@@ -32,7 +32,7 @@ CHOKED = (2 / (AIR_GAMMA + 1)) ** (AIR_GAMMA / (AIR_GAMMA - 1))
 DECADES = 6
 # Parameters of cooling at two rates beside its size, and their values where none are given.
 _TWO_RATES = {"first_s": 10.0, "later_share": 0.0, "later_times": 6.0}
-# The readings of this time tell where a hold begins, to within this share of the absolute pressure.
+# Length of the readings that determine a hold's start, to within this share of the absolute pressure.
 BEGINNING_s, NEAR = 1.0, 0.01
 
 EFFECTS = (
@@ -151,7 +151,7 @@ EFFECTS = (
         "the gas cools to the temperature of the wall, and more slowly with the wall to that of the room",
         refines=True,
     ),
-    # A hold's own first pressure takes up a curve.
+    # A hold's own first pressure absorbs a curve.
     *(e for e in gauge(KIND) if e.name != CURVE),
 )
 
@@ -226,7 +226,7 @@ class ChamberPressure:
         if (room := experiment.columns.get(ROOM)) is not None:
             warm = room - room[0]
         if warm.any():
-            # What leaks away meanwhile is that of the room as it was.
+            # The gas that leaks meanwhile is at room temperature.
             p = (p + ATMOSPHERE_kPa) * (1.0 + warm / ROOM_K) - ATMOSPHERE_kPa
         p = as_read(p, values, self._largest_kPa)
         p = p + drift("pressure_drift", experiment["time_s"], values)

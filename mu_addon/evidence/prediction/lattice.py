@@ -127,7 +127,7 @@ class Struts:
         A tenth of the strut is left at least.
         """
         t = self.thickness_mm * scale
-        # Without an effect exactly 1.
+        # Exactly 1 without an effect.
         thick = max(t + 2 * offset_mm, 0.1 * t)
         return (thick / t) ** self.exponent * (1 + 2 * self.exponent * excess_mm / t)
 

@@ -19,23 +19,23 @@ Array = np.ndarray[Any, Any]
 
 ANGLE = "angle_deg"
 CHANNEL = re.compile(r"marker(\d+)_([yz])_mm")
-# Farther than one chamber of a unit at 1.0x a marker is taken for another one.
+# A larger jump than one chamber of a unit at 1.0x is a confusion of markers.
 FARTHEST_mm = Chambers().cell_mm
 # Smallest slip from which a fit begins.
 SMALLEST_mm = 0.01
-# Powers of the pressure that a marker's place follows, beside what the other markers do.
+# Powers of the pressure in the regression of a marker's position, beside the other markers.
 POWERS = 4
 # Reversals of pressure below this are noise of the gauge.
 DEADBAND_kPa = 0.2
-# Samples at either end in which a step is not told from a reading that stands alone.
+# Samples at either end in which a step cannot be distinguished from an isolated reading.
 ENDS = 4
-# Most samples that a search looks at: of longer records every second one, or fewer.
+# Most samples of a search: longer records are thinned.
 SAMPLES = 20_000
 # Chi squared beyond that of the best moment by noise, above which a second marker is offered, too.
 PLAIN = 10.0
-# A reading so many deviations from the middle one of itself and its neighbours stands alone.
+# Deviations from the median of itself and its neighbours beyond which a reading is isolated.
 ALONE = 6.0
-# Directions of unit columns that hold less than this are none.
+# Directions of unit columns with less than this are dropped.
 NEAR = 1e-6
 
 
@@ -146,7 +146,7 @@ class Slip:
 
 def _effect(slip: Slip, kind: str, most: float, total_s: float, tried: int) -> Effect:
     marker, (y, z) = f"marker{slip.marker}", slip.step_mm
-    # What is far from nothing beside a moment would step over samples in a derivative.
+    # A large moment's finite difference would step over samples.
     near = max(slip.moment_s - 1e-2 * total_s, 0.0)
     moment = Parameter(
         f"{marker}_moment_s",
@@ -323,7 +323,7 @@ def _step_of(
     if not resolved.any() or not (total > 0.0).all():
         return None
     squares = np.where(resolved[:, None], products**2 / np.where(resolved, length, 1.0)[:, None], 0.0)
-    # Noise is what the step leaves: of each channel its own.
+    # Noise is the step's residual: separate for each channel.
     rest = np.maximum(total - squares, 1e-12 * total) / max(n - q.shape[1] - 1, 1)
     gains = np.sum(squares / rest, axis=1)
     at = int(np.argmax(gains))
@@ -335,7 +335,7 @@ def _without_lone(left: Array) -> Array:
     middle = left.copy()
     middle[1:-1] = np.median(np.stack([left[:-2], left[1:-1], left[2:]]), axis=0)
     apart = np.abs(left - middle)
-    # Half of all readings are their own middle one's neighbours, so the mean tells their spread.
+    # Half of all readings are their own neighbourhood's median, so the mean gives their spread.
     alone = apart > ALONE * np.maximum(apart.mean(axis=0), 1e-300) * 2.0
     return np.where(alone, middle, left)
 

@@ -19,8 +19,8 @@ from .unit import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
 Array = np.ndarray[Any, Any]
 
 KIND = "unit_pose"
-# Orientations about an axis that are simulated. What lies between them is their trigonometric polynomial,
-# exact where the angle has no more than three waves in a turn.
+# Orientations about an axis that are simulated. Between them their trigonometric polynomial is used, exact if
+# the angle has at most three waves in a turn.
 STATIONS = tuple(np.arange(0.0, 360.0, 45.0).tolist())
 # Of the fixture's protractor, or of how upright its base stands.
 TILT = Parameter("pose_tilt_deg", "deg", -10.0, 10.0, 0.0, (), "fixtures set by eye or level", spread=1.0)
@@ -42,7 +42,7 @@ class UnitPose:
     def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:
         if not responses:
             raise InputError("no response of the unit is given", KIND, "simulate the unit first")
-        # Zero, modulus and discrepancy are those of a unit that is driven: it is one unit.
+        # Zero, modulus and discrepancy are shared with a driven unit: it is the same unit.
         driven = UnitPressure(responses)
         static = [e for e in driven.effects if e.name in responses[0].variants]
         here = [attrs.evolve(e, kinds=(KIND,)) for e in TIMED if e.name in ACTING]

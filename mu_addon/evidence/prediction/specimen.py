@@ -25,17 +25,17 @@ Law = Callable[[Array], Array]
 
 # Length of a specimen at 1.0x whose length is not given.
 LENGTH_mm = 25.0
-# A preload needs faces to bear it: it comes in over this much of the gap, so that seating has one size.
+# A preload needs faces to carry it: it builds up over this share of the gap, so that seating has one size.
 ONSET_mm = 0.01
-# Rows of a record whose load cell has a zero of its own.
+# Rows of a record from which its load cell has a fitted zero.
 FEWEST = 20
-# Of the largest load: what such cells' sheets allow a zero to wander, and hands to miss it.
+# Of the largest load: drift of zero allowed by such cells' data sheets, and errors of zeroing by hand.
 ZERO_SHARE = 0.01
 # Iterations for the frame's share.
 _MOST = 200
-# Of the change of slope at a turn, by which slopes beside it may differ from straight lines'.
+# Share of the change of slope at a turn by which slopes beside it may differ from straight lines'.
 STRAIGHT = 0.2
-# Strain up to which a preload is looked for.
+# Strain up to which a preload is sought.
 FARTHEST = 0.5
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
 _TIMED = {e.name: e.parameters for e in TIMED}
@@ -44,7 +44,7 @@ BY_PEAK = (
     Parameter("by_peak", "", 0.0, 5.0, 0.0, (0.3,), "b of Beatty and Krishnaswamy 2000, over strain^power"),
     Parameter("power", "", 0.2, 2.0, 0.5, (0.5, 1.0), "one half in Beatty and Krishnaswamy 2000"),
 )
-# And one that ends, by the way below the largest strain over that strain.
+# And one that saturates, by the distance below the largest strain over that strain.
 BY_SHARE = (
     Parameter("lost", "", 0.0, 0.95, 0.0, (0.2,), "most that softening takes of the stress"),
     Parameter("width", "", 0.02, 5.0, 0.4, (0.3,), "of the largest strain: m of Dorfmann and Ogden 2004"),
@@ -130,7 +130,7 @@ def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, 
     for e in experiments:
         if e.kind != kind:
             continue
-        # A specimen without a name is taken for a fresh one.
+        # A specimen without a name is assumed to be new.
         whose = (e.specimen or e.name, e.scale)
         past = found[e.name] = now.get(whose, NEW)
         now[whose] = StrainHistory(past.tests + 1, max(past.strain, float(np.abs(e["strain"]).max())))
@@ -206,7 +206,7 @@ def recorded(
     """
     timed = "time_s" in experiment.columns
     if timed and any(values.get(key) for key in FILTERED):
-        # A filter sees where the machine turned, too.
+        # A filter also depends on where the machine turned.
         dense, rows = _with_turns(experiment)
         found = filtered(dense["time_s"], _borne(dense, law, values, past), values)[rows]
     else:
@@ -326,7 +326,7 @@ def _remembering(
         way = below / np.maximum(values.get("mullins_softening.width", 0.4) * most, 1e-12)
         stress = stress * (1 + lost * np.expm1(-(way ** values.get("mullins_softening.shape", 1.0))))
     if (share := values.get("viscoelasticity.share", 0.0)) and "time_s" in experiment.columns:
-        # Relaxing from equilibrium: sigma = sigma_0 - share of what the dashpot has given way.
+        # Relaxation from equilibrium: sigma = sigma_0 - share of the dashpot's strain.
         stress = stress - share * first_order_lag(
             experiment["time_s"], stress, values.get("viscoelasticity.time_s", 1.0)
         )

@@ -17,10 +17,10 @@ from .unit import UnitPressure, UnitResponse
 Array = np.ndarray[Any, Any]
 
 KIND = "pressure_step"
-# An interval this many times as long as most has lost samples. Of what the pressure did in it the mean is not
-# known: that of a step at any moment differs from the chord's by 0.29 of the way (a standard deviation).
+# An interval this many times longer than usual has lost samples. Its mean pressure is unknown: for a step at
+# a random moment it differs from the chord's by 0.29 of the change (a standard deviation).
 LOST, MEAN = 1.5, 0.29
-# Slower than this a unit of the sizes that are printed does not swing, nor one without its damping.
+# Longest period of units of the printed sizes, with their damping.
 SLOWEST_s = 2.0
 
 INERTIA = Effect(
@@ -97,7 +97,7 @@ class PressureStep(UnitPressure):
             columns = {c: np.full(len(time), np.nan) for c in experiment.columns}
             columns |= {"time_s": time, "pressure_kPa": pressure}
             dense = attrs.evolve(experiment, columns=columns, rows=np.arange(len(time)))
-            # With the experiment, whose identity would otherwise be given to another one.
+            # Stored with the experiment, whose identity could otherwise be reused.
             self._finer[id(experiment)] = experiment, dense, rows
         _, dense, rows = self._finer[id(experiment)]
         pressure = dense["pressure_kPa"]

@@ -26,15 +26,15 @@ from .marker_slip import Recordings, slip_effects, slipped
 Array = np.ndarray[Any, Any]
 
 KIND = "unit_pressure"
-# Kinds that drive a unit over time, which it remembers.
+# Kinds that drive a unit over time, with history.
 DRIVEN = (KIND, "pressure_step", "blocked_force")
 REFERENCE_C = 23.0
 # Smaller reversals are noise of the gauge.
 DEADBAND_kPa = 0.2
-# Times the last pressure computed, up to which the response is believed along its end's slope.
+# Factor on the last computed pressure up to which the response is extrapolated along its end's slope.
 BEYOND = 1.25
-# Of the largest reading, by which a gauge's zero may drift: sheets allow 0.25 to 2 % of full scale, which is
-# up to a few times what is read.
+# Of the largest reading, possible drift of a gauge's zero: data sheets allow 0.25 to 2 % of full scale, a few
+# times the reading.
 GAUGE_SHARE = 0.05
 # Sizes of variants whose curves a response keeps.
 REMEMBERED = 64
@@ -293,8 +293,8 @@ TIMED = (
 )
 
 
-# A second law of viscoelasticity: polymers relax over many decades of time, and a drift of the gauge would be
-# named in its place where one relaxation time is too few.
+# A second law of viscoelasticity: polymers relax over many decades of time, and if one relaxation time is too
+# few a drift of the gauge would be named instead.
 RELAXING = Effect(
     "viscoelasticity",
     (
@@ -321,7 +321,7 @@ SPREADING = Effect(
 )
 
 
-# A second law of the line: what lies before the chambers (tube, filter, manifold) fills first. Two volumes,
+# A second law of the line: the volume before the chambers (tube, filter, manifold) fills first. Two volumes,
 # each behind a resistance, have two real time constants, whatever their sizes.
 TWO_VOLUMES = Effect(
     "line_lag",
@@ -407,7 +407,7 @@ class UnitPressure:
         pressure = self.discrepant(self.effective_kPa(experiment, values), values)
         static = {name: values[key] for name, key in self._sizes.items() if key in values}
         if "gravity" in static:
-            # Weight bends a unit of stiffer resin by as much less.
+            # Weight bends a stiffer unit less, in proportion.
             static["gravity"] = static["gravity"] / values.get("modulus_factor", 1.0)
         zeros = [
             values.get(zero, 0.0) + (values.get("angle_offset.offset_deg", 0.0) if c == "angle_deg" else 0.0)
@@ -446,7 +446,7 @@ class UnitPressure:
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
         p = before_the_gauge(p, values, self._largest_kPa)
-        # With a valve shut nothing flows between gauge and chambers: what leaks is seen by both.
+        # With a valve shut nothing flows between gauge and chambers: both see a leak.
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)
         modulus: Any = get("modulus_factor", 1.0)

@@ -133,7 +133,7 @@ class WaveguideVoltage:
         exponent = exponent + get("led_drift.per_hour", 0.0) * (time - time[0]) / 3600.0
         if settled := get("led_drift.settled", 0.0):
             exponent = exponent - settled * np.expm1(-(time - time[0]) / get("led_drift.settling_s", 100.0))
-        # Far from the data a fit may try losses that no float holds.
+        # Far from the data a fit may try losses beyond floating point.
         voltage = get(STRAIGHT.name, STRAIGHT.null) * np.exp(np.clip(exponent, -100.0, 100.0))
         ambient = get("ambient_light.at_first_V", 0.0)
         ambient = ambient * (1.0 + get("ambient_light.per_hour", 0.0) * (time - time[0]) / 3600.0)

@@ -87,7 +87,7 @@ def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
     return _by_masing(np.ascontiguousarray(strain, np.float64).tobytes(), per_strain, hardening)
 
 
-# A derivative by anything else asks for the same way again, of each experiment.
+# A derivative by any other parameter needs the same history again, of each experiment.
 @lru_cache(maxsize=64)
 def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
     """Elastic strain (n,), read-only, of the bytes of strains (n,), see `elastic_strain`."""
@@ -98,7 +98,7 @@ def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
         return hardening * e + (1.0 - hardening) * e * (-math.expm1(-x) / x if x else 1.0)
 
     found = []
-    # Where the way turned, in pairs of strain and elastic strain, as far as the material remembers.
+    # Turning points, in pairs of strain and elastic strain, as far as the material remembers.
     turns = [(0.0, 0.0)]
     last, elastic, rising = 0.0, 0.0, True
     for e in np.frombuffer(strain).tolist():

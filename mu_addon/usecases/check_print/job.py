@@ -67,7 +67,7 @@ class Job:
                 "layers",
                 f"give up to {MOST_LAYERS} heights above the part's lowest point, in mm, from 0 on",
             )
-        # What is no part must be refused before a folder is opened.
+        # An invalid part must be refused before a folder is opened.
         _ = self.stl_surface
 
     @cached_property

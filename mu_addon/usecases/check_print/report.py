@@ -39,7 +39,7 @@ FILES = {
 COLORS = {"error": (0.75, 0.05, 0.10), "warning": (0.95, 0.55, 0.0)}
 GREY = (0.66, 0.70, 0.76)
 MOST_ROWS = 12
-# Layers that are drawn where none was asked for.
+# Number of layers drawn by default.
 LAYERS = 12
 
 
@@ -242,7 +242,7 @@ def layer_pictures(found: Sequence[Slice]) -> str:
             blue = plots.BY_LENGTH[3]
             for ring in section.open_chamber:
                 axes.add_patch(PathPatch(Outline(np.vstack([ring, ring[:1]]), closed=True), fc=blue, lw=0))
-            # Holes last, filled: what stands in them is material again.
+            # Holes last, filled: material may stand in them.
             for ring in sorted(section.outlines, key=lambda ring: abs(signed_area(ring)), reverse=True):
                 edge = Outline(np.vstack([ring, ring[:1]]), closed=True)
                 color = GREY if signed_area(ring) > 0 else blue

@@ -63,7 +63,7 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
     write_json(folder / "check.json", as_plain(job, found, mended))
     context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress, mended)
-    # Before the error of a part that must not be printed: that is the answer, and no reason to leave early.
+    # Before the error of a part that must not be printed: that is the result, and no reason to leave early.
     context.write_report()
     context.report = None
     errors = [f for f in found.findings if f.severity == "error"]

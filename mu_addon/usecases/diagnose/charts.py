@@ -17,7 +17,7 @@ from .words import readable
 
 Array = np.ndarray[Any, Any]
 
-# What an experiment of a kind is drawn against.
+# Column against which an experiment of a kind is drawn.
 AXES = {
     "unit_pressure": ("time_s", "time [s]"),
     "pressure_step": ("time_s", "time [s]"),

@@ -96,7 +96,7 @@ def _of_a_unit(
                     unit, experiments, settings, cache, lambda _, share: progress.update(share)
                 )
             found[blocked_force.KIND] = blocked_force.BlockedForce(held, experiments)
-    # Where and what to do, on further lines, is of a simulation that nobody asked for.
+    # Location and remedy on further lines belong to a simulation that nobody asked for.
     left_out = [str(warning.message).partition("\n")[0] for warning in caught]
     for words in left_out:
         progress.warning(words, "unit")

@@ -17,17 +17,17 @@ from .remedies import what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
-# Names of experiments and specimens that are of a rigid chamber, and what to ask for where one is there.
+# Names of experiments and specimens with a rigid chamber, and the request that replaces one for it.
 _RIGID = re.compile(r"rigid|control|blank|alumin|metal|steel|plug", re.IGNORECASE)
 _INSTEAD = {
     "the same hold with a plug of metal in the unit's place": "the same hold with soapy water on its joints",
     "a longer hold, and the same in a rigid chamber of that volume": "a hold ten times as long",
 }
-# Share of a misfit from which on what takes it is worth a sentence.
+# Least share of a misfit for an explanation to be reported.
 LEAST_SHARE = 0.1
-# So many intervals are a table.
+# Number of intervals from which a table is used.
 TABLE = 6
-# Most measurements that are proposed for what the data cannot show.
+# Most proposed measurements for effects that the data cannot show.
 MOST_SHOWN = 3
 
 
@@ -95,7 +95,7 @@ def _slipped(verdict: Verdict, cause: Cause) -> str:
     clock = record["time_s"]
     if second <= clock[0]:
         return f"{', '.join(words)}, before {record.name}"
-    # When between two samples it was, no record tells.
+    # Its moment between two samples is unknown.
     half = 0.5 * float(np.median(np.diff(clock)))
     low, high = verdict.intervals.get(key, (math.nan, math.nan))
     ends = between(second - values[key] + low - half, second - values[key] + high + half)

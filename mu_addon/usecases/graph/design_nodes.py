@@ -32,7 +32,7 @@ from .parts import (
 STACK = Stack()
 """Values of the steps of every tree in this process."""
 DESIGN, UNIT = "Design", "Unit"
-# Fields of `StepInputs` that are set at the first step which depends on them.
+# Fields of `StepInputs`, set at the first step that depends on them.
 _CHOSEN = {
     "path": setting("path", "", "path of the waveguide, alpha1 and on; empty: none"),
     "quality": Setting(QUALITY),

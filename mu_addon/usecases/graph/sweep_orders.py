@@ -22,7 +22,7 @@ from ..simulate_and_place.settings import STAGES
 from .parts import Design, refuse_body
 from .sweep_nodes import GOALS
 
-# No file is named by such a plan: where it would lie decides nothing, and is the same wherever it is made.
+# Such a plan names no file: its folder decides nothing, and is the same everywhere.
 _NOWHERE = Path("/")
 
 
@@ -76,7 +76,7 @@ def _plan_of(call: Call) -> Plan:
             "leave one of them out, or vary another parameter",
         )
     variables = tuple(variable(name, dict(table), call.node) for name, table in ranges)
-    # A setting that is wrong for every point is told before any work.
+    # A setting that is wrong for every point is reported before any work.
     job_with(tables, call.node, unit=design.unit, protocol=protocol, workers=1)
     return Plan(
         inputs=Inputs(design.unit, protocol, tables),

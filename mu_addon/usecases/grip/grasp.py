@@ -38,7 +38,7 @@ Array = np.ndarray[Any, Any]
 
 # Halves of fingers that touch one cube.
 HALVES = 4
-# A cube comes from so far below its place, in sides of its own.
+# Distance below its place, in sides, from which a cube comes.
 COMES_FROM = 1.5
 # The balance of weight and friction is found to this share of the weight, with so many tries.
 BALANCE = 1e-3
@@ -368,7 +368,7 @@ def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cub
             try:
                 found, force = carried(states[-1], way)
             except ConvergenceError:
-                # The tips snap off the cube: what they carried until then is what they carry.
+                # The tips snap off the cube: their load until then is the capacity.
                 break
             obstacle.commit(found.u)
             pulls.append((way, force))

@@ -12,7 +12,7 @@ from ...report import charts
 from ...report.html import facts_table, figure, note, page, table
 from .understood import Understood
 
-# What is drawn against what, the first that is there.
+# Axes of the chart, the first pair that is present.
 _PICTURES = (
     ("displacement_mm", "force_N"),
     ("strain", "stress_kPa"),

@@ -15,7 +15,7 @@ from ...lab_files.source import Sheet, read_sheets
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
-# Keys that answer a question or change what was concluded; others are a slip of the pen.
+# Keys that answer a question or change a conclusion; others are mistakes.
 KEYS = (
     "kind",
     "mode",

@@ -199,7 +199,7 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
         minimize=_words(document, "minimize", where),
         maximize=_words(document, "maximize", where),
     )
-    # A setting that is wrong for every point is told before any work, and not as many failures.
+    # A setting that is wrong for every point is reported before any work, and not as many failures.
     job_with(tables, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
     for v in variables:
         if v.name == FILE:

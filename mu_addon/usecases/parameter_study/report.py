@@ -19,7 +19,7 @@ from .sensitivity import Effect, main_effect, pareto_front
 
 Array = np.ndarray[Any, Any]
 
-# Figures whose effects are shown where none are named.
+# Figures whose effects are shown by default.
 USUAL = ("angle_range_deg", "mass_g", "J_hat_mm volume_fraction", "J_hat_mm intersect", "J_hat_mm lattice")
 # Fewer points say nothing about an effect.
 FEWEST = 4

@@ -31,7 +31,7 @@ from .settings import ADD, GRID, WORKERS
 
 Array = np.ndarray[Any, Any]
 
-# Columns after the figures: what a point took, and why it failed.
+# Columns after the figures: a point's cost, and why it failed.
 LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
 # Seconds between two writings of the table.
 EVERY_S = 10.0

@@ -50,7 +50,7 @@ class Variable:
             return min(self.low + int(u * (self.high - self.low + 1)), self.high)
         width = self.high - self.low
         found = self.low * (self.high / self.low) ** u if self.log else self.low + u * width
-        # Digits that mean nothing would only be in the way of a reader.
+        # Meaningless digits would only disturb a reader.
         return float(f"{found:.8g}")
 
     @property

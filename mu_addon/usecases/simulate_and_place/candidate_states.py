@@ -75,8 +75,8 @@ class CandidateSolver:
             *job.effects.parts,
         )
         distinct = in_MPa(np.unique(pressure_kPa))
-        # What is solved whatever comes of it; the rest only where these do not tell enough. A printed
-        # candidate that is followed from rest to an extreme pressure has those before it for nothing.
+        # States that are always solved; the rest only if these do not suffice. A printed candidate followed
+        # from rest to an extreme pressure passes those before it.
         certain = self._rounds(distinct)[: 1 if mesh.resolved else 2]
         self._certain = {float(distinct[i]) for pair in certain for i in pair}
         self._passed: list[State] = []

@@ -49,7 +49,7 @@ def compare(runs: Sequence[Run]) -> list[Row]:
     """Inputs in which runs differ, then bending angles, best path, J and seconds of each."""
     rows = [row for row in _inputs(runs) if len(set(row.values)) > 1]
     met = [{p for p, _ in run.angles} for run in runs if run.angles]
-    # One that was stopped has not been everywhere: compared is where each one was.
+    # A stopped run has not reached every pressure: compared are those that both have.
     pressures = sorted(set.intersection(*met) or set.union(*met)) if met else []
     for p in (pressures[0], pressures[-1]) if len(pressures) > 1 else pressures:
         angles = [dict(run.angles).get(p) for run in runs]
@@ -70,12 +70,12 @@ def _inputs(runs: Sequence[Run]) -> list[Row]:
         groups = [getattr(run.unit, section.section) for run in runs]  # type: ignore[attr-defined]
         for d in describe(section):
             values = tuple(_text(getattr(group, d.name)) for group in groups)
-            # Its name ends with its unit, which stands in a column of its own.
+            # Its name ends with its unit, which has a separate column.
             bare = d.name.removesuffix("_" + d.unit.replace("/", "_")) if d.unit else d.name
             rows.append(Row(bare.replace("_", " "), d.unit, values, True))
 
     for what, stage, *keys in _SETTINGS:
-        # A stage that one of them has not is told by its job.
+        # A stage that one of them lacks is shown by its job.
         if not all(stage in run.tables for run in runs):
             continue
         rows.append(Row(what, "", tuple(_text(_setting(run, stage, keys)) for run in runs), True))
@@ -87,7 +87,7 @@ def _setting(run: Run, stage: str, keys: Sequence[str]) -> Any:
     found: Any = run.tables.get(stage, {})
     for name in keys:
         found = found.get(name) if isinstance(found, dict) else None
-    # Of a file its hash tells whether it differs, and nothing more.
+    # The hash of a file shows a difference, and nothing more.
     return found[:8] if keys[-1].endswith("_sha256") and isinstance(found, str) else found
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-# By so much the gap is off at 1.0x at the contact pressure expected, and friction gives before it slides.
+# Error of the gap at 1.0x at the expected contact pressure, and slip at which friction slides.
 DEPTH_mm = 0.05
 # The contact pressure in MPa, and how often faces are halved: contact is felt at their points. Faces of a
 # homogenised envelope are some 15 mm long; struts bear on few small places.

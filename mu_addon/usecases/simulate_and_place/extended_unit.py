@@ -20,7 +20,7 @@ from ..diagnose.words import readable
 from .named_effects import NAMES, NamedEffects, law_within
 
 Values = Mapping[str, Fitted]
-# A unit with a value in it, and what changed in words.
+# A unit with a value in it, and the changes in words.
 Put = Callable[[Unit, float], tuple[Unit, str]]
 
 # Effects that the unit has parameters for.
@@ -29,7 +29,7 @@ _DESCRIPTIONS = {
     "skin_cure": "a skin of {:.3g} mm times the excess of its modulus over the core's",
     "wall_thickness": "walls are {:.3g} times as thick as drawn",
 }
-# Effects that a simulation is told of otherwise.
+# Effects that a simulation gets otherwise.
 _ELSEWHERE = {
     "contact": "obstacles are given with --obstacle",
     "mesh_error": "a finer mesh is given with --refine",

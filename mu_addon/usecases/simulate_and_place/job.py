@@ -76,30 +76,30 @@ class Job:
     mesh_check: bool = MESH_CHECK.field()
     paths: str = PATHS.field()
     limits: Limits = attrs.field(factory=Limits)
-    # What the resin does to light, for the signal beside each path's disturbance.
+    # Optical constants of the resin, for the signal beside each path's disturbance.
     optics: Optics = attrs.field(factory=Optics)
     most_checks: int = CHECKS.field()
     # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
     lattice: Effective | None = None
-    # A sound body that takes the place of the lattice's box.
+    # A sound body that replaces the lattice's box.
     body: Body | None = None
     # Rigid bodies that the unit may touch, fixed in its frame.
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
-    # What measured data named beside what the unit has parameters for, and the direction of gravity.
+    # Effects named by measured data beyond the unit's parameters, and the direction of gravity.
     effects: NamedEffects = attrs.field(factory=NamedEffects)
-    # Whether walls and struts of a resolved unit keep apart, at a cost of several times the time.
+    # Self-contact of a resolved unit's walls and struts, at several times the cost.
     self_contact: bool = SELF_CONTACT.field()
     self_friction: float = SELF_FRICTION.field()
-    # How linear systems are solved: within their tolerance it decides nothing.
+    # Linear solver: within its tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)
-    # What is run of it: the first, the first two or all.
+    # Stages to run: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
     # Name of a path along which the unit with a waveguide is built, too; decides no figure.
     path: str = attrs.field(default="", validator=attrs.validators.instance_of(str))
 
     def __attrs_post_init__(self) -> None:
         if self.path:
-            # Only its name is kept: an unknown one must not be met after the solid was built.
+            # Only its name is kept: an unknown one must be found before the solid is built.
             window(self.unit, self.path)
         if self.mesh.resolved:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 TABLE = "signals.csv"
-# Of what is read, as a share of the light: a photodiode and a 10 bit converter.
+# Noise of a reading, as a share of the light: a photodiode and a 10 bit converter.
 NOISE = 0.005
-# How much the curvature of one cell of the backbone varies, 1/mm: a fifth of the unit's at 40 degrees.
+# Variation of the curvature of one cell of the backbone, 1/mm: a fifth of the unit's at 40 degrees.
 SPREAD = 0.002
 _CHECKS = 5
 
@@ -51,7 +51,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
     with study.progress.stage("light", expected_s=10.0):
         law = cached_law(unit.printed, optics, study.cache, study.progress.update)
         states = study.trajectory.solved
-        # What no pressure acts on comes first, whether or not a sample meets it.
+        # The state without pressure comes first, whether or not a sample meets it.
         still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
         displacements = [still, *(s.u for s in states)]
         angle = np.array([study.bending_angle_deg(u) + 0.0 for u in displacements])

@@ -32,7 +32,7 @@ REFERENCE = Parameter("reference_kPa", "kPa", 0.01, 1e4, 1.0, (), "the largest p
 _LAWS = ("anisotropy", "strain_stiffening", "tension_compression_asymmetry")
 # The other effects change the unit that is meshed, or the mesh.
 STATIC = tuple(name for name, e in EFFECTS.items() if e.materials or e.model or e.load)
-# What acts in time: the pressure at which the unit without them would stand, by the evidence's own rules.
+# Effects in time: by the effective pressure, with the evidence's own rules.
 _OF_UNIT = (
     "line_lag",
     "leak",
@@ -42,7 +42,7 @@ _OF_UNIT = (
 )
 IN_TIME = {e.name: e for e in TIMED if e.name in _OF_UNIT}
 NAMES = (*STATIC, *_OF_UNIT)
-# Of each in a few words, its size included.
+# Each in a few words, its size included.
 _DESCRIPTIONS = {
     "gravity": "solid parts have a density of {:.4g} kg/m³",
     "strain_stiffening": "the wall stiffens at large stretch, c2/c1 = {:.3g}",

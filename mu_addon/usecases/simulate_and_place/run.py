@@ -28,7 +28,7 @@ def simulate_and_place(job: Job, folder: Path, context: RunContext) -> Study:
 def run_stages(study: Study) -> None:
     """Every stage of a study's job, in the order they need each other."""
     job = study.job
-    # An unknown path, or none in the whole lattice, is found out before an hour's work, not after.
+    # An unknown path, or an empty search of the lattice, is found before an hour's work, not after.
     path = window(job.unit, job.path) if job.path else None
     if job.paths == "graph" and "place" in job.stages:
         chains_within(job)

@@ -67,9 +67,9 @@ from .study_file import LAYOUT, NAME
 
 Array = np.ndarray[Any, Any]
 
-# Figures of summary.json that tell that a stage was run.
+# Figures of summary.json by which a finished stage is recognised.
 _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
-# What a study writes, with as much to spare: so much anyway, and so much a node and distinct pressure.
+# Disk space of a study, with a margin: a constant, and a part for each node and distinct pressure.
 _BYTES = {"interactive": 30_000_000, "export": 150_000_000}
 _BYTES_A_NODE = {"simulate": 300, "place": 1000}
 # With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
@@ -78,7 +78,7 @@ HOMOGENISED = (
     "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
     "motion matters, choose the fidelity resolved."
 )
-# A coarser twin of the mesh, to tell how far the mesh moves a ranking.
+# Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
 
 
@@ -216,7 +216,7 @@ class Study:
 
     def _mesh(self, settings: MeshSettings) -> Mesh:
         settings = self.job.mesh_settings(settings)
-        # Only the shape: what it is made of, or called, leaves a mesh as it is.
+        # Only the shape: material and name do not change a mesh.
         shape = attrs.evolve(self.job.unit, name="shape", material=Material(), wall=Wall())
         body = [] if self.job.body is None else [self.job.body.hash]
         name = key(shape.hash(), attrs.astuple(settings), self.job.mesher, *body)
@@ -238,7 +238,7 @@ class Study:
         fallback = [w for w in caught if issubclass(w.category, MeshingWarning)]
         for warning in fallback:
             self.warn(str(warning.message))
-        # A stand-in's mesh is kept by its mesher; here it would pass for the one asked for.
+        # A substitute's mesh is cached by its mesher; here it would pass for the one asked for.
         if not fallback:
             arrays = {f: getattr(mesh, f) for f in fields}
             self.cache.put("mesh", name, {**arrays, "symmetry": np.array(mesh.symmetry, dtype="U1")})
@@ -291,7 +291,7 @@ class Study:
     def _reached(self, state: State) -> None:
         self.states.append(state)
         if not (self.job.in_time or self.job.effects.in_time):
-            # At once: a run that is killed has said how far it came.
+            # At once, so that a killed run leaves its progress.
             angles = self.context.summary.setdefault("angle_deg", {})
             angles[f"{state.pressure_kPa:.6g}"] = self.bending_angle_deg(state.u)
         if self._ahead is not None:
@@ -439,7 +439,7 @@ class Study:
         ]
         head = ["time_s", "pressure_kPa", "angle_deg"]
         if self.job.effects.in_time:
-            # The pressure at which the unit without the effects in time stands so.
+            # The effective pressure of the unit without the effects in time.
             head.append("effective_kPa")
         write_csv(self.folder / "angle.csv", head, [row[: len(head)] for row in rows])
         # Of a pressure met twice, what it was the first time.
@@ -675,7 +675,7 @@ class Study:
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         time = np.arange(len(chosen), dtype=float)
         if self.job.in_time:
-            # What contact or wall remembers is of the whole protocol.
+            # The history of contact or wall is of the whole protocol.
             time, chosen = self.job.protocol.sample(self.job.times)
             instants = list(range(len(time)))
         with self.progress.stage("mesh check"):

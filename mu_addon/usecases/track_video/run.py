@@ -431,7 +431,7 @@ def track_into(
     with context.progress.stage("track"):
         found = followed(clip, bench, pressure, follow)
         file = f"{file_stem(name)}.csv"
-        # What `diagnose` could not read must not be met once the folder is there.
+        # Data that `diagnose` could not read must be found before the folder is there.
         tried(_block(name, file, bench), file, _table(found, bench))
     context.open_folder(folder)
     context.console_summary = console_summary

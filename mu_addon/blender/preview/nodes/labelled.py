@@ -35,7 +35,7 @@ def build(tree, tube_group) -> None:
     painted = w.node(
         "GeometryNodeSetMaterial", Geometry=turned.outputs["Geometry"], Material=w.given("Material")
     )
-    # Where a name is drawn over the viewport, the text is for renders.
+    # Names are drawn over the viewport; the text is for renders.
     rendered = w.node("FunctionNodeBooleanMath", {"operation": "NOT"})
     tree.links.new(w.node("GeometryNodeIsViewport").outputs[0], rendered.inputs[0])
     seen = w.node("FunctionNodeBooleanMath", {"operation": "OR"})

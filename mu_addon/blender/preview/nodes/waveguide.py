@@ -41,8 +41,8 @@ def build(tree) -> None:
     link_radius(tree, sweep, curve, diagonal)
     bar = w.node("GeometryNodeSetMaterial", Geometry=sweep.outputs["Mesh"], Material=w.given("Material"))
 
-    # The stretch that holds the wells: whole pitches, midway along each curve, half a pitch or more from its
-    # ends. Normals are kept from the whole curve, about which a part of it may turn otherwise.
+    # The part with the wells: whole pitches, centred on each curve, half a pitch or more from its ends.
+    # Normals are captured from the whole curve, since those of a part may differ.
     length = w.node("GeometryNodeSplineLength").outputs["Length"]
     gaps = w.math("FLOOR", w.math("SUBTRACT", w.math("DIVIDE", length, w.given("Pitch")), 1.0))
     reach = w.math("MULTIPLY", w.math("MAXIMUM", gaps, 0.0), w.given("Pitch"))
@@ -61,7 +61,8 @@ def build(tree) -> None:
         Start=start,
         End=w.math("ADD", start, w.math("MAXIMUM", reach, 1e-3)),
     )
-    # A little less than the pitch: the count must not fall short by rounding; points spread evenly anyway.
+    # A little less than the pitch, so that rounding does not lower the count; points are spread evenly
+    # anyway.
     places = w.node(
         "GeometryNodeCurveToPoints",
         {"mode": "LENGTH"},
@@ -72,7 +73,7 @@ def build(tree) -> None:
     turn = w.node("FunctionNodeAxesToRotation", {"primary_axis": "Z", "secondary_axis": "X"})
     w.tree.links.new(places.outputs["Tangent"], turn.inputs[0])
     w.tree.links.new(normal.outputs["Attribute"], turn.inputs[1])
-    # Past the face that it opens, so that no two faces coincide.
+    # Beyond the face that it opens, so that no two faces coincide.
     over = w.math("MULTIPLY", w.given("Section"), 0.04)
     tall = w.math("ADD", w.given("Well Depth"), over)
     size = w.node("ShaderNodeCombineXYZ")
@@ -83,7 +84,7 @@ def build(tree) -> None:
     ):
         tree.links.new(value, size.inputs[name])
     box = w.node("GeometryNodeMeshCube", Size=size.outputs["Vector"])
-    # From the axis outward to the face, less half the well, and the little more.
+    # From the axis outward to the face, less half the well, plus the margin.
     lift = w.math("SUBTRACT", w.math("ADD", half, over), w.math("MULTIPLY", tall, 0.5))
     up = w.node("ShaderNodeCombineXYZ")
     tree.links.new(lift, up.inputs["X"])
