@@ -74,7 +74,7 @@ def _of(data: bytes, encoding: str, where: str) -> str:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         raise InputError(
-            f"the file begins like {encoding} and goes on otherwise", where, "export it again"
+            f"the file begins like {encoding} but continues otherwise", where, "export it again"
         ) from error
 
 

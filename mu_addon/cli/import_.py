@@ -42,7 +42,7 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument(
         "--dry-run",
         action="store_true",
-        help="Show what is understood, in the terminal and with pictures in import.html, and import nothing.",
+        help="Show how the files were read, in the terminal and in import.html, and import nothing.",
     )
     add_results(command)
 

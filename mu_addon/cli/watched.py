@@ -78,7 +78,7 @@ def _error(options: Any, folder: Path | None, stage: str, made: Sequence[str], c
     where = ", ".join(part for part in parts if part)
     again = "the same command" if folder is None else f"`run.py resume {folder}` or the same command"
     coarser = ", or a coarser mesh (--refine below 1)" if hasattr(options, "refine") else ""
-    memory = "raise that limit" if limit else "close other programs, or take a machine with more memory"
+    memory = "raise that limit" if limit else "close other programs, or use a machine with more memory"
     shared = ", --workers 1" if hasattr(options, "workers") else ""
     keep = "report it with log.ndjson" if folder is not None else "report it"
     return _Crashed(

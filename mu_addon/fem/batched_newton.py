@@ -60,7 +60,7 @@ class BatchedNewton:
             raise InputError(
                 "bodies with self-contact each have a tangent of their own pattern",
                 "BatchedNewton",
-                "solve each by itself, with Equilibrium",
+                "solve each separately, with Equilibrium",
             )
         self.model, self.materials, self.variants = model, materials, list(variants)
         self.settings = settings or NewtonSettings()

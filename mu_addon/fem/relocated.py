@@ -45,5 +45,5 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
 
 def _refused(blocks: Array) -> Array:
     raise InputError(
-        "a relocated body with other ties has no tangent", "mesh", "make a model of the mesh anew"
+        "a relocated body with other ties has no tangent", "mesh", "make a new model of the mesh"
     )

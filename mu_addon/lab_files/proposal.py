@@ -190,7 +190,7 @@ class _Proposing:
         one = self.block.columns[k]
         if one.quantity == "count":
             return "no quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
-        return f"what it holds is not known; column.{one.name}=QUANTITY says it"
+        return f"its quantity is not known; answer with column.{one.name}=QUANTITY says it"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
         """The columns of known quantity, in the units that are read, and the source of each."""

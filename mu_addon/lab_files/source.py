@@ -110,7 +110,7 @@ def _require_small(path: Path, data: bytes) -> None:
             unpacked = sum(entry.file_size for entry in archive.infolist())
     except zipfile.BadZipFile as error:
         raise InputError(
-            "the workbook is cut off, or is none", str(path), "export it again, or save it as CSV"
+            "the workbook is cut off, or is no workbook", str(path), "export it again, or save it as CSV"
         ) from error
     if unpacked > _MOST_UNPACKED:
         raise InputError(

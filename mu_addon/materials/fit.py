@@ -106,7 +106,7 @@ class Fit:
             raise InputError(
                 f"{self.form.title} as fitted is unstable: {self.instability()}",
                 "fit-material",
-                "take another law, or fit a narrower range",
+                "choose another law, or fit a narrower range",
             )
         return self.form.law, self.parameters
 

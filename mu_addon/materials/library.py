@@ -141,7 +141,7 @@ class Material:
                 raise InputError(
                     f"{self.name}: the {self.law.name} law is unstable {s.where()}",
                     "[law]",
-                    "take another law, or restrict its range to the strains that occur",
+                    "choose another law, or restrict its range to the strains that occur",
                 )
 
     def rows(self, count: int, factor: Any = 1.0) -> Array:

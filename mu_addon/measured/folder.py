@@ -88,7 +88,7 @@ def _as_run(experiments: Sequence[Experiment], path: Path) -> tuple[Experiment, 
         raise InputError(
             f"run_order is given to some experiments, and not to {without[0]!r}",
             str(path),
-            "give it to all of them, or to none where they stand in the order they were made",
+            "give it to all of them, or to none if they are listed in the order they were made",
         )
     return tuple(sorted(experiments, key=lambda e: e.run_order or 0.0))
 

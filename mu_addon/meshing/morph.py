@@ -177,4 +177,6 @@ def _laplace(nodes: Array, tets: Array, prescribed: Array) -> Harmonic:
 
 
 def _failed(why: str) -> MeshingError:
-    return MeshingError(f"the mesh of a unit cannot be moved: {why}", "unit", "mesh the other unit anew")
+    return MeshingError(
+        f"the mesh of a unit cannot be moved: {why}", "unit", "make a new mesh of the other unit"
+    )

@@ -35,7 +35,7 @@ def write_stopped_report(folder: Path, why: str) -> None:
         ("versions", "Versions", facts_table("program", "version", summary.get("versions", {}))),
     ]
     words = [
-        f"This run is partial: {why}. What follows was found until then, and is no end result.",
+        f"This run is partial: {why}. The results below are from before the stop, and are not final.",
         "The same command, or `run.py resume` with this folder, takes up what is finished.",
     ]
     whole = page(f"Stopped run: {folder.resolve().name}", "", note(words), "", sections)

@@ -151,5 +151,5 @@ class PrintedMorph:
 
 def _failed(why: str) -> MeshingError:
     return MeshingError(
-        f"the mesh of a printed unit cannot be moved: {why}", "unit", "mesh the other unit anew"
+        f"the mesh of a printed unit cannot be moved: {why}", "unit", "make a new mesh of the other unit"
     )

@@ -247,8 +247,8 @@ def asked_to_stop(number: int, folder: Path | None) -> MuError:
     """Error for a run that was asked to stop by a signal, SIGINT or SIGTERM."""
     where = f"finished results are in {folder}" if folder else ""
     if number == signal.SIGTERM:
-        return _Terminated("cancelled", where, "run it again: it goes on from there")
-    return _Interrupted("stopped by Ctrl-C", where, "run it again: it goes on from there" if folder else "")
+        return _Terminated("cancelled", where, "run it again: it continues from there")
+    return _Interrupted("stopped by Ctrl-C", where, "run it again: it continues from there" if folder else "")
 
 
 def has_ended(folder: Path) -> bool:
@@ -306,7 +306,7 @@ def _stop(context: RunContext, error: MuError) -> None:
         if isinstance(error, _Interrupted) and context.report is not None and context.wants_report:
             with suppress(MuError):
                 context.progress.warning(
-                    "stopping: the report shows what was found so far",
+                    "stopping: the report shows the results so far",
                     what_to_do="press Ctrl-C again for a short one",
                 )
         context.progress.error(error)

@@ -100,7 +100,9 @@ def _value(hint: Any, value: Any, where: str) -> Any:
     if hint in (float, int, str, bool) and type(value) is hint:
         return value
     words = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
-    raise InputError(f"{value!r} does not fit", where, f"give {words.get(hint, 'what a run writes there')}")
+    raise InputError(
+        f"{value!r} does not fit", where, f"give {words.get(hint, 'the value that a run writes there')}"
+    )
 
 
 def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:

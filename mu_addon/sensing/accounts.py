@@ -126,7 +126,7 @@ class Accounts:
         shown = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in seen)
         if shown < _TEXT * len(seen):
             return (
-                "what comes is noise: neither text nor frames, as with a wrong baud rate",
+                "the input is noise: neither text nor frames, as with a wrong baud rate",
                 "give the rate of the device's Serial.begin(...) by --baud (9600, 57600, 115200, ...), "
                 "and check the wiring and the port",
             )
@@ -135,6 +135,6 @@ class Accounts:
         first = self._first_line or next((text for line in whole if (text := text_of(line))), "")
         quoted = f": the first line is {first[:80]!r}, in which {why_unread(first)}" if first else ""
         return (
-            f"what comes is text in no format that is known{quoted}",
+            f"the input is text in an unknown format{quoted}",
             "send `label:value` pairs, CSV, JSON lines or frames (docs/guide/bench.md), or try another port",
         )

@@ -34,5 +34,5 @@ def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -
     raise InputError(
         f"the measured data are not those that the run was made with: {', '.join(other[:3])}",
         str(measured.folder),
-        "put those back, or give these a folder of results of their own",
+        "put those back, or give these a separate folder of results",
     )

@@ -267,7 +267,7 @@ def write_protocol(course: Course, path: Path) -> Path:
         raise InputError(
             f"the experiment begins at {pressure[0]:.3g} kPa",
             "",
-            "a simulation begins at rest: take an experiment that does, too",
+            "choose an experiment that begins at rest, as a simulation does",
         )
     pressure[0] = 0.0  # gauge noise
     write_csv(path, ("time_s", "pressure_kPa"), zip(time.tolist(), pressure.tolist(), strict=True))

@@ -77,7 +77,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         ),
         "cube_mm": FloatProperty(
             name="Cube",
-            description="Side of the cube that is grasped; it stands in the middle between the tips",
+            description="Side of the grasped cube, in the middle between the tips",
             subtype=MILLIMETRES,
             default=25.0,
             min=1.0,

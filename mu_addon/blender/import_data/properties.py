@@ -23,7 +23,7 @@ class MU_PG_import_answer(bpy.types.PropertyGroup):
     answered: BoolProperty(options={"HIDDEN"})
     value: StringProperty(
         name="Answer",
-        description="What the file does not say",
+        description="Open questions of the file",
         search=_offered,
         search_options={"SORT", "SUGGESTION"},
     )

@@ -89,7 +89,7 @@ class MU_MT_jobs(bpy.types.Menu):
         self.layout.separator()
         going = sum(map(start_child.goes_on, listed()))
         words = (
-            f"When Blender is closed {going} of them go on" if going else "They end when Blender is closed"
+            f"When Blender closes {going} of them continue" if going else "They end when Blender is closed"
         )
         self.layout.label(text=words, icon="INFO")
         kept = bpy.context.preferences.addons.get(start_child.PACKAGE)

@@ -20,7 +20,7 @@ FILES = {"report": "report.html", "log": "log.ndjson", "errors": f"{OWN_FOLDER}/
 RUN_FILES = [
     ("report", "Report", "Report of the run, in the browser"),
     ("log", "Log", "Every message of the run, as a text in Blender"),
-    ("errors", "Errors", "What the process wrote to its error output, as a text in Blender"),
+    ("errors", "Errors", "The process's error output, as a text in Blender"),
     ("folder", "Folder", "Folder of the run"),
 ]
 """Files of a run that can be opened, as items of a property."""

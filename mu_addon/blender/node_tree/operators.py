@@ -88,7 +88,7 @@ class MU_OT_tree_new(bpy.types.Operator):
 
     template: EnumProperty(
         name="Template",
-        description="What the tree holds at first",
+        description="Initial nodes of the tree",
         items=lambda self, context: _items(),
     )
 

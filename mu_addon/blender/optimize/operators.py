@@ -20,7 +20,7 @@ LONGEST_TITLE = 80
 _LIST = EnumProperty(
     name="List",
     description="Which list",
-    items=[("targets", "Targets", "What the unit shall do"), ("freedoms", "Freedoms", "What may change")],
+    items=[("targets", "Targets", "Targets of the unit"), ("freedoms", "Freedoms", "What may change")],
 )
 
 

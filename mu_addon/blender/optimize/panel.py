@@ -90,7 +90,7 @@ def _targets(layout, props) -> None:
     """Draw a box for each target: the quantity, where it is read, and its goal."""
     _head(layout, "The Unit Shall Have", "targets")
     if not props.targets:
-        wrapped(layout, "Press + to say what is asked for: an angle at a pressure, say", "INFO")
+        wrapped(layout, "Press + to add a target, such as an angle at a pressure", "INFO")
     for index, target in enumerate(props.targets):
         box = layout.box()
         row = box.row(align=True)
@@ -193,7 +193,7 @@ def _proposed(layout, proposed) -> None:
     for text in proposed.changes:
         wrapped(column, labelled(text), "FORWARD")
     if proposed.reasons:
-        column.label(text="What moved each target most:")
+        column.label(text="Largest influence on each target:")
     for text in proposed.reasons:
         wrapped(column, labelled(text), "BLANK1")
 

@@ -57,7 +57,7 @@ KINDS = [
     ("deviation", "J of a Path", "Mean deviation that the sensor along a path causes, in mm"),
     ("sensor_slope", "Slope of the Sensor", "Relative change of the light per degree, along a path"),
     ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),
-    ("printable", "Printable", "No error in the print check of what is proposed"),
+    ("printable", "Printable", "No error in the print check of a proposed unit"),
 ]
 AT_PRESSURE = ("angle", "tip_force", "tip_position", "stretch", "safety", "air_volume", "walls_apart")
 OF_PATH = ("deviation", "sensor_slope")
@@ -72,7 +72,7 @@ ASKED |= {"curve": ("points", "tolerance"), "minimise": (), "maximise": ()}
 class MU_PG_target(bpy.types.PropertyGroup):
     """One target of a design: a quantity and its goal."""
 
-    kind: EnumProperty(name="Quantity", description="What is asked for", items=KINDS)
+    kind: EnumProperty(name="Quantity", description="Quantity of the target", items=KINDS)
     pressure_kPa: FloatProperty(
         name="At (kPa)",
         description="Gauge pressure in all chambers; negative: vacuum",
@@ -118,7 +118,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
     )
     ask: EnumProperty(
         name="Shall Be",
-        description="What is asked of the quantity",
+        description="Goal of the quantity",
         items=[
             ("low", "At Least", "Not less than a bound"),
             ("high", "At Most", "Not more than a bound"),
@@ -132,7 +132,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
     value: FloatProperty(name="Value", description="In the quantity's unit", default=20.0, precision=3)
     tolerance: FloatProperty(
         name="Within",
-        description="Tolerance: how far the value may be from what is asked",
+        description="Tolerance: allowed deviation of the value from the goal",
         default=1.0,
         min=1e-6,
         precision=3,
@@ -256,7 +256,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
 
     source: EnumProperty(
         name="Targets",
-        description="Where targets and freedoms stand",
+        description="Where targets and freedoms are given",
         items=[
             ("panel", "Listed Here", "Targets and freedoms of the lists below"),
             ("file", "In a File", "Those of a design.toml"),
@@ -273,7 +273,7 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
         description="The search starts from this unit in place of the one that the file names",
         default=True,
     )
-    targets: CollectionProperty(type=MU_PG_target, description="What the unit shall do")
+    targets: CollectionProperty(type=MU_PG_target, description="Targets of the unit")
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
     robust: blender_property(ROBUST)
     printed_struts: BoolProperty(

@@ -21,7 +21,7 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
     bl_label = "Choose Sensor Path"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` takes the waveguide out")
+    name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` removes the waveguide")
 
     @reports_errors
     def execute(self, context):

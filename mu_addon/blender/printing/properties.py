@@ -69,7 +69,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     formats: EnumProperty(
         name="Files",
-        description="What an export writes; each file is read back and compared",
+        description="Formats of an export; each file is read back and compared",
         items=[(*item, 1 << number) for number, item in enumerate(FORMATS)],
         options={"ENUM_FLAG"},
         default={"stl", "3mf"},

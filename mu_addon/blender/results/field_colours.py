@@ -53,7 +53,7 @@ class Field:
 
 
 FIELDS = (
-    Field("displacement_mm", "Displacement", "mm", "Distance from where the point is at rest", amount=True),
+    Field("displacement_mm", "Displacement", "mm", "Distance from the point's position at rest", amount=True),
     Field(
         "deviation_mm",
         "Deviation",

@@ -114,7 +114,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
         update=_again,
     )
     trouble: StringProperty(
-        name="Trouble", description="Why the motion could not be shown anew", options={"HIDDEN"}
+        name="Trouble", description="Why the motion could not be updated", options={"HIDDEN"}
     )
 
 

@@ -62,7 +62,7 @@ class MU_PG_run(bpy.types.PropertyGroup):
 
     key: StringProperty(options={"HIDDEN"})
     title: StringProperty(
-        name="Name", description="What you call this run; empty for what it is", get=_title, set=_rename
+        name="Name", description="Your name for this run; empty for a description", get=_title, set=_rename
     )
     starred: BoolProperty(name="Star", description="Mark this run, to find it again", get=_starred, set=_star)
 

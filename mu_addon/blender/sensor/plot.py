@@ -112,7 +112,7 @@ def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: flo
             at += blf.dimensions(0, f"{name}{now}")[0] + 18 * scale
         bottom = top + GAP * scale
     if session.frozen is not None:
-        write("plot frozen, recording goes on", left, bottom + 4 * scale, round(11 * scale))
+        write("plot frozen, recording continues", left, bottom + 4 * scale, round(11 * scale))
 
 
 def _least(values: Any) -> float:

@@ -30,7 +30,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
 
     source: EnumProperty(
         name="From",
-        description="Where the samples come from",
+        description="Source of the samples",
         items=[
             ("port", "Serial Port", "The sensor at a port of this computer"),
             ("simulated", "Simulated", "A sensor that is not there, bending by 45 degrees every 8 s"),
@@ -52,7 +52,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         options=BESIDE_BLEND_FILE,
     )
     speed: FloatProperty(
-        name="Speed", description="Times as fast as it was", default=1.0, min=0.01, max=100.0
+        name="Speed", description="Factor on its original speed", default=1.0, min=0.01, max=100.0
     )
     channel: StringProperty(
         name="Light",

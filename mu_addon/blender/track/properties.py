@@ -49,7 +49,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     marks: EnumProperty(
         name="Markers are",
-        description="What the markers look like",
+        description="Kind of markers",
         items=[
             (
                 "crosses",
@@ -63,7 +63,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
             ),
         ],
     )
-    base_1: _track("Base", "A marker that stands with the unit's base or its clamp")
+    base_1: _track("Base", "A marker fixed to the unit's base or its clamp")
     base_2: _track("Base, Other", "Another marker on the base; the farther apart, the better")
     base_1_mm: _place("Place of Base")
     base_2_mm: _place("Place of Base, Other")
@@ -99,7 +99,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     starts_s: FloatProperty(
         name="Starts at (s)",
-        description="What the clock of the pressure's record shows at the clip's first frame",
+        description="Time of the pressure's record at the clip's first frame",
         precision=3,
     )
     pressure: StringProperty(
@@ -117,7 +117,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     title: StringProperty(name="Experiment", description="Name of the experiment. Empty: the clip's")
     role: EnumProperty(
         name="Role",
-        description="What the experiment is for",
+        description="Use of the experiment",
         items=[
             (ROLES[0], "Fit", "The model may be fitted to it"),
             (ROLES[1], "Held Out", "Never touched before the verdict: it shows what the verdict gains"),

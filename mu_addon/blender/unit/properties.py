@@ -107,7 +107,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
     self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
     solver: EnumProperty(
         name="Solver",
-        description="What solves the linear systems; answers agree within its tolerance",
+        description="Solver of the linear systems; results agree within its tolerance",
         items=[
             ("auto", "Automatic", "Factorisation, unless a motion's factor does not fit into memory"),
             ("direct", "Factorisation", "The fastest as long as it fits into memory"),
@@ -117,7 +117,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
     )
     device: EnumProperty(
         name="Device",
-        description="What computes the finite elements",
+        description="Device that computes the finite elements",
         items=[
             ("auto", "Automatic", "A CUDA device from 200 000 unknowns on, where there is one"),
             ("cpu", "CPU", "The processor"),
@@ -150,9 +150,9 @@ class MU_PG_step(bpy.types.PropertyGroup):
     """One step of the design in a unit's stack; its name is the core's."""
 
     muted: BoolProperty(
-        name="Mute", description="Leave this step out: what it would change is passed on", update=_changed
+        name="Mute", description="Leave this step out: its input is passed on unchanged", update=_changed
     )
-    shown: BoolProperty(name="Show", description="Show what this step gives in the preview", update=_changed)
+    shown: BoolProperty(name="Show", description="Show this step's result in the preview", update=_changed)
 
 
 def title_property(noun: str):
@@ -180,7 +180,7 @@ class MU_PG_unit(bpy.types.PropertyGroup):
             name: PointerProperty(type=group, description=textwrap.shorten(group.__doc__ or name, 200))
             for name, group in GROUPS.items()
         },
-        "study": PointerProperty(type=MU_PG_study, description="What the next simulation is asked to do"),
+        "study": PointerProperty(type=MU_PG_study, description="Stages of the next simulation"),
         "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
         "step": IntProperty(name="Step", description="The step whose parameters are shown"),
         "path": StringProperty(

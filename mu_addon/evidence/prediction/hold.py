@@ -72,7 +72,7 @@ EFFECTS = (
     Effect(
         "leak",
         (
-            Parameter("loss_above_per_s", "1/s", 0.0, 0.5, 0.0, (1e-3, 0.01), "of what is above"),
+            Parameter("loss_above_per_s", "1/s", 0.0, 0.5, 0.0, (1e-3, 0.01), "of the excess over it"),
             Parameter("opens_kPa", "kPa", 0.0, 1000.0, 0.0, (30.0, 100.0), "relief valves, seams that part"),
         ),
         (KIND,),
@@ -133,7 +133,7 @@ EFFECTS = (
     Effect(
         "temperature_drift",
         (
-            Parameter("warmth", "", 0.0, 1.0, 0.0, (0.05,), "share of what compression without loss warms"),
+            Parameter("warmth", "", 0.0, 1.0, 0.0, (0.05,), "share of the warming by adiabatic compression"),
             Parameter("cools_s", "s", 0.5, 3600.0, 30.0, (10.0, 60.0), "to the temperature of the wall"),
         ),
         (KIND,),

@@ -46,7 +46,7 @@ BY_PEAK = (
 )
 # And one that saturates, by the distance below the largest strain over that strain.
 BY_SHARE = (
-    Parameter("lost", "", 0.0, 0.95, 0.0, (0.2,), "most that softening takes of the stress"),
+    Parameter("lost", "", 0.0, 0.95, 0.0, (0.2,), "largest share of the stress lost by softening"),
     Parameter("width", "", 0.02, 5.0, 0.4, (0.3,), "of the largest strain: m of Dorfmann and Ogden 2004"),
     Parameter("shape", "", 0.2, 3.0, 1.0, (1.0,), "Weibull's, of the spread of chains that give way"),
 )

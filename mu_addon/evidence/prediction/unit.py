@@ -248,7 +248,7 @@ TIMED = (
     Effect(
         "rate_independent_hysteresis",
         (
-            Parameter("share", "", 0.0, 0.6, 0.0, (0.1,), "share of the stiffness that friction bears"),
+            Parameter("share", "", 0.0, 0.6, 0.0, (0.1,), "share of the stiffness carried by friction"),
             Parameter("threshold_kPa", "kPa", 0.05, 30.0, 2.0, (0.7, 3.0, 9.0), "pressure at which it slips"),
         ),
         (KIND,),

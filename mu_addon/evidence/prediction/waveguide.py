@@ -29,7 +29,7 @@ EFFECTS = (
         "led_drift",
         (
             Parameter(
-                "settled", "", -2.0, 2.0, 0.0, (-0.05,), "logarithm of what the warm-up leaves of light"
+                "settled", "", -2.0, 2.0, 0.0, (-0.05,), "logarithm of the light's share after warm-up"
             ),
             Parameter("settling_s", "s", 1.0, 1e4, 100.0, (20.0, 200.0), "warming of lamp and driver"),
         ),

@@ -16,7 +16,7 @@ FILES = {
     "chain.toml": "inputs of this run; unit_N.toml and protocol.csv belong to it",
     "tip.csv": "pressures, place and rotation of the tip over time, with half widths of 95 % intervals",
     "joints.csv": "every joint at states that took no part in its fit",
-    "target.csv": "pressures that bring the tip to the target, where there is one",
+    "target.csv": "pressures that bring the tip to the target, if there is one",
     "chain.pvd": "motion of the units, for ParaView",
     "chain_*.png": "the chain at its start, most bent and at its end",
     "summary.json": "all results of this run as numbers",

@@ -103,7 +103,8 @@ def require_whole(mended: Repair, name: str) -> None:
         raise GateError(
             f"the repair is not unambiguous: {'; '.join(mended.remains)} (done before that: {done})",
             name,
-            "correct what remains where the part was made, or check it without --repair to see the places",
+            "correct the remaining faults in the program that made the part, or check it without "
+            "--repair to see the places",
         )
 
 

@@ -199,8 +199,8 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
             else:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
-        f"the noise of {column}, up to {sd:.2g}, was averaged out over straight stretches, and no effect is "
-        "named for what remains of it"
+        f"the noise of {column}, up to {sd:.2g}, was averaged out over straight stretches, and no "
+        "effect is named for the rest of it"
         for column, sd in noise.items()
     ] + [
         f"{column} was read in steps of {step:.2g}; the model is driven by lines from change to change"

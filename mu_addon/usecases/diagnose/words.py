@@ -223,7 +223,7 @@ def _asked(verdict: Verdict) -> str:
         at = f" The deviation is largest at: {places[0].where}." if places else ""
         first = places[0].where.partition(", ")[0] if places else ""
         which = first if first in {e.name for e in verdict.experiments} else "an experiment"
-        return f"Repeat {which} unchanged: what does not recur is not a model error.{at}"
+        return f"Repeat {which} unchanged: a deviation that does not recur is not a model error.{at}"
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
         return ""

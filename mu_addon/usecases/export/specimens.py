@@ -227,7 +227,7 @@ def _written(specimen: Specimen, folder: Path, resin: Material) -> dict[str, Any
 
 def _write_template(every: list[Specimen], folder: Path) -> None:
     """Write experiments.toml and CSV files of headers alone, so that only rows are missing."""
-    lines = ["# Fill in what was measured, delete what was not; see docs/guide/measure.md for every key."]
+    lines = ["# Fill in measured values, delete the others; see docs/guide/measure.md for every key."]
     for specimen in (s for s in every if s.kind):
         for letter in "ABC"[: specimen.copies]:
             name = f"{specimen.name}-{letter}"

@@ -44,7 +44,7 @@ def bench_nodes() -> tuple[Definition, ...]:
             "record",
             "Record",
             BENCH,
-            "so many seconds of the sensor on its serial port",
+            "seconds of the sensor on its serial port",
             outputs=(Output("recording", "recording", "its samples"),),
             settings=(
                 setting("port", "", "serial port, or usb:VID:PID; empty: the only USB one"),
@@ -112,8 +112,8 @@ def bench_nodes() -> tuple[Definition, ...]:
             (Output("data", "data", "an experiment of a unit under pressure"),),
             (
                 setting("pressure", "pressure_kPa", "channel of the gauge"),
-                setting("kPa_per_unit", 1.0, "what the channel is multiplied by", low=-1e6, high=1e6),
-                setting("zero", 0.0, "what the channel reads without pressure", low=-1e9, high=1e9),
+                setting("kPa_per_unit", 1.0, "factor on the channel", low=-1e6, high=1e6),
+                setting("zero", 0.0, "reading of the channel without pressure", low=-1e9, high=1e9),
                 setting("rate_hz", 10.0, "rows a second", unit="Hz", low=1e-3, high=1e5),
                 setting("name", "bench", "name of the experiment"),
                 setting("specimen", "A", "which specimen"),

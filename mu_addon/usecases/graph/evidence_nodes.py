@@ -84,7 +84,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
             "compare",
             "Compare",
             DATA,
-            "what differs between units, studies, grasps or diagnoses: a table, and charts",
+            "differences between units, studies, grasps or diagnoses: a table, and charts",
             (Input("items", COMPARED, "link two or more of one kind", many=True),),
             (Output("table", "table", "the comparison"),),
             make=_compared,
@@ -108,7 +108,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
             "a number from two",
             outputs=(Output("number", "number", "the result"),),
             settings=(
-                setting("operation", "add", "what is done with them", choices=_OPERATIONS),
+                setting("operation", "add", "the operation", choices=_OPERATIONS),
                 setting("a", 0.0, "the first", low=-1e9, high=1e9),
                 setting("b", 0.0, "the second", low=-1e9, high=1e9),
             ),

@@ -40,7 +40,7 @@ def page_of(found: Understood, name: str) -> str:
     sections = [(f"e{i}", p.name, _section(p)) for i, p in enumerate(found.proposals)]
     return page(
         f"Import into {name}",
-        "What was understood of the files",
+        "How the files were read",
         note(notes if open_questions else []),
         "",
         [*sections, ("left", "Left out", note(found.left_out))],

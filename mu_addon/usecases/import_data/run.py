@@ -152,7 +152,7 @@ def _quoted(text: str) -> str:
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
     """Lines on what was read, and on what is open in a dry run."""
-    lines = [*summary["understood"], f"what was understood, with pictures: {summary['report']}"]
+    lines = [*summary["understood"], f"how the files were read, with pictures: {summary['report']}"]
     if summary.get("dry_run"):
         lines += [f"open: {question}" for question in summary["questions"]] + [
             "dry run: nothing was imported"

@@ -43,8 +43,8 @@ def report(found: Optimised) -> str:
             ("front", "Front", _front(found)),
             ("units", "Proposed units", _units(found)),
             ("targets", "Targets and errors", _targets(found)),
-            ("why", "What changed and why", _why(found)),
-            ("sensitivity", "What a tenth of each freedom moves", _sensitivity(found)),
+            ("why", "Changes and reasons", _why(found)),
+            ("sensitivity", "Effect of a tenth of each freedom", _sensitivity(found)),
             ("inputs", "Inputs", _inputs(found)),
             ("versions", "Versions", facts_table("package", "version", package_versions())),
         ],
@@ -59,7 +59,7 @@ def _front(found: Optimised) -> str:
     html = ""
     if shown is not None:
         alt = f"{targets[shown[1]].name} against {targets[shown[0]].name} of all units computed."
-        words = "All units computed; squares are proposed. Dashed lines are what is asked."
+        words = "All units computed; squares are proposed. Dashed lines are the targets."
         html += figure(charts.front(found, *shown), words, alt)
     words = "Largest misfit of any target, in its tolerances: below 1 all are met."
     html += figure(charts.course(found), words, "Misfit by the number of units computed.")
@@ -151,7 +151,9 @@ def _why(found: Optimised) -> str:
         changed = "".join(f"<li>{escape(words)}</li>" for words in p.changes) or "<li>nothing</li>"
         moved = "".join(f"<li>{escape(words)}</li>" for words in p.reasons)
         html += f"<h3>Unit {p.place}</h3><ul>{changed}</ul>"
-        html += f"<p>What moved each target, by its slopes at this unit:</p><ul>{moved}</ul>" if moved else ""
+        html += (
+            f"<p>Influences on each target, by its slopes at this unit:</p><ul>{moved}</ul>" if moved else ""
+        )
     return html
 
 

@@ -144,13 +144,13 @@ def _too_much(child: Child, task: Task, peak_MB: float) -> dict[str, str] | None
         return {
             "what": f"the study took more than the {task.memory_MB} MB of memory that are allowed",
             "where": str(child.progress.get("stage", "at its start")),
-            "what_to_do": "raise memory_MB, or take a coarser mesh",
+            "what_to_do": "raise memory_MB, or use a coarser mesh",
         }
     if child.seconds > 60 * task.minutes:
         return {
             "what": f"the study took longer than the {task.minutes:g} minutes that are allowed",
             "where": str(child.progress.get("stage", "at its start")),
-            "what_to_do": "raise minutes, or take a coarser mesh",
+            "what_to_do": "raise minutes, or use a coarser mesh",
         }
     return None
 

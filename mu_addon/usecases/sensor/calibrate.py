@@ -127,7 +127,7 @@ def read_job(folder: Path) -> Job:
         raise InputError(
             "the samples are not those that the calibration was made with",
             ", ".join(map(str, data)),
-            "put those back, or calibrate these in a folder of their own",
+            "put those back, or calibrate these in a separate folder",
         )
     return job
 

@@ -131,7 +131,7 @@ def read_job(folder: Path) -> Job:
         raise InputError(
             "recording or calibration are not those that this was made with",
             f"{recording}, {calibration}",
-            "put those back, or measure these in a folder of their own",
+            "put those back, or measure these in a separate folder",
         )
     return job
 

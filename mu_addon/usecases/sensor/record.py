@@ -85,7 +85,7 @@ def record(job: Job, folder: Path, context: RunContext) -> Path:
         raise _Stopped(
             f"the recording was stopped {short:.1f} s before its end",
             str(place),
-            "evaluate again: it is recorded anew; what there is stays in that folder",
+            "evaluate again for a new recording; the existing one stays in that folder",
         )
     require_samples(status, place)
     return place

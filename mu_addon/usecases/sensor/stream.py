@@ -201,5 +201,5 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
         ", ".join(losses),
         *([f"colour codes (ANSI escape sequences) left out of {coloured} lines"] if coloured else []),
         *summary["complaint"],
-        *([f"what could not be read is in {REJECTS}"] if kept else []),
+        *([f"unreadable input is in {REJECTS}"] if kept else []),
     ]

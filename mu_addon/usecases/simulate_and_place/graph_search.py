@@ -91,8 +91,8 @@ def _stable(
     out = [in_kPa(s.pressure_MPa) for s in study.trajectory.solved if s.pressure_MPa not in kept]
     if out:
         study.warn(
-            f"{what_leaves} out {', '.join(f'{p:g}' for p in sorted(out))} kPa: there the unit is unstable "
-            "and would leave its bending plane by itself. Angles and J_hat there are those of a unit that is "
+            f"{what_leaves} out {', '.join(f'{p:g}' for p in sorted(out))} kPa: there the unit is "
+            "unstable and would leave its bending plane. Angles and J_hat there are those of a unit that is "
             "kept in its plane."
         )
     return found

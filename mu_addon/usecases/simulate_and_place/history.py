@@ -288,7 +288,7 @@ def label(run: Run, name: str, starred: bool) -> None:
             str(run.folder),
             f"give at most {LONGEST_NAME} characters on one line",
         )
-    text = toml_text({"name": name, "starred": starred}, "# What the user calls this run.")
+    text = toml_text({"name": name, "starred": starred}, "# The user's name for this run.")
     write_text(run.folder / LABEL, text)
 
 

@@ -117,7 +117,7 @@ class Job:
             raise InputError(
                 "the search of the whole lattice knows a unit whose wall remembers nothing",
                 "[wall], paths",
-                "rank the windows of anchors, or take an elastic law",
+                "rank the windows of anchors, or use an elastic law",
             )
         for name in ("anisotropy", "strain_stiffening"):
             if self.unit.wall.names and name in self.effects.values:

@@ -299,9 +299,7 @@ def _motion(r: ReportData) -> str:
     html = ""
     if len(r.angle_deg):
         low, high = float(r.pressure_kPa.min()), float(r.pressure_kPa.max())
-        why = (
-            "friction causes hysteresis" if r.contact or r.self_friction else "it depends on what was before"
-        )
+        why = "friction causes hysteresis" if r.contact or r.self_friction else "it depends on the history"
         html += figure(
             plots.angle_against_pressure(r.pressure_kPa, r.angle_deg),
             "Bending angle of the tip relative to the base, without a sensor; each dot is a converged state"
@@ -367,8 +365,8 @@ def _self_contact(r: ReportData) -> str:
             f"{lost:.3g} mJ over the protocol.</p>"
         )
     return html + table(
-        "What walls and struts press on each other with, without a sensor, how near they come, and where at "
-        "rest the pressure is largest; at a single node it depends on the mesh.",
+        "Contact force between walls and struts without a sensor, their least gap, and the position "
+        "at rest of the largest pressure; at a single node it depends on the mesh.",
         head,
         rows,
     )

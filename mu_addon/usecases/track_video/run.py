@@ -192,7 +192,7 @@ def _markers(
     for table in tables if isinstance(tables, list) else []:
         name = table.get("name") if isinstance(table, dict) else None
         if not isinstance(name, str) or not name or name in names:
-            raise InputError(f"a marker is named {name!r}", origin, "give each [[marker]] a name of its own")
+            raise InputError(f"a marker is named {name!r}", origin, "give each [[marker]] a different name")
         names.append(name)
         for key, value in table.items():
             if key not in OF_MARKER:

@@ -256,7 +256,7 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     for expected in (
         "No unit of 3 meets every target", "Stands in the way: mass", "Unit 1",
         "angle at 30 kPa: 18.25 ± 0.5 deg, asked:", "printable: yes", "Wall: 0.9 to 0.7123 mm",
-        "What moved each target most: angle at 30 kPa: Wall by",
+        "Largest influence on each target: angle at 30 kPa: Wall by",
     ):  # fmt: skip
         assert expected in texts, (expected, texts)
     assert "other parameters" not in texts
@@ -299,7 +299,7 @@ def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
 def test_the_panel_says_how_to_begin_what_is_entered_and_what_a_sign_means(tmp_path):
     root = add()
     root.mu_unit.study.folder = str(tmp_path)
-    assert "Press + to say what is asked for" in drawn()
+    assert "Press + to add a target" in drawn()
     first = target(root, "angle", ask="curve")
     assert "Press + for each parameter" in drawn()
     free(root, "chambers.wall_mm")
