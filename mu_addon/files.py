@@ -180,19 +180,23 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
             raise ValueError("the header claims what the archive does not hold")
 
 
-def write_npz(path: Path, arrays: Mapping[str, Any]) -> None:
+def write_npz(path: Path, arrays: Mapping[str, Any], packed: bool = True) -> None:
     """Write named `arrays` to `path`; equal arrays make equal bytes; raises OutputError.
 
-    They are compressed, unless so strongly that `read_npz` would refuse them.
+    packed: compress them, unless so strongly that `read_npz` would refuse them. Not what a window reads:
+    unpacking holds it up.
     """
     # Packed in memory: on a full disk an archive fails again when it is deleted, with a traceback.
-    packed = io.BytesIO()
-    np.savez_compressed(packed, **arrays)
-    if sum(np.asarray(array).nbytes for array in arrays.values()) > _most_unpacked(packed.tell()) // 2:
+    archive = io.BytesIO()
+    if packed:
+        np.savez_compressed(archive, **arrays)
+    if sum(np.asarray(array).nbytes for array in arrays.values()) > _most_unpacked(archive.tell()) // 2:
         # Long rows of equal numbers: `read_npz` would take it for one that was made to fill the memory.
-        packed = io.BytesIO()
-        np.savez(packed, **arrays)
-    write_bytes(path, packed.getbuffer())
+        packed = False
+    if not packed:
+        archive = io.BytesIO()
+        np.savez(archive, **arrays)
+    write_bytes(path, archive.getbuffer())
 
 
 def plain(value: Any) -> Any:

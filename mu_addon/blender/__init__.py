@@ -22,6 +22,7 @@ _MODULES = (
     "results.legend_object",
     "jobs.preferences",
     "jobs.start_child",
+    "jobs.prepared",
     "sensor.twin",
     "sensor.state",
     "sensor.properties",

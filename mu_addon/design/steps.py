@@ -154,6 +154,14 @@ class Stack:
             raise _unknown(name)
         return self._value(name, given, keys(given))
 
+    def keep(self, name: str, given: StepInputs, value: Any) -> None:
+        """Keep a step's value that was made elsewhere, in another process say."""
+        self._values[name][keys(given)[name]] = value
+
+    def has(self, name: str, given: StepInputs) -> bool:
+        """Whether a step's value is cached."""
+        return keys(given)[name] in self._values[name]
+
     def again(self, name: str, given: StepInputs) -> Any:
         """The value of a step, evaluated anew even if it is cached; earlier steps only where they are not.
 

@@ -18,6 +18,7 @@ from ..run.usecase import UseCase
 # Modules with `USE_CASE` by the first file of inputs, imported on demand.
 MODULES = {
     "study.toml": ".simulate_and_place.run",
+    "prepare.toml": ".prepare",
     "check.toml": ".check_print.run",
     "export.toml": ".export.run",
     "specimens.toml": ".export.specimens",

@@ -20,6 +20,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
 from mu_addon.usecases.check_print import job as check
 from mu_addon.usecases.diagnose import design_experiments
@@ -78,6 +79,7 @@ def jobs(folder):
     )
     yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
     yield specimens.Job(UNIT, resin)
+    yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)
     yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 2 / 3)
     yield homogenize.Job(UNIT, homogenize.resin_of(None, load_preset("mu-1.5x")), frictions=())
     yield grip.Job(

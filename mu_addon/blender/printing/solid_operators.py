@@ -76,9 +76,9 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
         root = unit_object.active_root(context)
         core = to_unit(root.mu_unit)
         target = Path(bpy.path.abspath(self.filepath))
-        write_stl(unit_object.solid_of(root, core, self.quality), target)
         if self.nodes:
             write_nodes(core, target.with_suffix(".txt"))
+        write_stl(unit_object.solid_of(root, core, self.quality, str(target)), target)
         self.report({"INFO"}, f"Written: {target}")
         return {"FINISHED"}
 

@@ -198,7 +198,7 @@ def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]
 
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    from ...usecases.export.job import LAYOUT, Job, resin_of
+    from ...usecases.export.job import LAYOUT, Job
     from ...usecases.export.print_offsets import compensation_offsets
 
     settings, path = root.mu_print, path_of(root, unit)
@@ -206,7 +206,7 @@ def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     offsets, origin = compensation_offsets(unit, source)
     return LAYOUT, Job(
         unit=unit,
-        resin=resin_of(None),
+        resin=None,
         path=window(unit, path) if path else None,
         path_name=path,
         formats=tuple(name for name, _, _ in FORMATS if name in settings.formats),
@@ -218,10 +218,9 @@ def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 
 def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    from ...usecases.export.job import resin_of
     from ...usecases.export.specimens import LAYOUT, Job
 
-    return LAYOUT, Job(unit, resin_of(None), _printer(root))
+    return LAYOUT, Job(unit, None, _printer(root))
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:

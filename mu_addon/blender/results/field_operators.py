@@ -8,8 +8,8 @@ from bpy.props import BoolProperty, EnumProperty
 from mathutils import Quaternion, Vector
 
 from ...errors import InputError
-from ...usecases.simulate_and_place.motion import CONTACT_PRESSURE, MODEL_A, SENSITIVITY
-from ..shared import viewports
+from ...usecases.simulate_and_place.motion import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
+from ..shared import updates, viewports
 from ..shared.operators import reports_errors
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -52,13 +52,18 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
         root = unit_object.active_root(context)
         motion = motion_parts.motion_of(root)
         name = whose(root, motion, self.field)
+        if self.field == motion_parts.DIFFERENCE:
+            run_motions.apart(
+                root, motion, name, next(iter(REGIONS)), bool(root.mu_motion.cut and motion.halved)
+            )
         for pair in motion_parts.shown(root):
             if pair != (name, motion_parts.MESH):
                 motion_parts.hide(root, *pair)
         settings = root.mu_motion
-        settings.field, settings.on_unit = self.field, True
+        with updates.paused():
+            settings.field, settings.on_unit = self.field, True
         # They would cover the colours, at the position of the unit at rest.
-        root.mu_unit.candidates = False
+        unit_object.hide_candidates(root)
         motion_parts.show(root, name, motion_parts.MESH)
         if self.field == motion_parts.DIFFERENCE and run_motions.difference_words(root):
             found = motion_parts.parts(root)

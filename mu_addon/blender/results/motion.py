@@ -26,6 +26,7 @@ from ...usecases.simulate_and_place.motion import (
     Motion,
     Skin,
 )
+from ..jobs.prepared import Elsewhere
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..shared import displays, handlers, updates
@@ -114,6 +115,8 @@ def hide(root: Any, name: str, what: str) -> None:
 
 def rebuild(root: Any) -> None:
     """Rebuild the shown motions from the present files of the shown run. Raises MuError."""
+    for part in parts(root):
+        part.modifiers.clear()
     for name, what in shown(root):
         show(root, name, what)
 
@@ -130,10 +133,19 @@ def follow(root: Any) -> None:
     for name, what in shown(root):
         try:
             show(root, name, what)
+        except Elsewhere as wanted:
+            uuid = root.mu_unit.uuid
+            wanted.begin(root, lambda uuid=uuid: _follow(uuid))
         except MuError as error:
             hide(root, name, what)
             wrong = error.what
     root.mu_motion.trouble = wrong
+
+
+def _follow(uuid: str) -> None:
+    root = unit_object.by_uuid(uuid)
+    if root is not None:
+        follow(root)
 
 
 def arrange(root: Any) -> None:
@@ -178,8 +190,11 @@ def is_seen(root: Any, part: Any) -> bool:
 def _show_region(root: Any, motion: Motion, name: str, region: str) -> None:
     cut = root.mu_motion.cut and motion.halved
     skin = motion.skin(region, cut)
-    rest = skin.of_nodes(motion.mesh.nodes)
     file = motion.folder / PLAYED / f"{name}-{region}{'-cut' if cut else ''}.pc2"
+    old = next((part for part in parts(root) if part[MOTION] == f"{name}|{region}"), None)
+    if old is not None and _plays(old, file):
+        return
+    rest = skin.of_nodes(motion.mesh.nodes)
     _write_cache(file, motion, rest, skin.of_nodes(*motion.sides(name)))
     part = _part(root, motion, name, region)
     skeletons.write(part.data, skeletons.Skeleton(rest, faces=(skin.triangles,)))
@@ -200,8 +215,9 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
         root.mu_unit.show = "preview"
     solid = root.mu_unit.solid
     rest = vertices_of(solid)
-    carried = motion.embedding(rest)
-    moved, still = (motion.carried(whose, carried) for whose in (name, MODEL_A))
+    carried = run_motions.embedded(root, motion, rest)
+    still = motion.carried(MODEL_A, carried)
+    moved = still if name == MODEL_A else motion.carried(name, carried)
     file = motion.folder / PLAYED / f"{name}-{PRINT}.pc2"
     _write_cache(file, motion, rest, moved)
     part = _part(root, motion, name, PRINT)
@@ -249,6 +265,11 @@ def _write_cache(file: Path, motion: Motion, rest: Any, displacement: Any) -> No
 def _play(part: Any, motion: Motion, file: Path) -> None:
     """Let an object play a point cache of its vertices."""
     play(part, file, float(motion.time_s[1] - motion.time_s[0]))
+
+
+def _plays(part: Any, file: Path) -> bool:
+    modifier = part.modifiers.get("Motion")
+    return modifier is not None and modifier.filepath == studies.relative(file) and file.is_file()
 
 
 def play(part: Any, file: Path, step_s: float) -> None:
@@ -317,9 +338,12 @@ def _fields_of(motion: Motion, name: str, region: str, skin: Skin) -> dict[str, 
     return found
 
 
-def played(root: Any, part: Any) -> Played | None:
-    """Data of a played part, from memory or from the files; None if they are gone or of another mesh."""
-    motion = motion_of(root)
+def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
+    """Data of a played part, from memory or from the files; None if they are gone or of another mesh.
+
+    motion: that of the root, where the caller has asked for it already.
+    """
+    motion = motion or motion_of(root)
     if motion is None:
         return None
     name, body = _what(part)
@@ -335,7 +359,12 @@ def played(root: Any, part: Any) -> Played | None:
             return None
     if root.mu_motion.field != DIFFERENCE:
         return kept
-    apart = run_motions.apart(root, motion, name, body, cut)
+    try:
+        apart = run_motions.apart(root, motion, name, body, cut)
+    except Elsewhere as wanted:
+        uuid = root.mu_unit.uuid
+        wanted.begin(root, lambda: _refresh(uuid))
+        return kept
     return kept if apart is None else attrs.evolve(kept, fields={**kept.fields, DIFFERENCE: apart})
 
 
@@ -344,10 +373,10 @@ def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
     key = part.name_full, root.mu_unit.uuid
     kept = _prints.get(key)
     if kept is None or kept.motion is not motion:
-        carried = motion.embedding(vertices_of(part.data))
         try:
+            carried = run_motions.embedded(root, motion, vertices_of(part.data))
             moved, still = (motion.carried(whose, carried) for whose in (_what(part)[0], MODEL_A))
-        except InputError:
+        except (InputError, Elsewhere):
             return None
         kept = _prints[key] = Played(motion, _distances(moved, still))
     return kept
@@ -362,8 +391,15 @@ def refresh(root: Any) -> None:
     if not settings.lock:
         low, high = extent(root, settings.field)
         if (settings.low, settings.high) != (np.float32(low), np.float32(high)):
-            settings.low, settings.high = low, high
+            with updates.paused():
+                settings.low, settings.high = low, high
     colour(root)
+
+
+def _refresh(uuid: str) -> None:
+    root = unit_object.by_uuid(uuid)
+    if root is not None:
+        refresh(root)
 
 
 def colour(root: Any) -> None:
@@ -376,7 +412,9 @@ def colour(root: Any) -> None:
 
 def extent(root: Any, field: str) -> tuple[float, float]:
     """Range of a field in the shown objects over the motion, without its rarest values; else (0, 1)."""
-    found = [p.fields[field] for p in (played(root, part) for part in parts(root)) if p and field in p.fields]
+    motion = motion_of(root)
+    every = (played(root, part, motion) for part in parts(root))
+    found = [p.fields[field] for p in every if p and field in p.fields]
     if not found:
         return 0.0, 1.0
     ends = np.array([field_colours.BY_NAME[field].ends(values) for values in found])
@@ -407,8 +445,9 @@ def peak_frame(root: Any, scene: Any) -> int | None:
 
 def _write(root: Any, scene: Any) -> None:
     """Write the fields of the scene's frame as point attributes, in their units."""
+    motion = motion_of(root)
     for part in parts(root):
-        found = played(root, part)
+        found = played(root, part, motion)
         if found is None:
             continue
         _keep_time(part, float(found.motion.time_s[1] - found.motion.time_s[0]), scene)
@@ -460,7 +499,7 @@ def _chosen(root: Any) -> None:
     if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
         return
     # They lie on the unit at rest, which is shown with them.
-    root.mu_unit.candidates = False
+    unit_object.hide_candidates(root)
     if displays.on_unit(root):
         return
     if motion_of(root) is None:

@@ -78,7 +78,7 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
             motion_parts.hide(root, self.name, self.what)
             return {"FINISHED"}
         if root.mu_motion.on_unit:
-            root.mu_unit.candidates = False
+            unit_object.hide_candidates(root)
         motion_parts.show(root, self.name, self.what)
         if self.timeline:
             context.scene.frame_end = motion_parts.last_frame(motion, context.scene)

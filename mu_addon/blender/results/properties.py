@@ -6,21 +6,24 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...errors import MuError
-from ..shared import viewports
+from ..shared import updates, viewports
 from ..shared.registration import property_group_factory
+from ..unit import object as unit_object
 from . import field_colours
 from . import motion as motion_parts
 
 
 def _again(settings, context):
     """Recolour after a change of the field or its range."""
-    motion_parts.refresh(settings.id_data)
-    viewports.redraw()
+    if not updates.are_paused():
+        motion_parts.refresh(settings.id_data)
+        viewports.redraw()
 
 
 def _range(settings, context):
-    motion_parts.colour(settings.id_data)
-    viewports.redraw()
+    if not updates.are_paused():
+        motion_parts.colour(settings.id_data)
+        viewports.redraw()
 
 
 def _surface(settings, context):
@@ -40,7 +43,7 @@ def _redraw(settings, context):
 def _on_unit(settings, context):
     if settings.on_unit:
         # They would lie beside it as soon as it bends.
-        settings.id_data.mu_unit.candidates = False
+        unit_object.hide_candidates(settings.id_data)
     motion_parts.arrange(settings.id_data)
 
 

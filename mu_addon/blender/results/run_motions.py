@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import MuError
-from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A, Motion, read_motion
+from ...fem.embedding import Embedding
+from ...run.cache import key
+from ...usecases.simulate_and_place.motion import FOLDER, MODEL_A, REGIONS, Motion, read_motion
 from ...usecases.simulate_and_place.run_difference import difference
+from ..jobs import prepared
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 
@@ -41,21 +44,53 @@ def apart(root: Any, motion: Motion, name: str, region: str, cut: bool) -> Any |
     if other.folder == motion.folder:
         _words[root.mu_unit.uuid] = "The shown run is the one that it is compared with: tick another one"
         return None
-    key = motion.folder, other.folder, f"{name}|{region}", cut
-    kept = _apart.get(key)
+    place = motion.folder, other.folder, f"{name}|{region}", cut
+    kept = _apart.get(place)
     if kept is None or kept[0] is not motion or kept[1] is not other:
+        if not prepared.at_once():
+            raise _elsewhere(root, motion, name, other, cut)
         try:
             found = difference(motion, name, motion.skin(region, cut), other, name)
         except MuError as error:
             kept = motion, other, None, error.what
         else:
-            words = (
-                f"{found.unknown:.0%} of the surface is not in the other unit: grey" if found.unknown else ""
-            )
-            kept = motion, other, found.distance_mm, words
-        _apart[key] = kept
+            kept = motion, other, found.distance_mm, _unknown(found.unknown)
+        _apart[place] = kept
     _words[root.mu_unit.uuid] = kept[3]
     return kept[2]
+
+
+def _unknown(share: float) -> str:
+    return f"{share:.0%} of the surface is not in the other unit: grey" if share else ""
+
+
+def _elsewhere(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> prepared.Elsewhere:
+    """Both regions' distances, made in another process."""
+    from ...usecases.prepare import Job
+
+    one, two = (m.folder.parent for m in (motion, other))
+
+    def keep(arrays: Any, trouble: str) -> None:
+        for region in REGIONS:
+            found = None if arrays is None else arrays[region]
+            words = trouble or _unknown(float(arrays[f"{region}_unknown"]))
+            _apart[motion.folder, other.folder, f"{name}|{region}", cut] = motion, other, found, words
+
+    of = {"one": str(one), "other": str(two), "name": name, "cut": cut}
+    folder = studies.folder_of(root) / "difference"
+    return prepared.Elsewhere("difference of runs", folder, Job("difference", of), keep)
+
+
+def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
+    """Points (p, 3) in mm of the unit's frame embedded in a motion's mesh; raises Elsewhere in a window."""
+    if not (prepared.at_once() or motion.embedding_file(points).is_file()):
+        from ...usecases.prepare import Job
+
+        of = {"one": str(motion.folder.parent), "points": key(points)}
+        folder = studies.folder_of(root) / "embedding"
+        job = Job("embedding", of)
+        raise prepared.Elsewhere("motion of the print", folder, job, lambda *_: None, points)
+    return motion.embedding(points)
 
 
 def difference_words(root: Any) -> str:

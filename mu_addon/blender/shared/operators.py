@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 
 import bpy
 
 from ...errors import MuError
-from ..unit.object import active_root
+from ..jobs.prepared import Elsewhere
+from ..unit.object import active_root, by_uuid
 from .displays import editable
 from .wording import in_panel
 
@@ -60,11 +61,29 @@ def reports_errors(execute):
     def reported(self, context):
         try:
             return execute(self, context)
+        except Elsewhere as wanted:
+            root = active_root(context)
+            try:
+                wanted.begin(root, partial(_again, root.mu_unit.uuid, self.bl_idname, self.as_keywords()))
+            except MuError as error:
+                self.report({"ERROR"}, in_panel(str(error)))
+            # Without an undo step: that comes with what is made.
+            return {"CANCELLED"}
         except MuError as error:
             self.report({"ERROR"}, in_panel(str(error)))
             return {"CANCELLED"}
 
     return reported
+
+
+def _again(uuid: str, name: str, values: dict) -> None:
+    """Call an operator once more on a unit, as one step to undo; where the unit is gone, do nothing."""
+    root, windows = by_uuid(uuid), bpy.context.window_manager.windows
+    if root is not None and windows:
+        with bpy.context.temp_override(window=windows[0], object=root, active_object=root):
+            getattr(bpy.ops.mu, name.rpartition(".")[2].removeprefix("MU_OT_"))(
+                "EXEC_DEFAULT", True, **values
+            )
 
 
 def open_file(context, path: Path) -> None:

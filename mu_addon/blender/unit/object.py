@@ -18,13 +18,16 @@ from ...design.anchors import Window, windows
 from ...design.body import Body
 from ...design.parameters import Unit
 from ...design.solid import Solid
+from ...design.steps import require_whole
 from ...errors import InputError, MuError
 from ..body import state as bodies
+from ..jobs import prepared
 from ..path import ranking
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
 from ..shared.compat import set_modifier_input
+from ..simulate import study_folder as studies
 from ..steps import state as stack
 from . import broken, drawing
 from .properties import from_unit, shape_hash, to_unit
@@ -213,6 +216,12 @@ def show(root: Any) -> None:
         set_modifier_input(modifier, name, part)
 
 
+def hide_candidates(root: Any) -> None:
+    """Hide the candidate paths; setting what is set already would draw the whole unit again."""
+    if root.mu_unit.candidates:
+        root.mu_unit.candidates = False
+
+
 def shows_result(root: Any) -> bool:
     """Return True if the motion of a study is seen in the unit's own place."""
     return root.mu_unit.show == RESULT and bool(displays.on_unit(root))
@@ -253,10 +262,28 @@ def solid_is_current(root: Any) -> bool:
     return now == (mesh["mu_unit_hash"], mesh["mu_path"], mesh.get("mu_body", ""))
 
 
-def solid_of(root: Any, unit: Unit, quality: str = "interactive") -> Solid:
-    """The printable solid of a unit in the scene; raises InputError and GateError."""
-    solid: Solid = stack.STACK.value("solid", stack.given(root, unit, quality))
-    return solid
+def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "") -> Solid:
+    """The printable solid of a unit in the scene; raises InputError, GateError and, in a window, Elsewhere.
+
+    stl: file to write it to, as made elsewhere; such a solid, of many facets, is not kept.
+    """
+    given = stack.given(root, unit, quality)
+    require_whole(given)
+    if prepared.at_once() or (not stl and stack.STACK.has("solid", given)):
+        solid: Solid = stack.STACK.value("solid", given)
+        return solid
+    from ...usecases.prepare import Job, solid_of
+
+    window = chosen_window(root, unit)
+    of = {"path": window.name if window else "", "quality": quality, "stl": stl}
+    job = Job("solid", of, unit, given.body)
+
+    def keep(arrays: Any, trouble: str) -> None:
+        if arrays is not None and not stl:
+            stack.STACK.keep("solid", given, solid_of(arrays, job))
+
+    folder = studies.folder_of(root) / ("stl" if stl else "solid")
+    raise prepared.Elsewhere(f"STL in {stl}" if stl else "solid", folder, job, keep, repeats=not stl)
 
 
 def put_envelope(root: Any, body: Body) -> Any:

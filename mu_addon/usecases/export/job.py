@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -14,12 +15,14 @@ from ...design.anchors import Window, window
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.settings import USUAL_RESIN
 from ...errors import InputError
-from ...materials.library import Material, load_material, material_text, read_material
 from ...reading import file_text, unreadable
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
 from .settings import FORMATS, QUALITY
+
+if TYPE_CHECKING:
+    from ...materials.library import Material
 
 Array = NDArray[np.float64]
 
@@ -38,11 +41,12 @@ LAYOUT = FolderLayout(
 class Job:
     """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm.
 
-    vent_along: build direction, away from the platform, for which trapped resin gets vents; None for none.
+    resin: None for the usual one, loaded where it runs. vent_along: build direction, away from the platform, for
+    which trapped resin gets vents; None for none.
     """
 
     unit: Unit
-    resin: Material
+    resin: Material | None
     path: Window | Array | None = None
     path_name: str = ""
     formats: tuple[str, ...] = FORMATS
@@ -72,14 +76,14 @@ class Job:
             "quality": self.quality,
             "take_off_mm": self.take_off,
             "offset_source": self.offset_source or None,
-            "resin": self.resin.name,
+            "resin": USUAL_RESIN if self.resin is None else self.resin.name,
             "vent_along": self.vent_along,
             "points_mm": None if self.path is None or isinstance(self.path, Window) else self.path,
         }
         return {
             LAYOUT.inputs: toml_text(values, LAYOUT.header),
             UNIT: to_toml(self.unit),
-            RESIN: material_text(self.resin),
+            **resin_text(self.resin),
         }
 
 
@@ -117,14 +121,28 @@ def read_job(folder: Path) -> Job:
     )
 
 
+def resin_text(resin: Material | None) -> dict[str, str]:
+    """The file of a resin by its name; none for the usual one, which the library has."""
+    if resin is None:
+        return {}
+    from ...materials.library import material_text
+
+    return {RESIN: material_text(resin)}
+
+
 def read_resin(folder: Path, name: str) -> Material:
     """Resin in a folder, or of the library for an older folder; raises InputError."""
+    # Only now: a window that writes a job needs none of the solver's packages that come with it.
+    from ...materials.library import load_material, read_material
+
     kept = folder / RESIN
     return read_material(kept) if kept.is_file() else load_material(name)
 
 
 def resin_of(name: str | None) -> Material:
     """A resin of the library by name, or of a TOML file; by default the usual one. Raises InputError."""
+    from ...materials.library import load_material, read_material
+
     chosen = name or USUAL_RESIN
     return read_material(Path(chosen)) if chosen.endswith(".toml") else load_material(chosen)
 

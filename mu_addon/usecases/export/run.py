@@ -25,7 +25,7 @@ from ...run.context import RunContext
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .job import LAYOUT, MANIFEST, Job, read_job
+from .job import LAYOUT, MANIFEST, Job, read_job, resin_of
 
 Array = NDArray[np.float64]
 
@@ -241,7 +241,7 @@ class Export:
 
     def _manifest(self, solid: Solid) -> dict[str, Any]:
         job, g = self.job, solid.gates
-        density = job.resin.density_g_per_ml
+        resin = job.resin or resin_of(None)
         written = {entry["file"] for entry in self.files}
         bar = solid.bar
         return {
@@ -271,10 +271,10 @@ class Export:
             },
             "vents": self._vents(),
             "resin": {
-                "name": job.resin.name,
-                "density_g_per_ml": density,
+                "name": resin.name,
+                "density_g_per_ml": resin.density_g_per_ml,
                 "ml": g.volume_mm3 / 1e3,
-                "g": g.volume_mm3 / 1e3 * density,
+                "g": g.volume_mm3 / 1e3 * resin.density_g_per_ml,
             },
             "files": self.files,
             "refused": self.refused,

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -16,11 +16,11 @@ from ...design import coupons
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.limit_parts import LimitPart, limit_parts
 from ...design.printing.printer import Printer, load_printer, printer_text, read_printer
+from ...design.settings import USUAL_RESIN
 from ...design.strut_cell import specimen_solid, strut_cell
 from ...design.surface import Triangles, Vertices, bad_edges, stl_bytes, stl_surface, volume
 from ...errors import OutputError
 from ...files import write_bytes, write_json, write_text
-from ...materials.library import Material, material_text
 from ...measured.kinds import KINDS
 from ...report.html import page, table
 from ...run.context import RunContext
@@ -29,9 +29,12 @@ from ...run.inputs import FORMAT, read_inputs
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
-from .job import RESIN, UNIT, read_resin
+from .job import UNIT, read_resin, resin_of, resin_text
 from .limit_sheet import limit_sheet
 from .print_offsets import gauge_sheet
+
+if TYPE_CHECKING:
+    from ...materials.library import Material
 
 SCALES = (0.75, 1.0, 1.5)
 CELLS = 3
@@ -154,16 +157,17 @@ class Job:
     """Inputs of the specimens: the unit, its resin, and parts for a printer's limits."""
 
     unit: Unit
-    resin: Material
+    resin: Material | None
     printer: Printer = attrs.field(factory=load_printer)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; specimens.toml is the first."""
-        values = {"format": FORMAT, "unit": UNIT, "resin": self.resin.name, "printer": PRINTER}
+        resin = USUAL_RESIN if self.resin is None else self.resin.name
+        values = {"format": FORMAT, "unit": UNIT, "resin": resin, "printer": PRINTER}
         return {
             LAYOUT.inputs: toml_text(values, LAYOUT.header),
             UNIT: to_toml(self.unit),
-            RESIN: material_text(self.resin),
+            **resin_text(self.resin),
             PRINTER: printer_text(self.printer),
         }
 
@@ -182,7 +186,7 @@ def read_job(folder: Path) -> Job:
 
 def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
     """Write every specimen, the gauge's sheet, the manifest and the folder to fill; raises MuError."""
-    unit, resin, progress = job.unit, job.resin, context.progress
+    unit, resin, progress = job.unit, job.resin or resin_of(None), context.progress
     limits = job.limit_parts
     every = [*specimens(unit), *(Specimen(p.name, p.make, p.measure) for p in limits)]
     rows = []

@@ -190,14 +190,18 @@ class Motion:
             moved[:, embedding.mirrored] = far[:, embedding.mirrored]
         return moved
 
+    def embedding_file(self, points: Array) -> Path:
+        """Where the embedding of points (p, 3) in mm is kept."""
+        return self.folder / PLAYED / f"embedding-{key(self.mesh.hash(), points)}.npz"
+
     def embedding(self, points: Array) -> Embedding:
         """Points (p, 3) in mm embedded in the mesh; kept, since it takes seconds. Raises OutputError."""
-        path = self.folder / PLAYED / f"embedding-{key(self.mesh.hash(), points)}.npz"
+        path = self.embedding_file(points)
         found = read_npz(path)
         if found is not None:
             return Embedding(**found)
         made = embed(self.mesh, points)
-        write_npz(path, attrs.asdict(made, recurse=False))
+        write_npz(path, attrs.asdict(made, recurse=False), packed=False)
         return made
 
     def at(self, time_s: float) -> tuple[int, int, float]:
@@ -229,7 +233,7 @@ def write_model_a(
     found = looked.of_states([state.u for state in trajectory.solved], materials, history)
     for name, surface in surfaces.items() if len(contact_kPa) else ():
         found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
-    write_npz(folder / FOLDER / "mesh.npz", arrays)
+    write_npz(folder / FOLDER / "mesh.npz", arrays, packed=False)
     write_npz(
         folder / FOLDER / f"{MODEL_A}.npz",
         {
@@ -240,6 +244,7 @@ def write_model_a(
             "displacement_mm": np.array([s.u for s in trajectory.solved], np.float32),
             **found,
         },
+        packed=False,
     )
 
 
@@ -295,7 +300,7 @@ def write_path(folder: Path, name: str, state_kPa: Array, difference_mm: Array, 
     """
     arrays = {"difference_mm": difference_mm, **differences}
     single = {key: np.asarray(values, np.float32) for key, values in arrays.items()}
-    write_npz(folder / FOLDER / f"{name}.npz", {"state_kPa": state_kPa, **single})
+    write_npz(folder / FOLDER / f"{name}.npz", {"state_kPa": state_kPa, **single}, packed=False)
 
 
 def write_sensitivity(folder: Path, mesh: Mesh, by_modulus: Array) -> None:
