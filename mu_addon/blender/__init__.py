@@ -58,6 +58,7 @@ _MODULES = (
     "node_tree.groups",
     "node_tree.operators",
     "scene.dropping",
+    "scene.handles",
     "simulate.timings",
     # Drawing; panels appear in the sidebar in this order, that of the work.
     "unit.panel",

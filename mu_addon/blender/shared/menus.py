@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..unit import presets
+from . import displays
 
 
 class MU_MT_presets(bpy.types.Menu):
@@ -52,6 +53,17 @@ class MU_MT_object(bpy.types.Menu):
 
     def draw(self, context):
         layout = self.layout
+        # In the layout's own context: chosen from the search, too, a drag needs the 3D view.
+        layout.operator_context = "INVOKE_REGION_WIN"
+        for name in ("wall", "bladder", "cell", "pressure"):
+            layout.operator("mu.drag", text=f"Drag {name.capitalize()}", icon="ARROW_LEFTRIGHT").what = name
+        layout.separator()
+        layout.operator("mu.simulate", icon="PLAY")
+        layout.operator_menu_enum("mu.field_show", "field", text="Show on the Unit", icon="SHADING_RENDERED")
+        layout.operator("mu.solid", icon="MESH_DATA")
+        layout.operator("mu.print_check", icon="VIEWZOOM")
+        layout.operator("mu.export_stl", icon="EXPORT")
+        layout.separator()
         layout.operator("mu.select", icon="RESTRICT_SELECT_OFF")
         layout.operator("mu.rebuild", icon="FILE_REFRESH")
         layout.operator("mu.delete", icon="TRASH")
@@ -62,6 +74,12 @@ class MU_MT_object(bpy.types.Menu):
 def _object(self, context):
     # The menu search of Blender finds what is in menus.
     self.layout.menu("MU_MT_object", icon="OUTLINER_OB_LATTICE")
+
+
+def _on_unit(self, context):
+    if displays.root_above(context.object) is not None:
+        _object(self, context)
+        self.layout.separator()
 
 
 class MU_MT_more(bpy.types.Menu):
@@ -92,10 +110,12 @@ def register() -> None:
     _register_classes()
     bpy.types.VIEW3D_MT_mesh_add.append(_add)
     bpy.types.VIEW3D_MT_object.append(_object)
+    bpy.types.VIEW3D_MT_object_context_menu.prepend(_on_unit)
 
 
 def unregister() -> None:
     """Unregister them."""
+    bpy.types.VIEW3D_MT_object_context_menu.remove(_on_unit)
     bpy.types.VIEW3D_MT_object.remove(_object)
     bpy.types.VIEW3D_MT_mesh_add.remove(_add)
     _unregister_classes()

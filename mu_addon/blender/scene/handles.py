@@ -1,0 +1,247 @@
+"""Arrows on the active unit that are dragged in millimetres, and on its result in kPa: sizes in the view.
+
+A drag is an operator: from an arrow, a menu or the search, with its value in the header, as one undo step.
+"""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Matrix, Vector
+
+from ...design.dimensions import Dimensions
+from ..results import motion as motion_parts
+from ..results.operators import NO_MOTION
+from ..shared import viewports
+from ..shared.displays import editable
+from ..shared.operators import UnitOperator
+from ..steps import state as stack
+from ..unit import object as unit_object
+from ..unit.fields import field, label, step_of
+from ..unit.properties import to_unit
+
+PRESSURE = "pressure"
+FINE = 0.1
+"""What Shift makes of a drag."""
+
+
+@attrs.frozen
+class Handle:
+    """An arrow: whose parameter, none for the pressure, where it stands and points to in the unit's frame,
+    how many true millimetres the value grows by as its end moves by one, and its colour."""
+
+    section: str
+    name: str
+    stand: Callable[[Dimensions], tuple[tuple[float, float, float], tuple[float, float, float]]]
+    gain: float
+    colour: tuple[float, float, float]
+
+
+HANDLES = {
+    "wall": Handle(
+        "chambers", "wall_mm", lambda d: ((0.0, d.R, 1.5 * d.cell), (0.0, 1.0, 0.0)), 1.0, (1.0, 0.55, 0.1)
+    ),
+    "bladder": Handle(
+        "chambers",
+        "bladder_diameter_mm",
+        lambda d: ((0.0, -d.R, 0.5 * d.cell), (0.0, -1.0, 0.0)),
+        2.0,
+        (0.2, 0.75, 0.3),
+    ),
+    "cell": Handle(
+        "chambers",
+        "cell_mm",
+        lambda d: ((0.0, d.bounds[1][1], d.height), (0.0, 0.0, 1.0)),
+        0.0,
+        (0.25, 0.5, 1.0),
+    ),
+    PRESSURE: Handle(
+        "", "", lambda d: ((0.0, 0.0, -d.inlet_length - d.cell), (0.0, 0.0, 1.0)), 1.0, (0.95, 0.3, 0.6)
+    ),
+}
+"""A cell is one of `count` along the unit, by which its end moves: a gain of 0 stands for that."""
+ITEMS = [
+    ("wall", "Wall", "Thickness of the chambers' wall"),
+    ("bladder", "Bladder Ø", "Diameter of the bladders, with the cell that they are tied to"),
+    ("cell", "Cell", "Cell of the lattice, with the bladders that are tied to it"),
+    (PRESSURE, "Pressure", "Pressure of the shown motion: goes to its frame"),
+]
+
+
+def pressure_of(root: Any, scene: Any) -> float:
+    """Pressure in kPa at the scene's frame, of the motion that a unit shows."""
+    motion = motion_parts.motion_of(root)
+    assert motion is not None
+    return float(np.interp(motion_parts.time_of(motion, scene), motion.time_s, motion.pressure_kPa))
+
+
+def to_pressure(root: Any, scene: Any, kPa: float) -> None:
+    """Go to the frame at which the shown motion has a pressure, of several the nearest in time."""
+    motion = motion_parts.motion_of(root)
+    assert motion is not None
+    frames = np.arange(scene.frame_start, motion_parts.last_frame(motion, scene) + 1)
+    rate = scene.render.fps / scene.render.fps_base
+    times = motion.time_s[0] + (frames - scene.frame_start) / rate
+    off = np.abs(np.interp(times, motion.time_s, motion.pressure_kPa) - kPa)
+    near = frames[off <= off.min() + 0.25 * float(np.ptp(motion.pressure_kPa)) / max(len(frames), 1)]
+    scene.frame_set(int(near[np.abs(near - scene.frame_current).argmin()]))
+
+
+def usable(root: Any | None, name: str) -> bool:
+    """Whether a unit has that handle now: sizes while the design is seen, the pressure with its result."""
+    if root is None or not editable(root) or root.mode != "OBJECT" or not root.visible_get():
+        return False
+    return bool(unit_object.shows_result(root) == (name == PRESSURE))
+
+
+class MU_OT_drag(UnitOperator, bpy.types.Operator):
+    """Drag this with the mouse; Shift: finely, Ctrl: in whole steps, Esc or a right click: as it was"""
+
+    bl_idname = "mu.drag"
+    bl_label = "Drag"
+    bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR"}
+
+    what: EnumProperty(name="What", description="What the mouse changes", items=ITEMS)
+
+    @classmethod
+    def description(cls, context, properties):
+        return next(f"{name}: {text}. {cls.__doc__}" for key, name, text in ITEMS if key == properties.what)
+
+    def invoke(self, context, event):
+        root = unit_object.active_root(context)
+        if context.region_data is None:
+            self.report({"ERROR"}, "Drag in a 3D view")
+            return {"CANCELLED"}
+        if not usable(root, self.what):
+            words = NO_MOTION if motion_parts.motion_of(root) is None else "Show the result first"
+            self.report({"ERROR"}, words if self.what == PRESSURE else "Show the preview first")
+            return {"CANCELLED"}
+        self._root = root
+        self._start = self._read(context)
+        self._mouse = Vector((event.mouse_region_x, event.mouse_region_y))
+        self._pixels, self._per_pixel = self._scale(context)
+        context.window_manager.modal_handler_add(self)
+        self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self._write(context, self._start)
+            return self._end(context, {"CANCELLED"})
+        if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
+            changed = self._read(context) != self._start
+            # The pressure is a frame, which is no state to undo.
+            return self._end(context, {"FINISHED" if changed and self.what != PRESSURE else "CANCELLED"})
+        if event.type == "MOUSEMOVE":
+            moved = Vector((event.mouse_region_x, event.mouse_region_y)) - self._mouse
+            along = moved.dot(self._pixels.normalized()) * (FINE if event.shift else 1.0)
+            value, step = self._start + along * self._per_pixel, self._step()
+            if event.ctrl:
+                step *= 10.0
+            self._write(context, round(value / step) * step)
+            self._tell(context)
+        return {"RUNNING_MODAL"}
+
+    def _scale(self, context) -> tuple[Vector, float]:
+        """Pixels (2,) on the screen of a millimetre along the arrow, and by how much a pixel changes it."""
+        at, toward = _place(self._root, self.what)
+        ends = [
+            location_3d_to_region_2d(context.region, context.region_data, end) for end in (at, at + toward)
+        ]
+        pixels = Vector((0.0, 1.0)) if None in ends else ends[1] - ends[0]
+        if pixels.length < 1e-3:  # it points at the eye
+            pixels = Vector((0.0, 1.0))
+        if self.what == PRESSURE:
+            motion = motion_parts.motion_of(self._root)
+            return pixels, float(np.ptp(motion.pressure_kPa)) / 300.0
+        description, unit = self._described(), to_unit(self._root.mu_unit)
+        if description.high <= 20.0:
+            # A thin wall follows the mouse as its field in the panel does.
+            return pixels, step_of(description.high) / 100.0
+        gain = HANDLES[self.what].gain or 1.0 / unit.dimensions.count
+        return pixels, gain / pixels.length
+
+    def _described(self):
+        handle = HANDLES[self.what]
+        return stack.description(handle.section, handle.name)
+
+    def _field(self):
+        group = getattr(self._root.mu_unit, HANDLES[self.what].section)
+        return group, field(group, self._described())
+
+    def _step(self) -> float:
+        return 0.5 if self.what == PRESSURE else step_of(self._described().high) / 100.0
+
+    def _read(self, context) -> float:
+        return pressure_of(self._root, context.scene) if self.what == PRESSURE else getattr(*self._field())
+
+    def _write(self, context, value: float) -> None:
+        if self.what == PRESSURE:
+            to_pressure(self._root, context.scene, value)
+        elif self._read(context) != value:
+            setattr(*self._field(), value)
+
+    def _tell(self, context) -> None:
+        value = self._read(context)
+        name = f"Pressure: {value:.1f} kPa" if self.what == PRESSURE else ""
+        words = name or f"{label(self._described())}: {value:.2f} mm"
+        trouble = self._root.mu_unit.trouble.partition("\n")[0]
+        context.area.header_text_set(f"{words}   {trouble}".rstrip())
+        viewports.redraw()
+
+    def _end(self, context, how):
+        context.area.header_text_set(None)
+        viewports.redraw()
+        return how
+
+
+def _place(root: Any, name: str) -> tuple[Vector, Vector]:
+    """Where a handle stands, and where a millimetre along it leads, in the scene."""
+    at, toward = HANDLES[name].stand(to_unit(root.mu_unit).dimensions)
+    world = root.matrix_world
+    return world @ Vector(at), world.to_3x3() @ Vector(toward)
+
+
+class MU_GGT_handles(bpy.types.GizmoGroup):
+    """Arrows on the active unit: wall, bladder, cell; on its result the pressure"""
+
+    bl_idname = "MU_GGT_handles"
+    bl_label = "Sizes of the Unit"
+    bl_space_type, bl_region_type = "VIEW_3D", "WINDOW"
+    bl_options = {"3D", "PERSISTENT", "SHOW_MODAL_ALL"}
+
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.root_of(unit_object.active_object(context))
+        return root is not None and any(usable(root, name) for name in HANDLES)
+
+    def setup(self, context):
+        self.arrows = {}
+        for name, handle in HANDLES.items():
+            arrow = self.arrows[name] = self.gizmos.new("GIZMO_GT_arrow_3d")
+            arrow.target_set_operator("mu.drag").what = name
+            arrow.color, arrow.alpha = handle.colour, 0.8
+            arrow.color_highlight, arrow.alpha_highlight = (1.0, 1.0, 1.0), 1.0
+            arrow.scale_basis, arrow.line_width = 0.6, 3.0
+
+    def draw_prepare(self, context):
+        root = unit_object.active_root(context)
+        for name, arrow in self.arrows.items():
+            # A broken rule keeps the last good preview; its arrows wait where they were.
+            arrow.hide = not usable(root, name)
+            if not arrow.hide and not root.mu_unit.trouble:
+                at, toward = _place(root, name)
+                turn = toward.to_track_quat("Z", "Y").to_matrix().to_4x4()
+                arrow.matrix_basis = Matrix.Translation(at) @ turn
+
+
+CLASSES = (MU_OT_drag, MU_GGT_handles)
+
+
+register, unregister = bpy.utils.register_classes_factory(CLASSES)
