@@ -45,7 +45,7 @@ WRITERS = (
     "pyparsing",
     "matplotlib",
 )
-"""Modules that write a job's inputs or colour a result, each loaded in about a tenth of a second; no solver."""
+"""Modules that write a job's inputs or colour a result, each loaded in a tenth of a second; no solver."""
 CHILD_MAIN = Path(__file__).with_name("child_main.py")
 SOLVER = ("warp", "scipy", "cvxopt", "meshio", "matplotlib")
 """Modules that a simulation needs."""

@@ -41,7 +41,7 @@ LAYOUT = FolderLayout(
 class Job:
     """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm.
 
-    resin: None for the usual one, loaded where it runs. vent_along: build direction, away from the platform, for
+    resin: None for the usual one, loaded by the run. vent_along: build direction, away from the platform, for
     which trapped resin gets vents; None for none.
     """
 
