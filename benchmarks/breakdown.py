@@ -18,9 +18,9 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 

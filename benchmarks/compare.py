@@ -21,9 +21,9 @@ from peers.problem import Problem
 from peers.process import run
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 AGREEMENT = 1e-4
 STEP_KPA = 2.5

@@ -20,7 +20,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress

@@ -25,7 +25,7 @@ from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.report.render import Cut, Part, fit, render
 from mu_addon.report.shapes import tube
 from mu_addon.report.unit_pictures import PATH_COLOR, SAGITTAL, unit_parts
-from mu_addon.usecases.simulate_and_place.motion import FOLDER, MODEL_A, read_motion
+from mu_addon.usecases.simulate_and_place.motion_files import FOLDER, MODEL_A, read_motion
 
 PRESSURES_kPa = (-20, -10, 0, 20, 40)
 FRAME = (340, 480)  # pixels

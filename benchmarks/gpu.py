@@ -24,9 +24,9 @@ from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.state import rest
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi
 from mu_addon.placement.inclusion import sensor_share

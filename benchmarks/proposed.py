@@ -22,9 +22,9 @@ from peers.process import run
 
 from mu_addon.design.parameters import Unit, read_unit
 from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 STEP_KPA = 2.5
 

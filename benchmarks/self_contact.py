@@ -17,7 +17,7 @@ from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import CONTACT_NEWTON, SELF_CONTACT_NEWTON
 from mu_addon.fem.self_contact import SelfContact
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved import mesh_printed
 

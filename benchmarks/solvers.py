@@ -18,9 +18,9 @@ from scipy import sparse
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.factor import Cholesky, SuperLU
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 
 def system(refine):

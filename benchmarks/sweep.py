@@ -25,9 +25,9 @@ from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.influence import influence_map, representative_pressures

@@ -20,7 +20,7 @@ from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
 from mu_addon.resolved.unit import mesh_printed
 

@@ -16,7 +16,7 @@ from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
 from ..fem.rotations import skew
-from ..fem.unit import materials_of
+from ..fem.unit_materials import materials_of
 from ..meshing.mesh import LATTICE, Mesh
 from .rigid_motion import exponential, inverse, logarithm, motion, slope
 

@@ -116,7 +116,7 @@ class Body:
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
-        from ..fem.unit import materials_of
+        from ..fem.unit_materials import materials_of
 
         if self.unit.wall.names:
             raise InputError(
@@ -172,7 +172,7 @@ class UnitEffect:
 
 
 def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
-    from ..fem.loads import gravity
+    from ..fem.dead_loads import gravity
 
     hollow = (mesh.region == LATTICE) & (not mesh.resolved)
     solid = np.where(hollow, relative_density(strut_cell(body.unit)), 1.0)

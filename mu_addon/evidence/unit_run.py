@@ -17,7 +17,7 @@ from ..fem.held_tip import HeldTip
 from ..fem.kinematics import TipSection
 from ..fem.state import State
 from ..fem.trajectory import branches
-from ..fem.unit import self_contact_of
+from ..fem.unit_materials import self_contact_of
 from ..measured.pose import X
 from .markers import material_points
 from .prediction.flat_obstacle import NAME as CONTACT

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from .continuation import Branch as Branch
     from .continuation import limit_pressure as limit_pressure
     from .continuation import trace_branch as trace_branch
+    from .dead_loads import gravity as gravity
+    from .dead_loads import traction as traction
     from .embedding import Embedding as Embedding
     from .embedding import embed as embed
     from .equilibrium import Equilibrium as Equilibrium
@@ -39,8 +41,6 @@ if TYPE_CHECKING:
     from .laws import OgdenRoxburgh as OgdenRoxburgh
     from .laws import Prony as Prony
     from .laws import Yeoh as Yeoh
-    from .loads import gravity as gravity
-    from .loads import traction as traction
     from .materials import Layer as Layer
     from .materials import Materials as Materials
     from .model import Model as Model
@@ -64,6 +64,6 @@ if TYPE_CHECKING:
     from .time_stepping import simulate_in_time as simulate_in_time
     from .trajectory import Trajectory as Trajectory
     from .trajectory import simulate as simulate
-    from .unit import materials_of as materials_of
+    from .unit_materials import materials_of as materials_of
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
+    from .homogenised_unit import MeshingWarning as MeshingWarning
+    from .homogenised_unit import mesh_unit as mesh_unit
     from .lattice import GmshUnavailable as GmshUnavailable
     from .mesh import LATTICE as LATTICE
     from .mesh import MEMBRANE as MEMBRANE
@@ -25,7 +27,5 @@ if TYPE_CHECKING:
     from .surface import VOID as VOID
     from .surface import Surface as Surface
     from .surface import mesh_surface as mesh_surface
-    from .unit import MeshingWarning as MeshingWarning
-    from .unit import mesh_unit as mesh_unit
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -30,7 +30,7 @@ from .search import SearchSettings
 from .settings import FINER
 from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
-from .whole import Mass
+from .unit_quantities import Mass
 
 FORMAT = 1
 UNIT, RESIN, BODY = "unit.toml", "resin.toml", "body.obj"

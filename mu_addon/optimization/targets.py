@@ -23,7 +23,7 @@ from .quantities import (
 )
 from .sensor import Disturbance, SensorSlope
 from .structure import Quantity
-from .whole import Mass, PrintTime, WallThickness
+from .unit_quantities import Mass, PrintTime, WallThickness
 
 Goal = Literal["minimise", "maximise"]
 

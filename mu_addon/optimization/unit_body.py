@@ -19,7 +19,7 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
 from ..fem.relocated import relocated
-from ..fem.unit import materials_of, relocated_contact, self_contact_of
+from ..fem.unit_materials import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
 from ..meshing.morph import Morph
 from ..meshing.settings import MeshSettings

@@ -28,7 +28,7 @@ from ..run.folder import FolderLayout
 from ..run.inputs import FORMAT, read_inputs
 from ..run.usecase import UseCase
 from ..toml_writer import toml_text
-from .simulate_and_place.motion import REGIONS, read_motion
+from .simulate_and_place.motion_files import REGIONS, read_motion
 from .simulate_and_place.run_difference import difference
 
 RESULT, POINTS = "prepared.npz", "points.npz"

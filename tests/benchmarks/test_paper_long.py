@@ -20,9 +20,9 @@ from benchmarks.paper.table.settings import Settings
 from benchmarks.paper.table.values import unit_of_table_column, with_values
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, TET_FACES
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.inclusion import RULES
 from tests.benchmarks.test_paper_table import shown
 

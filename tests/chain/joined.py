@@ -13,13 +13,13 @@ from mu_addon.chain.chain import GRAVITY_N_PER_G, Loads
 from mu_addon.chain.rigid_motion import motion
 from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.errors import InputError
+from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.embedding import embed
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import NeoHooke
-from mu_addon.fem.loads import gravity
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.state import State
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, TET_EDGES, Mesh
 
 from ..fem.cavities import CavitiesModel

@@ -11,8 +11,8 @@ from mu_addon.chain.rigid_motion import rotation_vector
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem import Equilibrium, Model, materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.cache import Cache
 
 from .joined import full_model

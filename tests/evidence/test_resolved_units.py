@@ -11,8 +11,8 @@ from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
 from mu_addon.evidence.verdict import diagnose
+from mu_addon.fem.dead_loads import STANDARD_GRAVITY
 from mu_addon.fem.laws import Foam, Layered, NeoHooke, Yeoh
-from mu_addon.fem.loads import STANDARD_GRAVITY
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic

@@ -26,10 +26,10 @@ from mu_addon.evidence.unit_fem import (
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.measured.rest import at_rest
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from tests.evidence import analytic
 
 UNIT = load_preset("mu-1.0x")

@@ -15,8 +15,8 @@ from mu_addon.evidence.verdict import diagnose
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.newton_settings import CONTACT_NEWTON
 from mu_addon.fem.wall_law import layer_stiffness
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from tests.evidence import analytic
 
 UNIT = load_preset("mu-1.0x")

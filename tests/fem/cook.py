@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem.dead_loads import traction
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.loads import traction
 from mu_addon.fem.model import Model
 
 from . import bodies

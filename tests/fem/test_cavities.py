@@ -7,9 +7,9 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem import Materials, Model
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 from .cavities import CavitiesModel
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.loads import gravity
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import CONTACT_NEWTON

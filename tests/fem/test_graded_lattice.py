@@ -13,7 +13,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.graded_lattice import element_factors, relative_moduli
 from mu_addon.fem.lattice_law import LatticeLaw
 from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam, NeoHooke
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.unit import mesh_of, mesh_printed

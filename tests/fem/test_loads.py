@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem.dead_loads import STANDARD_GRAVITY, gravity, traction
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.loads import STANDARD_GRAVITY, gravity, traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings

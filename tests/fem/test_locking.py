@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.fem.dead_loads import gravity, traction
 from mu_addon.fem.laws import Foam, NeoHooke
-from mu_addon.fem.loads import gravity, traction
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest

@@ -9,8 +9,8 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.fem.batched_newton import BatchedNewton
 from mu_addon.fem.continuation import trace_branch
+from mu_addon.fem.dead_loads import traction
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.loads import traction
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import SELF_CONTACT_NEWTON

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.fem.dead_loads import traction
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.loads import traction
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import SELF_CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle

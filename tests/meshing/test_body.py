@@ -15,7 +15,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing import MeshSettings, mesh_quality, mesh_unit
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.revolved import unit_surfaces

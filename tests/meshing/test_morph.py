@@ -8,10 +8,10 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import outer_radius
 from mu_addon.errors import MeshingError
 from mu_addon.fem.elements import reference_gradients
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE
 from mu_addon.meshing.morph import morphed
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 UNIT = load_preset("mu-1.0x")
 

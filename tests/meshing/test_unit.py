@@ -316,7 +316,9 @@ def test_without_gmsh_pytetwild_is_asked_and_the_user_told(
     unit: Unit, coarse: Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = []
-    monkeypatch.setattr("mu_addon.meshing.unit._from_surfaces", lambda d, *_: asked.append(d) or coarse)
+    monkeypatch.setattr(
+        "mu_addon.meshing.homogenised_unit._from_surfaces", lambda d, *_: asked.append(d) or coarse
+    )
     with pytest.warns(MeshingWarning, match="libglu1-mesa"):
         mesh_unit(unit)
     assert asked == [unit.dimensions]

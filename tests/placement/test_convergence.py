@@ -9,10 +9,10 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidate_paths, roi
 from mu_addon.placement.inclusion import stiffened_volume_mm3
 

@@ -12,10 +12,10 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.graph import Limits, lattice_graph

@@ -13,7 +13,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.model import Model
 from mu_addon.fem.stress import cauchy
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
 from mu_addon.meshing.settings import SOLID, MeshSettings
 from mu_addon.resolved.beams import without_beams

@@ -11,7 +11,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import SOLID, MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.unit import mesh_printed

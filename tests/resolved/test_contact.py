@@ -14,12 +14,12 @@ from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.rigid import Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.homogenize.cell_mesh import cell_materials
 from mu_addon.homogenize.specimen import block_specimen
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import SOLID, MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.resolved.lattice import clearance
 from mu_addon.resolved.strut import strut_mesh
 from mu_addon.resolved.unit import mesh_printed

@@ -9,12 +9,12 @@ import numpy as np
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.usecases.simulate_and_place import history
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
-from mu_addon.usecases.simulate_and_place.motion import write_model_a
+from mu_addon.usecases.simulate_and_place.motion_files import write_model_a
 
 UNIT = load_preset("mu-0.75x")
 PRESSURES = np.array([-20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0])

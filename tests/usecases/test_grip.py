@@ -15,19 +15,19 @@ from mu_addon.design.parameters import to_toml
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.report.pc2 import read_pc2
 from mu_addon.resolved.unit import mesh_printed
 from mu_addon.usecases.grip import path_deviation
 from mu_addon.usecases.grip.grasp import OF_FIDELITY, Cube, Grip, grasp
-from mu_addon.usecases.grip.motion import even
+from mu_addon.usecases.grip.motion_files import even
 from mu_addon.usecases.grip.path_deviation import PathDeviations, path_deviations, published_deviations
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
-from mu_addon.usecases.simulate_and_place.motion import read_motion
+from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 
 COARSE = MeshSettings(refine=0.3)
 

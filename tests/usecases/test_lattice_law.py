@@ -96,7 +96,7 @@ def test_another_law_is_another_entry_of_the_cache():
 
 
 def simulated_mesh():
-    from mu_addon.meshing.unit import mesh_unit
+    from mu_addon.meshing.homogenised_unit import mesh_unit
 
     return mesh_unit(JOB.unit, JOB.mesh)
 

@@ -17,18 +17,18 @@ from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import write_npz
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import Candidate, candidate_paths, roi, with_sensor
-from mu_addon.placement.whole import whole_body
+from mu_addon.placement.whole_body import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
 from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.motion import (
+from mu_addon.usecases.simulate_and_place.motion_files import (
     FIELDS,
     MODEL_A,
     REGIONS,
@@ -39,8 +39,8 @@ from mu_addon.usecases.simulate_and_place.motion import (
     write_model_a,
     write_sensitivity,
 )
-from mu_addon.usecases.simulate_and_place.panel_pictures import ANGLE, delta_name, write_angle, write_delta
 from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
+from mu_addon.usecases.simulate_and_place.result_pictures import ANGLE, delta_name, write_angle, write_delta
 
 UNIT = load_preset("mu-0.75x")
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])

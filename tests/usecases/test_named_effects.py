@@ -23,8 +23,8 @@ from mu_addon.fem.kinematics import bending_angle_deg, probe
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.candidates import candidate_paths, evaluate
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs

@@ -18,7 +18,7 @@ from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place import study as module
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.motion import read_motion
+from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 

@@ -12,15 +12,15 @@ from mu_addon.errors import InputError
 from mu_addon.fem.laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.materials.library import load_material, material_text, parse_material
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.motion import read_motion
+from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.study import Study
 
 BASE = Unit(chambers=Chambers(count=3))

@@ -21,9 +21,9 @@ import numpy as np
 
 from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.files import write_text
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import AXES, LATTICE, Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 
 from .recording import Trial, instrument, read, write
 from .units import _softened

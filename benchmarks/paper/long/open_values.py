@@ -11,9 +11,9 @@ import numpy as np
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import ConvergenceError, MuError
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.run.cache import Cache, key
 from mu_addon.usecases.parameter_study.variable import Variable
 

@@ -17,7 +17,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.self_intersection import first_self_intersection
 from mu_addon.fem.state import State, rest
 from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit import materials_of
+from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import Mesh
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi

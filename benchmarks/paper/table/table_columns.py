@@ -11,8 +11,8 @@ import numpy as np
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import ConvergenceError
+from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.meshing.unit import mesh_unit
 from mu_addon.placement.deviation import Deviation, deviation_of
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key

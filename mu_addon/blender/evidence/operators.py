@@ -13,8 +13,8 @@ from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import from_unit, to_unit
-from . import motion as evidence_motion
 from . import state as evidence
+from . import timeline as evidence_motion
 
 NO_DATA = "Choose a folder of measured data first"
 

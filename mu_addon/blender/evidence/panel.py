@@ -11,8 +11,8 @@ from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import readable
 from ..shared.wording import in_panel
-from . import motion as evidence_motion
 from . import state as evidence
+from . import timeline as evidence_motion
 
 JOB = "evidence_"
 ROWS = 5

@@ -15,9 +15,9 @@ from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit.object import active_root
 from ..unit.properties import to_unit
-from . import motion
 from . import object as gripper_object
 from . import state as grasps
+from . import timeline
 
 NO_GRIPPER = "Select a Monolithic Gripper, or add one: Add > Mesh > Monolithic Gripper"
 
@@ -128,9 +128,9 @@ class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):
     def execute(self, context):
         root = gripper_object.active(context)
         if self.on:
-            motion.show(root, context.scene)
+            timeline.show(root, context.scene)
         else:
-            motion.hide(root)
+            timeline.hide(root)
         return {"FINISHED"}
 
 

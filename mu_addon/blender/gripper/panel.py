@@ -9,9 +9,9 @@ from ...design.quantity import describe
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import RootPanel, alert, wrapped
 from ..unit.fields import field
-from . import motion
 from . import object as gripper_object
 from . import state as grasps
+from . import timeline
 
 JOB = "grasp_"
 PHASES = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
@@ -94,7 +94,7 @@ def _found(layout, scene, root, found):
         held, icon = ("Held", "CHECKMARK") if f["held"] else ("Slips", "ERROR")
         wrapped(column, f"{held}: friction carries {f['margin']:.2g} times the weight", icon)
         column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
-    on = bool(motion.parts(root))
+    on = bool(timeline.parts(root))
     row = box.row(align=True)
     text = "Hide Grasp" if on else "Show Grasp"
     row.operator("mu.grasp_show", text=text, icon="MOD_SIMPLEDEFORM", depress=on).on = not on

@@ -16,7 +16,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...usecases.simulate_and_place.motion import MODEL_A
+from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.displays import LEGEND
 from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol

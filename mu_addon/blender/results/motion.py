@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...report.pc2 import read_pc2, write_pc2
-from ...usecases.simulate_and_place.motion import (
+from ...usecases.simulate_and_place.motion_files import (
     MODEL_A,
     PLAYED,
     REGIONS,

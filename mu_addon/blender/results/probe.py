@@ -12,7 +12,7 @@ from bpy_extras.view3d_utils import (
     region_2d_to_vector_3d,
 )
 
-from ...usecases.simulate_and_place.motion import MODEL_A
+from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol
 from ..unit import object as unit_object

@@ -17,7 +17,7 @@ MOTION = "mu_motion_part"
 """Mark of the objects that show a study's motion, see `results.motion`. It must differ from property groups:
 up to Blender 4.5 those are among an object's custom properties."""
 EVIDENCE = "mu_evidence_part"
-"""Mark of the objects that show measured motion, see `evidence.motion`."""
+"""Mark of the objects that show measured motion, see `evidence.timeline`."""
 CHECK = "mu_check"
 """Mark of the objects that show a print check's findings, see `printing.marks`."""
 LAYER = "mu_layer"

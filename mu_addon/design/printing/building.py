@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import layers
-from .drain import Chambers
+from .chambers import Chambers
 from .finding import MOST_PLACES, Finding, Points, Severity, clustered, counted
 from .printer import Printer
 from .voxels import VoxelRows

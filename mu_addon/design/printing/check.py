@@ -19,10 +19,10 @@ from ..surface import Triangles, Vertices, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
 from .building import build_findings
+from .chambers import chambers, distance_field
 from .crossing import MOST_CROSSINGS, crossings
-from .drain import chambers, distance_field
+from .drainage import drainage_findings
 from .finding import NOWHERE, Finding, Severity, at_least, clustered, none_of
-from .leaks import drainage_findings
 from .nominal import against_nominal
 from .orientation import Build, fits, orientations
 from .printer import Printer

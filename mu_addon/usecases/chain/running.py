@@ -20,8 +20,8 @@ from ...fem.state import State
 from ...files import write_csv
 from ...materials.library import load_material
 from ...measured.pose import down
+from ...meshing.homogenised_unit import MeshingWarning
 from ...meshing.mesh import Mesh
-from ...meshing.unit import MeshingWarning
 from ...report.vtk import write_trajectory
 from ...resolved.unit import mesh_of
 from ...run.cache import Cache, key

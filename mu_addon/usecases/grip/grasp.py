@@ -17,9 +17,9 @@ from ...design.anchors import anchor_points
 from ...design.gripper import Gripper
 from ...design.settings import FRICTION
 from ...errors import ConvergenceError, InputError
+from ...fem.dead_loads import STANDARD_GRAVITY
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import TipSection, probe
-from ...fem.loads import STANDARD_GRAVITY
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.newton_settings import CONTACT_NEWTON, NewtonSettings

@@ -18,7 +18,7 @@ from ...errors import OutputError
 from ...fem.materials import Materials
 from ...fem.self_intersection import first_self_intersection
 from ...fem.state import State, rest
-from ...fem.unit import materials_of, self_contact_of
+from ...fem.unit_materials import materials_of, self_contact_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
 from ...resolved.unit import mesh_of
@@ -30,7 +30,7 @@ from ...sensing.signal import Signal, traced_signal
 from ..simulate_and_place.job import in_time_newton
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
-from .motion import write_grasp
+from .motion_files import write_grasp
 from .path_deviation import PathDeviations, path_deviations, published_deviations
 from .phases import MEANING
 

@@ -25,7 +25,7 @@ from ...fem.model import Model
 from ...fem.newton_settings import CONTACT_NEWTON
 from ...fem.time_stepping import simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
-from ...fem.unit import materials_of, self_contact_of
+from ...fem.unit_materials import materials_of, self_contact_of
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from ...design.gripper import Gripper, load_gripper
-from ...fem.unit import materials_of
+from ...fem.unit_materials import materials_of
+from ...meshing.homogenised_unit import mesh_unit
 from ...meshing.settings import MeshSettings
-from ...meshing.unit import mesh_unit
 from ...run.context import RunContext
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase

@@ -11,7 +11,7 @@ from ...design.body import Body
 from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
-from ...fem.unit import materials_of
+from ...fem.unit_materials import materials_of
 from ...meshing.settings import RESOLVED, MeshSettings
 from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
 from ...optimization.settings import WORKERS

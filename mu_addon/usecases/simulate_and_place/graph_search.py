@@ -31,12 +31,12 @@ from ...placement.influence import (
 )
 from ...placement.response import Response, reduced_response
 from ...placement.search import SearchSettings, front, search_paths
-from ...placement.whole import whole_body
+from ...placement.whole_body import whole_body
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
 from ...resolved.response import bar_response
 from ...resolved.waveguide import bar_of
-from .motion import write_sensitivity
+from .motion_files import write_sensitivity
 
 if TYPE_CHECKING:
     from .job import Job

@@ -253,7 +253,7 @@ class Job:
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
-        from ...fem.unit import materials_of
+        from ...fem.unit_materials import materials_of
 
         drawn = materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
         return self.effects.materials(drawn, mesh)
@@ -268,7 +268,7 @@ class Job:
 
             model.obstacles = obstacles_of(self.obstacles, self.unit, mesh)
         if self.self_contact:
-            from ...fem.unit import self_contact_of
+            from ...fem.unit_materials import self_contact_of
 
             model.self_contact = self_contact_of(self.unit, mesh, self.self_friction)
         return model

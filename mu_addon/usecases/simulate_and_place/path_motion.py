@@ -9,7 +9,7 @@ import numpy as np
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, roi, with_sensor
 from ...placement.inclusion import PRINTED, sensor_share
-from .motion import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
+from .motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...fem.kinematics import TipSection
-from .motion import Motion
+from .motion_files import Motion
 
 Array = np.ndarray[Any, Any]
 

@@ -22,7 +22,7 @@ from ...report.results import (
 )
 from ...run.versions import package_versions
 from .job import LATTICE_LAW
-from .motion import CONTACT_PRESSURE, REGIONS, read_motion
+from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def write_report(study: Study, stopped: str = "") -> None:
 
 def _panel_pictures(study: Study) -> None:
     """Write pictures of the study's answers for panels, beside its motion."""
-    from .panel_pictures import write_angle, write_delta
+    from .result_pictures import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
         return

@@ -32,10 +32,10 @@ from ...fem.time_stepping import Instant, simulate_in_time
 from ...fem.trajectory import Trajectory, simulate
 from ...files import write_csv, write_npz
 from ...homogenize.foam_response import ellipticity
+from ...meshing.homogenised_unit import MeshingWarning
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...meshing.settings import MeshSettings
-from ...meshing.unit import MeshingWarning
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...placement.deviation import rank
 from ...reading import file_bytes, parse_json
@@ -60,7 +60,7 @@ from .candidates_in_time import evaluations
 from .contact_history import history
 from .expected import work
 from .job import Job
-from .motion import write_model_a
+from .motion_files import write_model_a
 from .path_motion import keep_motion
 from .settings import STAGES
 from .study_file import LAYOUT, NAME

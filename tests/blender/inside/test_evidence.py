@@ -12,9 +12,9 @@ import bpy
 import numpy as np
 import pytest
 
-from mu_addon.blender.evidence import motion as evidence_motion
 from mu_addon.blender.evidence import panel as evidence_panel
 from mu_addon.blender.evidence import state as evidence
+from mu_addon.blender.evidence import timeline as evidence_motion
 from mu_addon.blender.simulate import effects
 from mu_addon.blender.simulate import panel as panels
 from mu_addon.blender.simulate import study_folder as studies

@@ -7,10 +7,10 @@ import bpy
 import numpy as np
 import pytest
 
-from mu_addon.blender.gripper import motion as grasp_motion
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.gripper import panel as gripper_panel
 from mu_addon.blender.gripper import state as grasps
+from mu_addon.blender.gripper import timeline as grasp_motion
 from mu_addon.blender.gripper.properties import to_gripper
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.unit import object as unit_object

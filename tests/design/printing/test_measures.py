@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.design import shapes
-from mu_addon.design.printing import drain, faces, layers
+from mu_addon.design.printing import chambers, faces, layers
 from mu_addon.design.printing.check import check
 from mu_addon.design.printing.crossing import MOST_CROSSINGS, crossings, near_pairs
 from mu_addon.design.printing.finding import clustered
@@ -197,7 +197,7 @@ def test_a_chamber_and_its_ways_out():
     """A ball's hollow with a bore of 2 mm to the top and one of 1 mm to the side."""
     hollow = box(14, 14, 14) - shapes.ball(5.0, 64)
     body = hollow - shapes.cylinder(1.0, 0, 9, 32) - shapes.cylinder(0.5, 0, 9, 32).rotate([0, 90, 0])
-    found = drain.chambers(drain.distance_field(voxel_rows(*arrays(body), 0.2))).found
+    found = chambers.chambers(chambers.distance_field(voxel_rows(*arrays(body), 0.2))).found
     assert len(found) == 1
     assert found[0].volume == pytest.approx(4 / 3 * np.pi * 125, rel=0.02)
     assert np.linalg.norm(found[0].place) < 0.7
@@ -212,10 +212,10 @@ def test_a_chamber_and_its_ways_out():
 @pytest.mark.parametrize("near", [0.5, 12.0, 1000.0])
 def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
     """A bore of 2 mm, 30 mm long, is found before one of 1 mm to the side, wherever the search begins."""
-    monkeypatch.setattr(drain, "NEAR", near)
+    monkeypatch.setattr(chambers, "NEAR", near)
     hollow = box(12, 12, 42).translate([0, 0, 14]) - shapes.ball(4.0, 48)
     body = hollow - shapes.cylinder(1.0, 0, 40, 24) - shapes.cylinder(0.5, 0, 9, 24).rotate([0, 90, 0])
-    (found,) = drain.chambers(drain.distance_field(voxel_rows(*arrays(body), 0.25))).found
+    (found,) = chambers.chambers(chambers.distance_field(voxel_rows(*arrays(body), 0.25))).found
     far, side = found.openings
     assert [far.radius, side.radius] == pytest.approx([1.0, 0.5], abs=0.2)
     assert far.place[:2] == pytest.approx([0, 0], abs=0.3)
@@ -226,13 +226,13 @@ def test_a_way_out_is_the_widest_however_far_it_leads(near, monkeypatch):
 
 
 def test_a_sealed_chamber_has_no_way_out_and_an_open_frame_is_no_chamber():
-    sealed = drain.chambers(
-        drain.distance_field(voxel_rows(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25))
+    sealed = chambers.chambers(
+        chambers.distance_field(voxel_rows(*arrays(box(12, 12, 12) - shapes.ball(4.0, 48)), 0.25))
     )
     assert [len(chamber.openings) for chamber in sealed.found] == [0]
     assert sealed.hold(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5.0]])).tolist() == [True, False]
     frame = box(12, 12, 12) - box(9, 9, 14) - box(9, 14, 9) - box(14, 9, 9)
-    assert drain.chambers(drain.distance_field(voxel_rows(*arrays(frame), 0.25))).found == []
+    assert chambers.chambers(chambers.distance_field(voxel_rows(*arrays(frame), 0.25))).found == []
 
 
 def test_the_shortest_cut_of_a_surface_is_its_waist():

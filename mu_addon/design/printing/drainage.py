@@ -9,7 +9,7 @@ import numpy as np
 from .. import shapes
 from ..dimensions import Dimensions
 from ..parameters import Unit
-from .drain import Chambers, Opening
+from .chambers import Chambers, Opening
 from .finding import NOWHERE, Finding, Points, counted
 from .neck import necks
 from .printer import Printer

@@ -1,6 +1,6 @@
 """The motion of a grasp for display, one folder a cube.
 
-- motion/: one finger in its own frame, as `study.motion` has it, each instant a state of its own
+- motion/: one finger in its own frame, as of a study (`motion_files`), each instant a separate state
 - finger.pvd and its .vtu files: the half mesh, for ParaView
 - gripper.npz: both fingers in the gripper's frame: `rest_mm` (2, v, 3), `triangles` (t, 3), `membrane` (t,),
   whether a triangle is the membrane's; `time_s` (k,), `cube_mm` (k, 3), the cube's middle, `cube_side_mm`;
@@ -24,7 +24,7 @@ from ...files import make_folder, write_npz
 from ...meshing.mesh import Mesh
 from ...report.pc2 import write_pc2
 from ...report.vtk import write_trajectory
-from ..simulate_and_place.motion import read_motion, write_model_a
+from ..simulate_and_place.motion_files import read_motion, write_model_a
 from .grasp import Grasp
 
 Array = np.ndarray[Any, Any]

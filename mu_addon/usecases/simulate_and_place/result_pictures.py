@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...files import write_bytes
 from ...report.charts import BY_LENGTH, MAP, QUIET, label, signed, styled
 from ...report.results import Floats
-from .motion import FOLDER
+from .motion_files import FOLDER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
