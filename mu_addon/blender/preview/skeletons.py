@@ -19,6 +19,7 @@ from ...design.parameters import Unit
 from ...design.steps import Path, Section, Struts, TrimmedStruts, along
 from ...design.waveguide import Bar
 from ..shared.texts import path_symbol
+from .nodes import unit as unit_group
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,6 +28,8 @@ AROUND = 48
 """Number of flat pieces around the axis."""
 ALONG_STRUT = 4
 """Number of straight pieces of a strut, enough to show its taper."""
+INTO_WALL, INTO_CUT_WALL = 6.0, 1.0
+"""How far a strut goes on into the wall that cuts it, in radii; less where one sees into the chambers."""
 WIDEST_LANE = 0.4
 """Largest distance, in cells, between candidate paths drawn side by side, if the lattice is wide enough."""
 CANDIDATE_RADIUS = 0.07
@@ -96,17 +99,33 @@ def lines(trimmed: TrimmedStruts | None, cut: bool) -> Skeleton | None:
 
 
 def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
-    """Struts as polylines with their radius, or without one as lines; with `cut`, those at x <= 0."""
+    """Struts as polylines with a ball at every node, or without a radius as lines; with `cut`, at x <= 0."""
     if struts is None:
         return None
     shown = struts.trimmed
     here = (shown.ends[:, :, 0] <= 1e-6).all(axis=1) if cut else np.full(len(shown.ends), True)
     ends, first, last = shown.ends[here], shown.first[here], shown.last[here]
     pieces = 1 if struts.lattice is None else ALONG_STRUT
+    whole = np.stack([first == 0.0, last == 1.0], axis=1)
+    if struts.lattice is not None:
+        # Cut where its axis meets the wall, a tube that grazes it would show its end: it goes on into it.
+        radii = (INTO_CUT_WALL if cut else INTO_WALL) * _widest(struts.lattice)
+        into = radii / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        first, last = np.maximum(first - into, 0.0), np.minimum(last + into, 1.0)
     t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, pieces + 1)
-    radius = {} if struts.lattice is None else {"radius": struts.lattice.radii(t, shown.rows[here]).ravel()}
     edges = _polylines(len(ends), pieces + 1)
-    return Skeleton(along(ends, t).reshape(-1, 3), edges, attributes=radius)
+    points = along(ends, t)
+    if struts.lattice is None:
+        return Skeleton(points.reshape(-1, 3), edges)
+    radii = struts.lattice.radii(t, shown.rows[here])
+    # As the print has them: without a ball the tubes' ends lie open where they meet.
+    nodes, thick = points[:, [0, -1]][whole], radii[:, [0, -1]][whole]
+    place, number = np.unique(nodes.round(4), axis=0, return_inverse=True)
+    widest = np.zeros(len(place))
+    np.maximum.at(widest, number.ravel(), thick)
+    kind = np.repeat([unit_group.TUBE, unit_group.NODE], [radii.size, len(place)]).astype(np.int32)
+    attributes = {"radius": np.concatenate([radii.ravel(), widest]), unit_group.SKIN: kind}
+    return Skeleton(np.concatenate([points.reshape(-1, 3), place]), edges, attributes=attributes)
 
 
 def anchor_skeleton(points: Floats | None, struts: Struts | None) -> Skeleton | None:

@@ -77,7 +77,7 @@ def _part(name: str, part: Skeleton) -> Skeleton:
     attributes = {
         **part.attributes,
         "mu_part": np.full(count, PARTS.index(name), np.int32),
-        "mu_skin": np.full(count, skin, np.int32),
+        unit_group.SKIN: part.attributes.get(unit_group.SKIN, np.full(count, skin, np.int32)),
     }
     faces = sum(map(len, part.faces))
     own = np.zeros(faces, np.int64) if part.slots is None else part.slots

@@ -10,14 +10,15 @@ from . import balls, tubes
 from .wiring import Wiring
 
 NAME = "MU Unit"
-VERSION = 2
+VERSION = 3
 TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
 USES = (tubes.NAME, balls.NAME)
 RESULTS = ("Result 1", "Result 2")
 """Inputs for the objects shown in place of the mesh, if any is given."""
 SHOW_RESULT = "Show Result"
-PLAIN, TUBE, BALL = 0, 1, 2
-"""Values of the point attribute `mu_skin`."""
+SKIN = "mu_skin"
+PLAIN, TUBE, BALL, NODE = 0, 1, 2, 3
+"""A point attribute and its values; a node is a coarser ball of the struts' material."""
 
 
 def build(tree, tube_group, ball_group) -> None:
@@ -31,7 +32,7 @@ def build(tree, tube_group, ball_group) -> None:
     w.socket(SHOW_RESULT, "Bool", False, text="Show the results in place of the design")
     for name in RESULTS:
         w.socket(name, "Object", text="Object that plays a study's motion")
-    kind = w.node("GeometryNodeInputNamedAttribute", {"data_type": "INT"}, Name="mu_skin").outputs[0]
+    kind = w.node("GeometryNodeInputNamedAttribute", {"data_type": "INT"}, Name=SKIN).outputs[0]
 
     def those(value: int):
         same = w.node("FunctionNodeCompare", {"data_type": "INT", "operation": "EQUAL"}, B=value)
@@ -44,17 +45,20 @@ def build(tree, tube_group, ball_group) -> None:
         ).outputs["Selection"]
 
     struts = w.node("GeometryNodeGroup", {"node_tree": tube_group})
+    joints = w.node("GeometryNodeGroup", {"node_tree": ball_group}, Detail=2)
     anchors = w.node("GeometryNodeGroup", {"node_tree": ball_group})
     for node, value, detail, material in (
         (struts, TUBE, "Sides", "Struts"),
+        (joints, NODE, "", "Struts"),
         (anchors, BALL, "Detail", "Anchors"),
     ):
         tree.links.new(those(value), node.inputs["Geometry"])
-        tree.links.new(w.given(detail), node.inputs[detail])
+        if detail:
+            tree.links.new(w.given(detail), node.inputs[detail])
         tree.links.new(w.given(material), node.inputs["Material"])
     both = w.node("GeometryNodeJoinGeometry")
     # A join takes the last link first: the mesh's own slots stay the first ones.
-    for geometry in (anchors.outputs["Geometry"], struts.outputs["Geometry"], those(PLAIN)):
+    for geometry in (*(n.outputs["Geometry"] for n in (anchors, joints, struts)), those(PLAIN)):
         tree.links.new(geometry, both.inputs[0])
     played = w.node("GeometryNodeJoinGeometry")
     for name in RESULTS:
