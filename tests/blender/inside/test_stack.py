@@ -157,7 +157,7 @@ def test_muted_steps_are_left_out_and_not_printed(tmp_path):
     bpy.ops.mu.mute(step="struts")
     assert skins() == {nodes.unit.PLAIN}, "struts without thickness stay lines"
     bpy.ops.mu.mute(step="struts", muted=False)
-    assert skins() == {nodes.unit.TUBE}
+    assert skins() == {nodes.unit.TUBE, nodes.unit.NODE}
     bpy.ops.mu.mute(step="trim", muted=False)
     bpy.ops.mu.mute(step="cells")
     assert "lattice" not in shown_parts(root)
