@@ -108,6 +108,7 @@ def _tree(context: Any) -> list[Any]:
     root.mu_unit.cut = True
     bpy.ops.mu.path(name="alpha4")
     bpy.ops.mu.tree_of_unit(steps=True)
+    bpy.ops.mu.tree_show()
     viewports.frame([root])
     return [root]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..evidence import state as evidence
 from ..jobs.panel import whole
 from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
@@ -14,10 +15,15 @@ LETTERS = 14
 
 
 def draw(row, root) -> None:
-    """Draw one button, or the running simulation's progress, of the same height."""
-    if SIMULATION.is_running(root):
-        fraction, text = whole(SIMULATION.child(root), LETTERS)
-        row.progress(factor=fraction, text=text)
+    """Draw one button, or the running job's progress, of the same height."""
+    for kind in (SIMULATION, evidence.DIAGNOSIS):
+        if kind.is_running(root):
+            fraction, text = whole(kind.child(root), LETTERS)
+            row.progress(factor=fraction, text=text)
+            return
+    data = evidence.measured_data(root)
+    if data is not None and data.measured is not None and evidence.diagnosis(root) is None:
+        row.operator("mu.evidence_diagnose", text="Diagnose the Data", icon="VIEWZOOM")
         return
     found = studies.findings(root)
     if found is None or found.stale or not found.run.complete:

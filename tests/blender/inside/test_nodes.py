@@ -16,6 +16,7 @@ from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit.panel import MU_PT_unit
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.assets import asset_names
 from mu_addon.design.parameters import load_preset, preset_names
@@ -24,6 +25,7 @@ from mu_addon.design.section_picture import section_pixels
 from mu_addon.materials import load_material, material_names
 
 from .acting import add, refused
+from .drawing import drawn as drawn_by
 
 
 def edge(length, radius=None):
@@ -345,6 +347,8 @@ def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
         "tree": lambda: [n for t in trees.trees() for n in t.nodes],
     }[scene]
     assert made()
+    first = {"measured": "Diagnose the Data", "gripper": ""}.get(scene, "Simulate, perhaps")
+    assert first in drawn_by([MU_PT_unit]), "the step at the top is what the scene is about"
     area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
     view = area.spaces.active.region_3d
     bodies = [o for o in bpy.data.objects if o.type == "MESH" and len(o.data.vertices) and not o.hide_get()]
