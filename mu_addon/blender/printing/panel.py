@@ -184,7 +184,7 @@ def _directions(layout, settings, found) -> None:
 
 
 def direction_words(direction) -> str:
-    """A build direction in words, of a unit vector (3,) in the unit's frame: "tilted 35° toward +y"."""
+    """A build direction in words, of a unit vector (3,) in the unit's frame: "tilted 35° to +x +y"."""
     x, y, z = direction
     angle = math.degrees(math.acos(max(-1.0, min(1.0, z))))
     if angle < 1.0 or angle > 179.0:
@@ -192,7 +192,7 @@ def direction_words(direction) -> str:
     aside = math.hypot(x, y)
     signs = [f"{'+' if s > 0 else '-'}{axis}" for axis, s in (("x", x), ("y", y)) if abs(s) > 0.38 * aside]
     toward = " ".join(signs)
-    return f"lying, {toward} up" if abs(angle - 90.0) < 1.0 else f"tilted {angle:.0f}° toward {toward}"
+    return f"lying, {toward} up" if abs(angle - 90.0) < 1.0 else f"tilted {angle:.0f}° to {toward}"
 
 
 def _is_up(build, settings) -> bool:

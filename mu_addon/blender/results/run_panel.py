@@ -54,7 +54,9 @@ def found_in(run) -> str:
         return f"{path_symbol(name)} {j:.3f}"
     if run.angles:
         return f"{run.angles[-1][1]:+.1f}°"
-    return run.state.partition(";")[0]
+    # The column has room for eight letters; all of it is said below the list.
+    state = run.state.partition(";")[0].partition(":")[0]
+    return "stopped" if state in ("cancelled", "interrupted") else state
 
 
 def draw_runs(layout, root) -> None:

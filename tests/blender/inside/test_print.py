@@ -444,6 +444,13 @@ def test_a_body_of_ones_own_is_checked_by_its_solid():
     assert "Stale: it belongs to other parameters" in drawn()
 
 
+def test_the_words_of_a_direction_fit_beside_their_button():
+    angles = np.radians(np.arange(0, 360, 5))
+    tilts = np.radians([0, 20, 70, 90, 120, 180])
+    every = [(np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), np.cos(t)) for t in tilts for a in angles]
+    assert max(len(print_panel.direction_words(direction)) for direction in every) <= 20
+
+
 def test_layers_follow_the_slider_the_direction_and_the_solid():
     root = short()
     assert "Build the solid first" in refused(bpy.ops.mu.print_layer)

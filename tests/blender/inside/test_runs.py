@@ -99,6 +99,12 @@ def test_what_is_shown_on_the_unit_follows_the_run(home):
     assert abs(places.largest(root).value - most) < 1e-4
 
 
+def test_a_run_that_was_stopped_says_so_in_the_room_there_is():
+    for status in ("cancelled; motion complete", "interrupted; no result yet", "stopped: memory; 2 states"):
+        run = SimpleNamespace(ranking=[], angles=[], state=status)
+        assert run_panel.found_in(run) == "stopped"
+
+
 def test_names_and_stars_are_kept_with_the_run(home):
     root = started(home)
     entry = bpy.context.window_manager.mu_runs.entries[2]
