@@ -1,11 +1,13 @@
 """What the window would stand still for is made in a process of its own, and what asked for it asked again.
 
-In background, where timers never fire and no window waits, whoever asks makes it himself.
+In background, where timers never fire and no window waits, it is made at once; so it is for a script, which
+goes on with what is made.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +21,23 @@ from ..shared import viewports
 from .start_child import JOB_ENDED, JobKind, forget
 
 
+_scripts = 0
+
+
 def at_once() -> bool:
-    """Whether nobody waits at a window."""
-    return bool(bpy.app.background)
+    """Whether nobody waits at a window: in background, and while a script calls an operator."""
+    return bool(bpy.app.background or _scripts)
+
+
+@contextmanager
+def called_by(script: bool) -> Iterator[None]:
+    """While the body runs an operator, called by a script or by a hand."""
+    global _scripts
+    _scripts += script
+    try:
+        yield
+    finally:
+        _scripts -= script
 
 
 @attrs.define(eq=False)
@@ -63,7 +79,7 @@ _waiting: dict[str, tuple[Elsewhere, list[Callable[[], None]]]] = {}
 
 def _kind(wanted: Elsewhere, root: Any) -> JobKind:
     name = root.mu_unit.uuid
-    return JobKind(f"prepare-{wanted.job.what}", lambda _: name, lambda _: wanted.folder, wanted.title)
+    return JobKind(f"prepare-{wanted.folder.name}", lambda _: name, lambda _: wanted.folder, wanted.title)
 
 
 def _ended(key: str) -> None:

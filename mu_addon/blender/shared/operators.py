@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import MuError
-from ..jobs.prepared import Elsewhere
+from ..jobs.prepared import Elsewhere, called_by
 from ..unit.object import active_root, by_uuid
 from .displays import editable
 from .wording import in_panel
@@ -60,7 +60,8 @@ def reports_errors(execute):
     @wraps(execute)
     def reported(self, context):
         try:
-            return execute(self, context)
+            with called_by(script=not self.options.is_invoke):
+                return execute(self, context)
         except Elsewhere as wanted:
             root = active_root(context)
             try:
@@ -82,7 +83,7 @@ def _again(uuid: str, name: str, values: dict) -> None:
     if root is not None and windows:
         with bpy.context.temp_override(window=windows[0], object=root, active_object=root):
             getattr(bpy.ops.mu, name.rpartition(".")[2].removeprefix("MU_OT_"))(
-                "EXEC_DEFAULT", True, **values
+                "INVOKE_DEFAULT", True, **values
             )
 
 

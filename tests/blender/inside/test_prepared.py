@@ -44,8 +44,13 @@ def test_a_solid_is_made_elsewhere_and_is_the_same(monkeypatch, tmp_path):
     assert unit_object.solid_is_current(root)
     assert start_child.ended() == [], "what is shown needs no notice"
     made = corners(root.mu_unit.solid)
+    # One more while the file is written: both are made.
+    root.mu_unit.chambers.wall_mm = 1.2
     assert bpy.ops.mu.export_stl(filepath=str(tmp_path / "it.stl"), quality="interactive") == {"CANCELLED"}
+    assert bpy.ops.mu.solid() == {"CANCELLED"}
     settled()
+    made = corners(root.mu_unit.solid)
+    assert unit_object.solid_is_current(root)
     assert (tmp_path / "it.stl").stat().st_size == 84 + 50 * len(root.mu_unit.solid.polygons)
     (key,) = start_child.ended()
     assert "STL" in start_child.title_of(key), "a file is told of when it is there"
