@@ -20,7 +20,6 @@ from ...run.folder import write_run
 from ..shared import viewports
 from .start_child import JOB_ENDED, JobKind, forget
 
-
 _scripts = 0
 
 
