@@ -28,7 +28,7 @@ AROUND = 48
 """Number of flat pieces around the axis."""
 ALONG_STRUT = 4
 """Number of straight pieces of a strut, enough to show its taper."""
-INTO_WALL, INTO_CUT_WALL = 6.0, 1.0
+INTO_WALL, INTO_CUT_WALL = 6.0, 0.4
 """How far a strut goes on into the wall that cuts it, in radii; less where one sees into the chambers."""
 WIDEST_LANE = 0.4
 """Largest distance, in cells, between candidate paths drawn side by side, if the lattice is wide enough."""

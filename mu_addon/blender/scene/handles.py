@@ -6,6 +6,7 @@ A drag is an operator: from an arrow, a menu or the search, with its value in th
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import attrs
@@ -16,11 +17,13 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Matrix, Vector
 
 from ...design.dimensions import Dimensions
+from ...errors import InputError
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import viewports
 from ..shared.displays import editable
 from ..shared.operators import UnitOperator
+from ..shared.wording import in_panel
 from ..steps import state as stack
 from ..unit import object as unit_object
 from ..unit.fields import field, label, step_of
@@ -125,7 +128,11 @@ class MU_OT_drag(UnitOperator, bpy.types.Operator):
         self._root = root
         self._start = self._read(context)
         self._mouse = Vector((event.mouse_region_x, event.mouse_region_y))
-        self._pixels, self._per_pixel = self._scale(context)
+        try:
+            self._pixels, self._per_pixel = self._scale(context)
+        except InputError as error:
+            self.report({"ERROR"}, in_panel(str(error)))
+            return {"CANCELLED"}
         context.window_manager.modal_handler_add(self)
         self._tell(context)
         return {"RUNNING_MODAL"}
@@ -233,9 +240,9 @@ class MU_GGT_handles(bpy.types.GizmoGroup):
     def draw_prepare(self, context):
         root = unit_object.active_root(context)
         for name, arrow in self.arrows.items():
-            # A broken rule keeps the last good preview; its arrows wait where they were.
             arrow.hide = not usable(root, name)
-            if not arrow.hide and not root.mu_unit.trouble:
+            # A broken rule keeps the last good preview; its arrows wait where they were.
+            with suppress(InputError):
                 at, toward = _place(root, name)
                 turn = toward.to_track_quat("Z", "Y").to_matrix().to_4x4()
                 arrow.matrix_basis = Matrix.Translation(at) @ turn

@@ -119,3 +119,20 @@ def test_what_is_not_seen_is_not_dragged():
     context.region_data = None
     assert hand.invoke(context, event("LEFTMOUSE")) == {"CANCELLED"}
     assert hand.report.call_args.args[1] == "Drag in a 3D view"
+
+
+def test_a_broken_rule_leaves_the_arrows_where_they_were():
+    root = add()
+    arrows = {name: SimpleNamespace(hide=False, matrix_basis=None) for name in handles.HANDLES}
+    group = SimpleNamespace(arrows=arrows)
+    handles.MU_GGT_handles.draw_prepare(group, seen(root))
+    before = arrows["wall"].matrix_basis
+    assert arrows["pressure"].hide
+    root.mu_unit.chambers.wall_mm = 3.0
+    handles.MU_GGT_handles.draw_prepare(group, seen(root))
+    assert arrows["wall"].matrix_basis == before
+    root.mu_unit.chambers.wall_mm = 0.9
+    hand, context = held(root, "wall")
+    root.mu_unit.chambers.wall_mm = 3.0
+    assert hand.invoke(context, event("LEFTMOUSE")) == {"CANCELLED"}
+    assert "wall" in hand.report.call_args.args[1]
