@@ -226,7 +226,8 @@ class MU_GGT_handles(bpy.types.GizmoGroup):
     @classmethod
     def poll(cls, context):
         root = unit_object.root_of(unit_object.active_object(context))
-        return root is not None and any(usable(root, name) for name in HANDLES)
+        # Not while something else is painted or edited that stands beside the unit.
+        return context.mode == "OBJECT" and root is not None and any(usable(root, name) for name in HANDLES)
 
     def setup(self, context):
         self.arrows = {}

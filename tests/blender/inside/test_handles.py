@@ -128,6 +128,8 @@ def test_a_broken_rule_leaves_the_arrows_where_they_were():
     handles.MU_GGT_handles.draw_prepare(group, seen(root))
     before = arrows["wall"].matrix_basis
     assert arrows["pressure"].hide
+    assert handles.MU_GGT_handles.poll(SimpleNamespace(mode="OBJECT", object=root))
+    assert not handles.MU_GGT_handles.poll(SimpleNamespace(mode="PAINT_WEIGHT", object=root))
     root.mu_unit.chambers.wall_mm = 3.0
     handles.MU_GGT_handles.draw_prepare(group, seen(root))
     assert arrows["wall"].matrix_basis == before
