@@ -63,7 +63,7 @@ def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
     factorisations = 0
     for step_number in range(MOST_STEPS):
         level = float(np.linalg.norm(force))
-        convex = model.self_contact is not None and level > EXACT_BELOW * scale
+        convex = model.has_convex_tangent and level > EXACT_BELOW * scale
         values = model.tangent(u, pressure_MPa, parameters, convex)
         if level <= tolerance * scale:
             try:

@@ -78,7 +78,7 @@ class Equilibrium:
         asked for, it comes first. first: number of the share to begin with, 0 for none. Returns whether the
         tangent asked for was definite, and the number of the share that was added.
         """
-        touches = self.model.self_contact is not None
+        touches = self.model.has_convex_tangent
         shares = 0.0, *self.settings.regularisation
         for with_convex in dict.fromkeys((convex, convex or touches)):
             values = self.model.tangent(u, pressure, self.parameters, with_convex)
@@ -165,7 +165,7 @@ class Equilibrium:
         """
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
-        touches = self.model.self_contact is not None
+        touches = self.model.has_convex_tangent
         factorisations, stale, definite, convex, added = 0, not factored, True, False, 0
         for iteration in range(s.max_iterations + 1):
             if search.converged:

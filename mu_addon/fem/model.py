@@ -146,6 +146,8 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
         self._least_force = self._beam_forces = 0.0
+        # Stiffness of obstacles on surfaces of beams, by each obstacle, of the last `_gathered`.
+        self._on_beams: list[tuple[Array, Array]] = []
         # Position of the last forces, and these: they rotate with their sections.
         self._seen: tuple[Array, float, MaterialData, Array] | None = None
         self.reference = Reference(mesh, device)
@@ -505,6 +507,11 @@ class Model:
                 )
             )
 
+    @property
+    def has_convex_tangent(self) -> bool:
+        """True if `tangent` has negative parts of contact to leave out: of pairs, or of turning sections."""
+        return self.self_contact is not None or (self._carried is not None and bool(self.obstacles))
+
     def moved(self, u: Array, step: Array) -> Array:
         """Displacements (n, 3) in mm of u (n, 3) after a step (f,) in mm of the free unknowns.
 
@@ -638,10 +645,33 @@ class Model:
     def _values(
         self, blocks: Array, u: Array, pressure: float, m: MaterialData, convex: bool = False
     ) -> Array:
-        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with those of beams added."""
+        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with beams and obstacles on beams added."""
         if self._carried is not None:
             blocks = self._beam_tangent(u, pressure, m, blocks, convex)
-        return np.asarray(blocks.ravel()[self._scalar_map])
+        values = np.asarray(blocks.ravel()[self._scalar_map])
+        for pairs, added in self._on_beams:
+            self._add_on_beams(values, u, pairs, added)
+        return values
+
+    def _add_on_beams(self, values: Array, u: Array, pairs: Array, blocks: Array) -> None:
+        """Add stiffness of obstacles on carried nodes to the tangent's own values (nnz,) at u (n, 3), in place.
+
+        pairs (j, 2): nodes of one beam's surface, each pair once; blocks (j, 3, 3), symmetric.
+        """
+        twice = pairs[:, 0] != pairs[:, 1]
+        pairs = np.vstack([pairs, pairs[twice, ::-1]])
+        blocks = np.concatenate([blocks, blocks[twice]])
+        rows, columns = np.broadcast_arrays(
+            3 * pairs[:, :1, None] + np.arange(3)[:, None], 3 * pairs[:, 1:, None] + np.arange(3)
+        )
+        size = 3 * len(self.mesh.nodes)
+        h = self._uncarried(
+            sparse.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)), u
+        )
+        row, column, data = self._lower(h.row, h.col, h.data)
+        places, has = self._own_pattern.places(row, column)
+        assert has.all(), "a beam's ends have blocks with each other"
+        np.add.at(values, places, data)
 
     def _with_self_contact(self, own: Array, u: Array, convex: bool) -> Array:
         """Values (nnz,) of the tangent with self-contact, its pattern enlarged if need be."""
@@ -707,11 +737,16 @@ class Model:
         inputs = [self._block_parts, *self._block_lists, self._blocks]
         self._launch(kernels.gather_blocks, len(self._blocks), inputs)
         blocks: Array = self._blocks.numpy()
+        self._on_beams = []
         for obstacle in self.obstacles:
             pairs, added = obstacle.blocks(u)
             # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
             keys = pairs.min(axis=1).astype(np.int64) * len(self.mesh.nodes) + pairs.max(axis=1)
-            np.add.at(blocks, np.searchsorted(self._block_keys, keys), added)
+            places = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
+            own = self._block_keys[places] == keys
+            np.add.at(blocks, places[own], added[own])
+            # But for those of a beam, whose elements have none: they belong to the beam's ends.
+            self._on_beams.append((pairs[~own], added[~own]))
         if self._folding is not None:
             blocks = self._folding(blocks)
         return blocks

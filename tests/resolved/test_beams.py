@@ -12,6 +12,8 @@ from mu_addon.fem.carried import Carried, following
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.model import Model
+from mu_addon.fem.obstacle import Obstacle
+from mu_addon.fem.rigid import Sphere
 from mu_addon.fem.stress import cauchy
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
@@ -73,8 +75,12 @@ def test_carried_nodes_move_with_rigid_sections(mesh):
     np.testing.assert_allclose(u[mesh.carried], mesh.nodes[mesh.carried] @ move.T, atol=1e-12)
 
 
-def test_forces_and_tangent_are_slopes_with_loads_on_what_is_carried(mesh):
+@pytest.mark.parametrize("beside", [(), (Sphere((0.0, SMALL.printed.bounds[1][1] + 18.0, 19.0), 20.0),)])
+def test_forces_and_tangent_are_slopes_with_loads_on_what_is_carried(mesh, beside):
     model, u = random_state(mesh)
+    model.obstacles = tuple(Obstacle(mesh, rigid, 0.1, 0.05) for rigid in beside)
+    for obstacle in model.obstacles:
+        assert np.isin(obstacle.forces(u)[0], mesh.carried).any()
     model.load = 1e-3 * np.random.default_rng(4).normal(size=mesh.nodes.shape)
     m = model.parameters(materials_of(SMALL, mesh))
     v, h = np.random.default_rng(5).normal(size=len(model.free)), 1e-5

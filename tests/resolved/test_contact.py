@@ -19,7 +19,7 @@ from mu_addon.homogenize.cell_mesh import cell_materials
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE
-from mu_addon.meshing.settings import SOLID, MeshSettings
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.resolved.lattice import clearance
 from mu_addon.resolved.strut import strut_mesh
 from mu_addon.resolved.unit import mesh_printed
@@ -31,7 +31,7 @@ TIP = SMALL.dimensions.height
 
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_printed(SMALL, MeshSettings(refine=0.5, fidelity=SOLID))
+    return mesh_printed(SMALL, MeshSettings(refine=0.5, fidelity=RESOLVED))
 
 
 def beside(mesh, obstacle):
@@ -99,7 +99,7 @@ def test_a_plate_on_the_tip_is_held_by_the_base_and_its_work_is_stored(mesh):
 def test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit(mesh):
     """Where only the wall is touched both meshes of it agree as well as two of one kind, within 7 %."""
     force = []
-    for body in (mesh, mesh_unit(SMALL, MeshSettings(refine=0.7))):
+    for body in (mesh, mesh_unit(SMALL, MeshSettings())):
         ball = Obstacle(body, Sphere((0.0, 0.0, TIP + 3.0), 3.0), 0.1, 0.05, 2)
         eq, u = beside(body, ball), rest(body).u
         for by in (0.02, 0.05):

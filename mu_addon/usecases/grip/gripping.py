@@ -109,7 +109,7 @@ class Gripping:
     def make_mesh(self) -> None:
         """Analysis mesh of half a finger."""
         with self.progress.stage("mesh", 5.0):
-            mesh = self.mesh = mesh_of(self.job.gripper.unit, self.job.mesh.without_beams)
+            mesh = self.mesh = mesh_of(self.job.gripper.unit, self.job.mesh)
             self.progress.made(f"{len(mesh.nodes)} nodes and {len(mesh.tets)} elements")
         self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
 

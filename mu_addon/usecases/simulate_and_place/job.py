@@ -338,10 +338,9 @@ class Job:
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
         """Settings of a mesh for this unit and its obstacles.
 
-        Of the whole unit where one is not its own mirror image; solid beside obstacles, and where the wall
-        has a law of its own, since beams support neither.
+        Of the whole unit where one is not its own mirror image; solid where the wall has a law of its own.
         """
-        if self.unit.wall.names or self.obstacles:
+        if self.unit.wall.names:
             settings = settings.without_beams
         if not self.obstacles or mirrored(self.obstacles):
             return settings
