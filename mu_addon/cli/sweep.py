@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def add(commands: Commands[Any]) -> None:
-    """Run the unfinished points, and report on all."""
+    """Add the parser of `sweep`."""
     from ..usecases.parameter_study.settings import ADD, WORKERS
 
     command = commands.add_parser(

@@ -96,8 +96,8 @@ class MeshSettings:
         return found
 
 
-QUICK = MeshSettings(refine=0.5)
-"""Coarse mesh for a preview in Blender."""
+QUICK = MeshSettings(refine=0.5, fidelity=RESOLVED)
+"""Coarse mesh of the printed body, for a quick look in Blender."""
 
 
 def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:

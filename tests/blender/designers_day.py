@@ -63,7 +63,7 @@ names = {entry["file"] for entry in printing.exported(root).manifest["files"]}
 assert {"unit.stl", "unit.3mf", "unit-beams.3mf", "waveguide.step", "nodes.txt"} <= names, names
 
 assert jobs.missing() == []
-root.mu_unit.study.detail = "quick"
+root.mu_unit.study.detail = "full"
 assert bpy.ops.mu.simulate() == {"FINISHED"}
 child = SIMULATION.child(root)
 while not child.progress:
@@ -79,7 +79,7 @@ watch(child)
 assert child.state == child_module.DONE, child.error
 assert not any("gmsh" in warning for warning in child.warnings), child.warnings
 found = studies.findings(root)
-assert (found.summary["status"], found.stale, found.quick) == ("complete", False, True)
+assert (found.summary["status"], found.stale, found.run.detail) == ("complete", False, "full")
 assert len(found.ranking) == 10
 for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
     assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}
@@ -93,7 +93,7 @@ assert len(studies.findings(root).ranking) == 10
 # Something in the way, and the gripper to print; the active object says which is worked on.
 assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
 stopped = unit_object.active_root(bpy.context)
-stopped.mu_unit.study.command, stopped.mu_unit.study.detail = "simulate", "quick"
+stopped.mu_unit.study.command, stopped.mu_unit.study.detail = "simulate", "full"
 assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
 bpy.context.view_layer.update()
 assert bpy.ops.mu.simulate() == {"FINISHED"}

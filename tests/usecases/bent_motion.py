@@ -11,7 +11,7 @@ from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.settings import QUICK, RESOLVED, MeshSettings
 from mu_addon.usecases.simulate_and_place import history
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 from mu_addon.usecases.simulate_and_place.motion_files import write_model_a
@@ -47,12 +47,11 @@ def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, refine=0.5, un
 def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     """A finished run in a unit's home folder, as if ended at a time: bent `more` times as far.
 
-    full: of quadratic elements, as its inputs say; ranked: whether it ranked paths, too. Returns the run.
+    full: on the default mesh, as its inputs say, else a quick look; ranked: whether it ranked paths, too. Returns the run.
     """
     chambers = attrs.evolve(UNIT.chambers, wall_mm=wall_mm)
-    job = Job(attrs.evolve(UNIT, chambers=chambers), grasp())
-    if not full:
-        job = attrs.evolve(job, mesh=MeshSettings(order=1, refine=0.5), rules=("volume_fraction",))
+    mesh = MeshSettings(fidelity=RESOLVED) if full else QUICK
+    job = Job(attrs.evolve(UNIT, chambers=chambers), grasp(), mesh=mesh)
     if not ranked:
         job = attrs.evolve(job, stages=("design", "simulate"))
     folder, job = history.place_of(home, job)
@@ -62,7 +61,7 @@ def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     summary = {"status": "complete", "angle_deg": angles, "seconds": {"Model A": 480.0 if full else 20.0}}
     if ranked:
         found = {"alpha4": 0.05 * more, "alpha1": 0.1, "alpha10": 0.4}
-        summary |= {"chosen": {"volume_fraction": "alpha4"}, "J_hat_mm": {"volume_fraction": found}}
+        summary |= {"chosen": {"printed": "alpha4"}, "J_hat_mm": {"printed": found}}
     path = folder / "summary.json"
     path.write_text(json.dumps(summary))
     os.utime(path, (at_s, at_s))

@@ -15,13 +15,13 @@ from mu_addon.usecases.simulate_and_place import history
 from mu_addon.usecases.simulate_and_place.comparison import compare
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 
-FULL = Job(load_preset("mu-0.75x"), grasp())
-QUICK = attrs.evolve(FULL, mesh=MeshSettings(order=1, refine=0.5), rules=("volume_fraction",))
+FULL = Job(load_preset("mu-0.75x"), grasp(), mesh=MeshSettings(fidelity="resolved"))
+QUICK = attrs.evolve(FULL, mesh=settings.QUICK)
 MOTION = attrs.evolve(FULL, stages=("design", "simulate"))
 SHORT = {"status": "complete", "angle_deg": {"-20": -3.0, "40": 6.0}, "seconds": {"Model A": 40.0}}
 RANKED = SHORT | {
-    "chosen": {"volume_fraction": "alpha4"},
-    "J_hat_mm": {"volume_fraction": {"alpha4": 0.05, "alpha10": 0.4}},
+    "chosen": {"printed": "alpha4"},
+    "J_hat_mm": {"printed": {"alpha4": 0.05, "alpha10": 0.4}},
     "seconds": {"Model A": 100.0, "candidates": 380.0},
 }
 
@@ -50,9 +50,9 @@ def design_of(job):
     [
         (MeshSettings(), "full"),
         (settings.QUICK, "quick"),
-        (MeshSettings(order=1), "quick"),
+        (MeshSettings(order=1), "full"),
         (MeshSettings(fidelity="resolved"), "resolved"),
-        (MeshSettings(fidelity="solid", refine=0.5), "resolved"),
+        (MeshSettings(fidelity="solid"), "resolved"),
     ],
 )
 def test_a_run_knows_its_detail(tmp_path, mesh, detail):

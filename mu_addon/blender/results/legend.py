@@ -61,8 +61,8 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     findings = studies.findings(root)
     if findings is None or findings.stale:
         found.append("stale: belongs to other parameters")
-    elif findings.quick:
-        found.append("quick look: homogenised, coarse mesh")
+    elif findings.caveat:
+        found.append(findings.caveat.partition(":")[0])
     return found
 
 

@@ -51,12 +51,9 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
             alert(layout, "Stale: these results belong to other parameters. Simulate again")
         if not found.run.complete:
             wrapped(layout, sentence(found.run.state), "INFO")
-        if found.quick:
-            wrapped(
-                layout,
-                "Quick look: a homogenised lattice. Under vacuum it bends half as far as printed struts",
-                "ERROR",
-            )
+        if found.caveat:
+            icon = "INFO" if found.run.detail == "quick" else "ERROR"
+            wrapped(layout, sentence(found.caveat), icon)
         column = layout.column(align=True)
         column.active = not found.stale
         for pressure, angle in found.angles:

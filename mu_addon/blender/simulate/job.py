@@ -75,13 +75,10 @@ def job_of(root: Any) -> Job:
     extra: dict[str, Any] = {}
     if settings.command == "place":
         extra["paths"] = settings.paths
-    if settings.detail == "quick":
-        # The homogenised unit on a mesh of half the refinement, one rule, no second mesh.
-        extra["mesh"] = QUICK
-        if settings.command == "place":
-            extra |= {"rules": ("volume_fraction",), "mesh_check": False}
-    elif settings.detail == "resolved":
-        extra |= {"mesh": MeshSettings(fidelity=RESOLVED), "self_contact": settings.self_contact}
+    if settings.detail != "full":
+        quick = settings.detail == "quick"
+        extra["mesh"] = QUICK if quick else MeshSettings(fidelity=RESOLVED)
+        extra |= {"self_contact": settings.self_contact, "mesh_check": not quick}
         if settings.self_contact:
             extra["self_friction"] = round(settings.self_friction, 6)
     body = bodies.envelope_in(root, unit)

@@ -39,7 +39,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         if study.command == "place":
             layout.prop(study, "paths")
         layout.prop(study, "detail")
-        if study.detail == "resolved":
+        if study.detail != "full":
             layout.prop(study, "self_contact")
             if study.self_contact:
                 layout.prop(study, "self_friction")

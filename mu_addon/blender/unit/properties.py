@@ -92,13 +92,14 @@ class MU_PG_study(bpy.types.PropertyGroup):
             (
                 "full",
                 "Homogenised",
-                "A continuum in place of the lattice, which knows no struts that buckle and no walls that "
-                "meet: a minute or two",
+                "A continuum in place of the lattice, without buckling struts or walls that meet: a minute or "
+                "two, and half the angle under vacuum",
             ),
             (
                 "quick",
                 "Quick Look",
-                "As Homogenised, on a mesh of half the fineness: about 2 degrees off it for mu-1.0x",
+                "As Printed Struts, on walls of elements twice as large: mu-1.0x bends 3 % less under pressure "
+                "and up to 12 % less under vacuum, in a third of the time",
             ),
         ],
         default="resolved",

@@ -17,9 +17,9 @@ FULL_S = {
     "motion of the best path": 60.0, "report": 30.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
-PACE = {"full": 1.0, "resolved": 7.0, "quick": 0.1}
+PACE = {"full": 1.0, "resolved": 7.0, "quick": 1.3}
 """Factor on the seconds of a study's equilibria by its detail."""
-MODEL_A_S = {"resolved": 350.0}
+MODEL_A_S = {"resolved": 350.0, "quick": 100.0}
 """Seconds of Model A alone, where measured: the printed body's candidates were not."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 TOUCHING = 7.0
@@ -28,6 +28,10 @@ TOUCHING = 7.0
 _SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5
+# Below a refinement of 1 the printed body's wall alone grows coarser.
+BY_WALL = 1.8
+# Linear elements have an eighth of the unknowns, and fewer neighbours.
+LINEAR = 0.1
 
 
 def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
@@ -59,11 +63,12 @@ def plan_of(job: Job) -> Plan:
     names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
     if job.path:
         names.insert(1, f"solid with {job.path}")
-    detail = "resolved" if job.mesh.resolved else "full" if job.mesh.order == 2 else "quick"
+    detail = "resolved" if job.mesh.resolved else "full"
     if not simulates:
         return [(name, seconds_of(name, detail)) for name in names]
     _, pressure = job.samples
     states = work(job, np.unique(pressure)) if not job.in_time else len(pressure)
     shipped = work(job, _SHIPPED)
-    factor = job.mesh.refine**BY_REFINEMENT * max(states, 1) / shipped
+    by = BY_WALL if job.mesh.resolved and job.mesh.refine < 1.0 else BY_REFINEMENT
+    factor = job.mesh.refine**by * max(states, 1) / shipped * (LINEAR if job.mesh.order == 1 else 1.0)
     return [(name, seconds_of(name, detail) * (factor if name in SOLVED else 1.0)) for name in names]

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from .job import Job
 
 RUNS, LABEL = "runs", "label.toml"
+DETAILS = ("full", "quick", "resolved")
+"""Details of a run, the least accurate first; see `Run.detail`."""
 HOME, STALE = "home", "stale"
 """Keys of the runs of older versions: in the home folder itself, and the one set aside by its next."""
 SUMMARY, OUTPUTS = "summary.json", "blender"
@@ -113,16 +115,15 @@ class Run:
 
     @property
     def detail(self) -> str:
-        """True if there are results to show: the run is complete, or its motion is found."""
+        """`resolved`, struts as printed; `quick`, the same on a coarse mesh; or `full`, homogenised."""
         mesh = self.tables.get("simulate", {}).get("mesh") or {}
-        if mesh.get("fidelity", HOMOGENISED) != HOMOGENISED:
-            return "resolved"
-        coarse = mesh.get("order") == 1 or mesh.get("refine", 1.0) <= QUICK.refine
-        return "quick" if coarse else "full"
+        if mesh.get("fidelity", HOMOGENISED) == HOMOGENISED:
+            return "full"
+        return "quick" if mesh.get("refine", 1.0) <= QUICK.refine else "resolved"
 
     @property
     def job(self) -> str:
-        """`resolved`, struts as printed, `full`, homogenised, or `quick`, homogenised on a coarse mesh."""
+        """The last stage asked for: `design`, `simulate` or `place`."""
         return [stage for stage in STAGES if stage in self.tables][-1]
 
     @property
@@ -131,7 +132,7 @@ class Run:
         what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
-        return self.name or what + {"full": "", "resolved": ", struts", "quick": ", quick"}[self.detail]
+        return self.name or what + {"full": ", homogenised", "resolved": "", "quick": ", quick"}[self.detail]
 
     @property
     def seconds(self) -> float:
@@ -247,14 +248,14 @@ def read_run(folder: Path) -> Run:
 def best_of(found: Sequence[Run], design: str) -> Run | None:
     """Run whose results are shown for a design: the best of those made of it, or else the latest of all.
 
-    Complete before incomplete, quadratic elements before linear ones, a ranking before the motion alone, then
-    the latest, so that a quick look replaces nothing. A run that has just begun is shown only if there is no
+    Complete before incomplete, printed struts before a quick look before a homogenised one, a ranking before
+    the motion alone, then the latest, so that a coarser run replaces no finer one. A run that has just begun is shown only if there is no
     other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
     if ready:
-        return max(ready, key=lambda r: (r.complete, r.detail != "quick", bool(r.rule), r.changed_s))
+        return max(ready, key=lambda r: (r.complete, DETAILS.index(r.detail), bool(r.rule), r.changed_s))
     others = [run for run in found if run.has_results]
     return next(iter(ordered(others or own)), None)
 

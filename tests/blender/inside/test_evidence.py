@@ -152,7 +152,7 @@ def applied(folder, clogged):
     root = add()
     root.mu_evidence.folder, root.mu_unit.study.folder = str(clogged / "data"), "//study"
     study = root.mu_unit.study
-    study.command, study.detail = "simulate", "quick"
+    study.command, study.detail = "simulate", "full"
     unit = to_unit(root.mu_unit)
     assert not effects.named_effects(root)
     assert "With named effects" not in drawn(panels.MU_PT_simulate)

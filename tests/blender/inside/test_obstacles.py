@@ -164,7 +164,7 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
         return dict(studies.findings(root).angles)[40.0]
 
     root = add(preset="mu-0.75x")
-    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
+    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "full"
     free = bent("/free")
     assert studies.contact_forces(root) == []
     assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}

@@ -33,7 +33,7 @@ def started(home):
 def keys(root):
     """Keys of the runs by what they are: the full one, the quick one, that of the thicker wall."""
     found = {("thick" if r.unit.chambers.wall_mm > 1 else r.detail): r.key for r in studies.runs_of(root)}
-    return found["full"], found["quick"], found["thick"]
+    return found["resolved"], found["quick"], found["thick"]
 
 
 def caches(root):

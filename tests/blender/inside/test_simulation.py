@@ -24,6 +24,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.errors import InputError
 from mu_addon.meshing import gmsh_libraries
+from mu_addon.meshing.settings import QUICK
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 
 from .acting import add, refused
@@ -175,7 +176,11 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = add(preset="mu-0.75x")
     root.mu_unit.chambers.count = 3
-    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
+    protocol = tmp_path / "both.csv"
+    protocol.write_text("time_s,pressure_kPa\n0,0\n1,-2.5\n2,0\n3,5\n")
+    study = root.mu_unit.study
+    study.command, study.detail, study.protocol = "simulate", "quick", str(protocol)
+    assert job_of(root).mesh == QUICK
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     child = SIMULATION.child(root)
     fractions = []
@@ -188,6 +193,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     assert found.angles[0][0] < 0 < found.angles[-1][0]
     assert found.angles[0][1] < 0 < found.angles[-1][1]
     assert "kPa" in drawn()
+    assert "Quick look: up to 12 % less angle under vacuum" in drawn()
     assert "Stale" not in drawn()
     root.mu_unit.chambers.wall_mm = 1.0
     assert studies.findings(root).stale
