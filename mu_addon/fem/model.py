@@ -645,7 +645,7 @@ class Model:
     def _values(
         self, blocks: Array, u: Array, pressure: float, m: MaterialData, convex: bool = False
     ) -> Array:
-        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with beams and obstacles on beams added."""
+        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with beams and obstacles on them."""
         if self._carried is not None:
             blocks = self._beam_tangent(u, pressure, m, blocks, convex)
         values = np.asarray(blocks.ravel()[self._scalar_map])
@@ -654,9 +654,9 @@ class Model:
         return values
 
     def _add_on_beams(self, values: Array, u: Array, pairs: Array, blocks: Array) -> None:
-        """Add stiffness of obstacles on carried nodes to the tangent's own values (nnz,) at u (n, 3), in place.
+        """Add stiffness of obstacles on carried nodes to the tangent's own values (nnz,), in place.
 
-        pairs (j, 2): nodes of one beam's surface, each pair once; blocks (j, 3, 3), symmetric.
+        pairs (j, 2): nodes of one beam's surface, each pair once; blocks (j, 3, 3), symmetric; u (n, 3).
         """
         twice = pairs[:, 0] != pairs[:, 1]
         pairs = np.vstack([pairs, pairs[twice, ::-1]])

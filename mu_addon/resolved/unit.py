@@ -31,7 +31,7 @@ TIE_MM = 0.1
 
 Ties of nodes within the wall alone leave it free to dent between them: three chambers then bend by 5 to 10 %
 more than in a mesh that joins both (docs/engineering/method.md). The distance shrinks with finer elements;
-grown with coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -10 kPa and a refinement of 0.5).
+grown with coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -10 kPa, refine 0.5).
 """
 
 

@@ -47,7 +47,8 @@ def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, refine=0.5, un
 def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     """A finished run in a unit's home folder, as if ended at a time: bent `more` times as far.
 
-    full: on the default mesh, as its inputs say, else a quick look; ranked: whether it ranked paths, too. Returns the run.
+    full: on the default mesh, as its inputs say, else a quick look; ranked: whether it ranked paths, too.
+    Returns the run.
     """
     chambers = attrs.evolve(UNIT.chambers, wall_mm=wall_mm)
     mesh = MeshSettings(fidelity=RESOLVED) if full else QUICK

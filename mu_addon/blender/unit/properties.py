@@ -92,14 +92,14 @@ class MU_PG_study(bpy.types.PropertyGroup):
             (
                 "full",
                 "Homogenised",
-                "A continuum in place of the lattice, without buckling struts or walls that meet: a minute or "
-                "two, and half the angle under vacuum",
+                "A continuum in place of the lattice, without buckling struts or walls that meet: a minute "
+                "or two, and half the angle under vacuum",
             ),
             (
                 "quick",
                 "Quick Look",
-                "As Printed Struts, on walls of elements twice as large: mu-1.0x bends 3 % less under pressure "
-                "and up to 12 % less under vacuum, in a third of the time",
+                "As Printed Struts, on walls of elements twice as large: mu-1.0x bends 3 % less under "
+                "pressure and up to 12 % less under vacuum, in a third of the time",
             ),
         ],
         default="resolved",

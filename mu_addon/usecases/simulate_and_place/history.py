@@ -249,8 +249,8 @@ def best_of(found: Sequence[Run], design: str) -> Run | None:
     """Run whose results are shown for a design: the best of those made of it, or else the latest of all.
 
     Complete before incomplete, printed struts before a quick look before a homogenised one, a ranking before
-    the motion alone, then the latest, so that a coarser run replaces no finer one. A run that has just begun is shown only if there is no
-    other.
+    the motion alone, then the latest, so that a coarser run replaces no finer one. A run that has just begun
+    is shown only if there is no other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]

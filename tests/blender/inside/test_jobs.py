@@ -122,7 +122,9 @@ def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study)
     from mu_addon.blender.simulate import study_folder as studies
 
     seconds = studies.findings(root).summary["seconds"]
-    assert dict(plan_of(root))["Model A"] != seconds["Model A"], "a homogenised run tells nothing of a printed one"
+    assert dict(plan_of(root))["Model A"] != seconds["Model A"], (
+        "a homogenised run tells nothing of a printed one"
+    )
     root.mu_unit.study.detail = "full"
     assert dict(plan_of(root))["Model A"] == seconds["Model A"]
 
