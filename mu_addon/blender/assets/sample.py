@@ -67,7 +67,7 @@ def _ranking(context: Any) -> list[Any]:
     """A unit cut open with its candidate paths, ready for *Place the Sensor*."""
     root = _unit(context)
     root.mu_unit.cut = root.mu_unit.candidates = True
-    root.mu_unit.study.command, root.mu_unit.study.detail = "place", "quick"
+    root.mu_unit.study.command, root.mu_unit.study.detail = "place", "full"
     context.view_layer.update()
     viewports.frame([root])
     return [root]

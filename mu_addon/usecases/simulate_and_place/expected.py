@@ -17,7 +17,7 @@ FULL_S = {
     "motion of the best path": 60.0, "report": 30.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
-PACE = {"full": 1.0, "resolved": 7.0, "quick": 1.3}
+PACE = {"full": 1.0, "resolved": 20.0, "quick": 6.0}
 """Factor on the seconds of a study's equilibria by its detail."""
 MODEL_A_S = {"resolved": 350.0, "quick": 100.0}
 """Seconds of Model A alone, where measured: the printed body's candidates were not."""
