@@ -7,7 +7,7 @@ import bpy
 from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import UnitOperator
 from ..shared.texts import sentence
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
@@ -48,13 +48,10 @@ class MU_OT_body_check(UnitOperator, bpy.types.Operator):
     bl_label = "Check Body"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         body = bodies.of_object(selected_mesh(context), root)
         found = bodies.examined(body, to_unit(root.mu_unit).dimensions)
         report_flaws(self, root, found, f"{body.name} can be an envelope: {len(body.triangles)} triangles")
-        return {"FINISHED"}
 
 
 class MU_OT_body_repair(UnitOperator, bpy.types.Operator):
@@ -64,9 +61,7 @@ class MU_OT_body_repair(UnitOperator, bpy.types.Operator):
     bl_label = "Repair Copy"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         obj = selected_mesh(context)
         mended = repaired(*bodies.arrays_of(obj, root))
         if not mended.is_whole:
@@ -88,9 +83,7 @@ class MU_OT_body(UnitOperator, bpy.types.Operator):
     bl_label = "Use as Envelope"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         obj = selected_mesh(context)
         body = bodies.of_object(obj, root)
         require_sound(body, bodies.examined(body, to_unit(root.mu_unit).dimensions))
@@ -98,7 +91,6 @@ class MU_OT_body(UnitOperator, bpy.types.Operator):
         obj.hide_set(True)
         unit_object.mark(root, [])
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
@@ -108,12 +100,10 @@ class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
     bl_label = "Remove Body"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         unit_object.remove_envelope(root)
         unit_object.mark(root, [])
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 CLASSES = (MU_OT_body_check, MU_OT_body_repair, MU_OT_body, MU_OT_body_remove)

@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared import updates, viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
+from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -19,17 +19,6 @@ from . import timeline as evidence_motion
 NO_DATA = "Choose a folder of measured data first"
 
 
-def _current(context):
-    """The unit's root and its diagnosis, or None and why there is none to use."""
-    root = unit_object.active_root(context)
-    found = evidence.diagnosis(root)
-    if found is None or not found.name:
-        return root, None, "Diagnose the measured data first"
-    if found.stale:
-        return root, None, f"The diagnosis is stale: {found.stale}"
-    return root, found, ""
-
-
 class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
     """Compare measured data with the simulation and name the effects that explain the difference"""
 
@@ -38,30 +27,20 @@ class MU_OT_evidence_diagnose(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        root = unit_object.active_root(context)
+    def trouble(cls, root):
         found = evidence.measured_data(root)
         if found is None or found.measured is None:
-            trouble = found.trouble.partition("\n")[0] if found else NO_DATA
-        elif evidence.DIAGNOSIS.is_running(root):
-            trouble = "A diagnosis is running"
+            why = found.trouble.partition("\n")[0] if found else NO_DATA
         else:
-            trouble = start_child.lacking()
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
+            why = "A diagnosis is running" if evidence.DIAGNOSIS.is_running(root) else start_child.lacking()
+        return super().trouble(root) or why
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         studies.assign_folder(root)
         evidence.DIAGNOSIS.start(
             root, evidence.folder_of(root), lambda folder: evidence.write_inputs(root, folder)
         )
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
@@ -72,25 +51,23 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        _, found, trouble = _current(context)
-        if found is not None and found.name not in ("named", "ambiguous"):
-            trouble = "No effect was named that could be applied"
-        if not trouble and evidence.applied(unit_object.active_root(context)):
-            trouble = "This model is already applied: undo removes it"
-        trouble = trouble or start_child.lacking()
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
+    def trouble(cls, root):
+        found = evidence.diagnosis(root)
+        if found is None or not found.name:
+            why = "Diagnose the measured data first"
+        elif found.stale:
+            why = f"The diagnosis is stale: {found.stale}"
+        elif found.name not in ("named", "ambiguous"):
+            why = "No effect was named that could be applied"
+        else:
+            why = "This model is already applied: undo removes it" if evidence.applied(root) else ""
+        return super().trouble(root) or why or start_child.lacking()
 
-    @reports_errors
-    def execute(self, context):
+    def act(self, context, root):
         # Imported late: it needs the simulator's packages, which a Blender may lack.
         from ...usecases.simulate_and_place.extended_unit import read_extended
 
-        root, found, _ = _current(context)
+        found = evidence.diagnosis(root)
         extended = read_extended(to_unit(root.mu_unit), found.folder / evidence.MODEL)
         for words in extended.left_out:
             self.report({"WARNING"}, f"Not applied: {words}")
@@ -117,19 +94,12 @@ class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not effects.inputs(unit_object.active_root(context)):
-            cls.poll_message_set("The unit's simulation has no effects beside its parameters")
-            return False
-        return True
+    def trouble(cls, root):
+        return "" if effects.inputs(root) else "The unit's simulation has no effects beside its parameters"
 
-    @reports_errors
-    def execute(self, context):
-        effects.keep(unit_object.active_root(context), "")
+    def act(self, context, root):
+        effects.keep(root, "")
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
@@ -143,9 +113,7 @@ class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
         name="Experiment", description="Name of an experiment of a unit under pressure; empty hides it"
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         if not self.experiment:
             evidence_motion.hide(root)
             return {"FINISHED"}
@@ -168,9 +136,7 @@ class MU_OT_evidence_protocol(UnitOperator, bpy.types.Operator):
         name="Experiment", description="Name of an experiment of a unit under pressure"
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         course = evidence.course(root, self.experiment)
         if course is None:
             self.report({"ERROR"}, f"No unit under pressure was measured as {self.experiment!r}")

@@ -6,7 +6,7 @@ import bpy
 
 from ...errors import InputError
 from ..shared import displays
-from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
+from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 from . import state
@@ -27,9 +27,7 @@ class MU_OT_paint_struts(ValidUnitOperator, bpy.types.Operator):
     bl_label = "Paint Cells"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         if root.mu_unit.envelope is not None:
             raise InputError(
                 "cells are counted in the lattice's box, and here it fills a body of your own",
@@ -42,18 +40,13 @@ class MU_OT_paint_struts(ValidUnitOperator, bpy.types.Operator):
         obj.hide_set(False)
         unit_object.make_active(context, obj)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-        return {"FINISHED"}
 
 
 class _WhilePainting(UnitOperator):
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if state.painted_on(unit_object.active_root(context)) is None:
-            cls.poll_message_set("No cells are being painted: use Paint Cells in the Lattice panel")
-            return False
-        return True
+    def trouble(cls, root):
+        painting = state.painted_on(root) is not None
+        return "" if painting else "No cells are being painted: use Paint Cells in the Lattice panel"
 
 
 class MU_OT_paint_struts_apply(_WhilePainting, bpy.types.Operator):
@@ -63,16 +56,13 @@ class MU_OT_paint_struts_apply(_WhilePainting, bpy.types.Operator):
     bl_label = "Apply"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         obj, field = state.painted_on(root), to_unit(root.mu_unit).grading_field
         text = field.cells_of_factors(state.factors_on(obj, field))
         _leave(context, root)
         root.mu_unit.grading.cells = text
         if not unit_object.rebuild(root):
             self.report({"ERROR"}, root.mu_unit.trouble)
-        return {"FINISHED"}
 
 
 class MU_OT_paint_struts_discard(_WhilePainting, bpy.types.Operator):
@@ -82,9 +72,8 @@ class MU_OT_paint_struts_discard(_WhilePainting, bpy.types.Operator):
     bl_label = "Discard"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        _leave(context, unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        _leave(context, root)
 
 
 CLASSES = (MU_OT_paint_struts, MU_OT_paint_struts_apply, MU_OT_paint_struts_discard)

@@ -78,9 +78,8 @@ class MU_OT_gripper_delete(GripperOperator, bpy.types.Operator):
     bl_label = "Delete Gripper"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        gripper_object.delete(gripper_object.active(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        gripper_object.delete(root)
 
 
 class MU_OT_grasp(GripperOperator, bpy.types.Operator):
@@ -91,28 +90,17 @@ class MU_OT_grasp(GripperOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        root = gripper_object.active(context)
-        trouble = root.mu_gripper.trouble.partition("\n")[0]
+    def trouble(cls, root):
         if grasps.GRASP.is_running(root):
-            trouble = "A job of this gripper is running"
-        else:
-            trouble = trouble or start_child.lacking()
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
+            return "A job of this gripper is running"
+        return root.mu_gripper.trouble.partition("\n")[0] or start_child.lacking()
 
-    @reports_errors
-    def execute(self, context):
-        root = gripper_object.active(context)
+    def act(self, context, root):
         folder = grasps.folder_of(root)
         if not root.mu_gripper.folder:
             root.mu_gripper.folder = studies.relative(folder)
         grasps.GRASP.start(root, folder, lambda folder: grasps.write_inputs(root, folder))
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):
@@ -124,14 +112,11 @@ class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
-    @reports_errors
-    def execute(self, context):
-        root = gripper_object.active(context)
+    def act(self, context, root):
         if self.on:
             timeline.show(root, context.scene)
         else:
             timeline.hide(root)
-        return {"FINISHED"}
 
 
 CLASSES = (

@@ -10,9 +10,8 @@ from bpy.props import CollectionProperty, StringProperty
 from ...errors import MuError
 from ...files import make_folder
 from ..shared import viewports
-from ..shared.operators import UnitOperator, open_file, reports_errors
+from ..shared.operators import UnitOperator, open_file
 from ..simulate import study_folder as studies
-from ..unit import object as unit_object
 
 FOLDER = "measured"
 """Folder of imported data in the unit's study folder, if no folder of measured data is chosen."""
@@ -34,13 +33,11 @@ class MU_OT_import_files(UnitOperator, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    @reports_errors
-    def execute(self, context):
+    def act(self, context, root):
         chosen = [str(Path(self.directory) / one.name) for one in self.files if one.name]
         if not chosen:
             self.report({"ERROR"}, "No file was chosen: choose one or more files of measured data")
             return {"CANCELLED"}
-        root = unit_object.active_root(context)
         root.mu_import.answers.clear()
         root.mu_import.files = "\n".join(chosen)
         return _import(self, root)
@@ -53,9 +50,7 @@ class MU_OT_import_answers(UnitOperator, bpy.types.Operator):
     bl_label = "Import with These Answers"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         lacking = [one for one in root.mu_import.answers if not one.value.strip()]
         if lacking:
             self.report({"ERROR"}, f"Not answered: {lacking[0].words}")
@@ -78,9 +73,8 @@ class MU_OT_import_cancel(UnitOperator, bpy.types.Operator):
     bl_label = "Do Not Import"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        _forget(unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        _forget(root)
 
 
 class MU_OT_import_page(UnitOperator, bpy.types.Operator):
@@ -90,11 +84,10 @@ class MU_OT_import_page(UnitOperator, bpy.types.Operator):
     bl_label = "What Was Understood"
     bl_options = {"REGISTER"}
 
-    @reports_errors
-    def execute(self, context):
+    def act(self, context, root):
         from ...usecases.import_data.run import PAGE
 
-        page = _folder(unit_object.active_root(context)) / PAGE
+        page = _folder(root) / PAGE
         if not page.exists():
             self.report({"ERROR"}, "Nothing was imported into this folder: choose Import Files first")
             return {"CANCELLED"}

@@ -12,7 +12,7 @@ from bpy.props import EnumProperty
 from ...errors import InputError
 from ...run.child import ERRORS
 from ..shared import viewports
-from ..shared.operators import UnitOperator, open_file, reports_errors
+from ..shared.operators import UnitOperator, open_file
 from .start_child import OWN_FOLDER, JobKind
 
 FILES = {"report": "report.html", "log": "log.ndjson", "errors": f"{OWN_FOLDER}/{ERRORS}", "folder": ""}
@@ -30,34 +30,25 @@ class _Cancel:
     """Stops the job; greyed out, with the reason, where none runs."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not cls.kind.is_running(cls.find_root(context)):
-            cls.poll_message_set(cls.not_running)
-            return False
-        return True
+    def trouble(cls, root):
+        return "" if cls.kind.is_running(root) else cls.not_running
 
-    def execute(self, context):
-        self.kind.child(self.find_root(context)).cancel()
+    def act(self, context, root):
+        self.kind.child(root).cancel()
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class _Dismiss:
-    def execute(self, context):
-        self.kind.dismiss(self.find_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        self.kind.dismiss(root)
 
 
 class _Open:
-    @reports_errors
-    def execute(self, context):
-        path = self.path_of(self.find_root(context), self.what)
+    def act(self, context, root):
+        path = self.path_of(root, self.what)
         if not path.exists():
             raise InputError("there is no such file yet", str(path), self.first)
         open_file(context, path)
-        return {"FINISHED"}
 
 
 def job_operators(

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import InputError
-from ..shared.operators import reports_errors
+from ..shared.operators import UnitOperator
 from . import conversion
 from .classes import GROUP, TREE, attribute
 
@@ -18,15 +18,12 @@ def active_tree(context):
     return tree if tree is not None and tree.bl_idname == TREE else None
 
 
-class TreeOperator:
+class TreeOperator(UnitOperator):
     """An operator on the tree that a node editor shows."""
 
-    @classmethod
-    def poll(cls, context):
-        if active_tree(context) is None:
-            cls.poll_message_set("Open a node tree of the kind Monolithic Unit in a node editor")
-            return False
-        return True
+    find_root = staticmethod(active_tree)
+    no_root = "Open a node tree of the kind Monolithic Unit in a node editor"
+    linked_too = True
 
 
 def make_group(tree, nodes):
@@ -150,11 +147,8 @@ class MU_OT_node_group_make(TreeOperator, bpy.types.Operator):
     bl_label = "Make Group"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        tree = active_tree(context)
+    def act(self, context, tree):
         make_group(tree, [node for node in tree.nodes if node.select])
-        return {"FINISHED"}
 
 
 class MU_OT_node_group_ungroup(TreeOperator, bpy.types.Operator):
@@ -164,12 +158,9 @@ class MU_OT_node_group_ungroup(TreeOperator, bpy.types.Operator):
     bl_label = "Ungroup"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        tree = active_tree(context)
+    def act(self, context, tree):
         for node in [n for n in tree.nodes if n.select and n.bl_idname == GROUP]:
             take_apart(tree, node)
-        return {"FINISHED"}
 
 
 class MU_OT_node_group_edit(TreeOperator, bpy.types.Operator):
@@ -181,14 +172,13 @@ class MU_OT_node_group_edit(TreeOperator, bpy.types.Operator):
 
     node: StringProperty(name="Node", description="Name of the group's node; empty: the active one")
 
-    def execute(self, context):
-        path, tree = context.space_data.path, active_tree(context)
+    def act(self, context, tree):
+        path = context.space_data.path
         node = tree.nodes.get(self.node) if self.node else tree.nodes.active
         if node is not None and node.bl_idname == GROUP and node.node_tree is not None:
             path.append(node.node_tree, node=node)
         elif len(path) > 1:
             path.pop()
-        return {"FINISHED"}
 
 
 CLASSES = (MU_OT_node_group_make, MU_OT_node_group_ungroup, MU_OT_node_group_edit)

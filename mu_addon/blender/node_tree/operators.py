@@ -15,9 +15,8 @@ from ...usecases.graph.definitions import definitions
 from ...usecases.graph.templates import template, template_names
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared.operators import NO_UNIT, UnitOperator, open_file, reports_errors
+from ..shared.operators import UnitOperator, open_file, reports_errors
 from ..shared.texts import sentence
-from ..unit import object as unit_object
 from . import conversion, following, state
 from .classes import TREE
 from .groups import TreeOperator, active_tree
@@ -63,20 +62,11 @@ class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
     node: StringProperty(name="Node", description="Evaluate this node and what it needs; empty: all")
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if state.RUN.is_running(root_tree(context)):
-            cls.poll_message_set("This tree is being evaluated")
-            return False
-        if trouble := start_child.lacking():
-            cls.poll_message_set(trouble)
-        return not trouble
+    def trouble(cls, tree):
+        return "This tree is being evaluated" if state.RUN.is_running(tree) else start_child.lacking()
 
-    @reports_errors
-    def execute(self, context):
-        state.start(root_tree(context), (self.node,) if self.node else ())
-        return {"FINISHED"}
+    def act(self, context, tree):
+        state.start(tree, (self.node,) if self.node else ())
 
 
 class MU_OT_tree_new(bpy.types.Operator):
@@ -149,18 +139,16 @@ class MU_OT_tree_save(_TreeOperator, bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    @reports_errors
-    def execute(self, context):
-        core = conversion.to_tree(root_tree(context))
+    def act(self, context, tree):
+        core = conversion.to_tree(tree)
         if not core.nodes:
             raise InputError("the tree has no nodes", core.name, "add some, or start from a template")
         path = Path(bpy.path.abspath(self.filepath)).with_suffix(".toml")
         write_text(path, tree_text(core))
         self.report({"INFO"}, f"Wrote {path}")
-        return {"FINISHED"}
 
 
-class MU_OT_tree_of_unit(bpy.types.Operator):
+class MU_OT_tree_of_unit(UnitOperator, bpy.types.Operator):
     """Add a tree with the active unit: its sidebar and the tree's node show the same fields"""
 
     bl_idname = "mu.tree_of_unit"
@@ -173,20 +161,12 @@ class MU_OT_tree_of_unit(bpy.types.Operator):
         default=False,
     )
 
-    @classmethod
-    def poll(cls, context):
-        if unit_object.active_root(context) is None:
-            cls.poll_message_set(NO_UNIT)
-            return False
-        return True
+    linked_too = True
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         tree = state.tree_of_unit(root, self.steps)
         state.refresh(tree)
         show(context, tree)
-        return {"FINISHED"}
 
 
 class MU_OT_tree_show(UnitOperator, bpy.types.Operator):
@@ -196,9 +176,7 @@ class MU_OT_tree_show(UnitOperator, bpy.types.Operator):
     bl_label = "Show the Tree"
     bl_options = {"REGISTER"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         node = following.followed(root)
         if node is None:
             raise InputError(
@@ -211,7 +189,6 @@ class MU_OT_tree_show(UnitOperator, bpy.types.Operator):
         if not bpy.app.background:
             space = _node_editor(context)
             space.tree_type, space.node_tree = TREE, tree
-        return {"FINISHED"}
 
 
 def _node_editor(context):
@@ -242,16 +219,14 @@ class MU_OT_node_open(_TreeOperator, bpy.types.Operator):
         ],
     )
 
-    @reports_errors
-    def execute(self, context):
-        tree, node = root_tree(context), active_tree(context).nodes.active
+    def act(self, context, tree):
+        node = active_tree(context).nodes.active
         path = state.place_of(tree, node, self.what) if node is not None else None
         if path is None or not path.exists():
             raise InputError(
                 "there is nothing to open yet", str(path or ""), "evaluate the tree; reports are an option"
             )
         open_file(context, path)
-        return {"FINISHED"}
 
 
 CLASSES = (

@@ -12,8 +12,7 @@ from ...design.settings import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
-from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
-from ..unit import object as unit_object
+from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..unit.fields import blender_property, exact
 from ..unit.properties import to_unit
 from . import state as obstacles
@@ -29,13 +28,8 @@ class ObstacleOperator(UnitOperator):
     )
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not obstacles.of_unit(unit_object.active_root(context)):
-            cls.poll_message_set(NO_OBSTACLE)
-            return False
-        return True
+    def trouble(cls, root):
+        return "" if obstacles.of_unit(root) else NO_OBSTACLE
 
     def chosen(self, root):
         """Objects to act on; raises InputError for an unknown name."""
@@ -58,9 +52,7 @@ class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
 
     friction: blender_property(FRICTION, precision=2)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core, chosen = to_unit(root.mu_unit), selected_meshes(context)
         for obj in chosen:
             body = obstacles.placed(root, obj).body
@@ -70,7 +62,6 @@ class MU_OT_obstacle(ValidUnitOperator, bpy.types.Operator):
             # An overlap is only reported, since the obstacle may be moved; a simulation refuses it.
             for flaw in obstacles.examined(root, obj, core):
                 self.report({"WARNING"}, f"{obj.name}: {flaw.what}: {flaw.remedy}")
-        return {"FINISHED"}
 
 
 class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
@@ -92,9 +83,7 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
     )
     friction: blender_property(FRICTION, precision=2)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         d = to_unit(root.mu_unit).dimensions
         size = np.array([exact(edge) for edge in self.size])
         mesh = bpy.data.meshes.new("Obstacle")
@@ -106,7 +95,6 @@ class MU_OT_obstacle_box(ValidUnitOperator, bpy.types.Operator):
         obj.matrix_world = root.matrix_world.copy()
         obj.location = root.matrix_world @ Vector((0.0, reach, d.height - 0.5 * float(size[2])))
         obj.mu_obstacle.unit, obj.mu_obstacle.friction = root.mu_unit.uuid, self.friction
-        return {"FINISHED"}
 
 
 class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
@@ -116,13 +104,10 @@ class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
     bl_label = "Check Obstacles"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core, chosen = to_unit(root.mu_unit), self.chosen(root)
         found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
         report_flaws(self, root, found, f"{len(chosen)} obstacle(s), valid and clear of the unit")
-        return {"FINISHED"}
 
 
 class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
@@ -132,12 +117,9 @@ class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):
     bl_label = "Remove Obstacle"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         for obj in self.chosen(root):
             obj.property_unset("mu_obstacle")
-        return {"FINISHED"}
 
 
 class MU_OT_obstacle_select(ObstacleOperator, bpy.types.Operator):
@@ -147,14 +129,11 @@ class MU_OT_obstacle_select(ObstacleOperator, bpy.types.Operator):
     bl_label = "Select Obstacle"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         for other in context.selected_objects:
             other.select_set(False)
         for obj in self.chosen(root):
             obj.select_set(True)
-        return {"FINISHED"}
 
 
 CLASSES = (

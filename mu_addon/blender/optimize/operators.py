@@ -10,7 +10,7 @@ from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..scene import landing
 from ..shared import updates, viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
+from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import from_unit
@@ -33,8 +33,8 @@ class MU_OT_optimize_list(UnitOperator, bpy.types.Operator):
 
     what: _LIST
 
-    def execute(self, context):
-        props = unit_object.active_root(context).mu_optimize
+    def act(self, context, root):
+        props = root.mu_optimize
         if self.what == "targets":
             props.targets.add()
             return {"FINISHED"}
@@ -65,8 +65,8 @@ class MU_OT_optimize_unlist(UnitOperator, bpy.types.Operator):
     what: _LIST
     index: IntProperty(name="Row", description="Row of the list, from 0", min=0)
 
-    def execute(self, context):
-        rows = getattr(unit_object.active_root(context).mu_optimize, self.what)
+    def act(self, context, root):
+        rows = getattr(root.mu_optimize, self.what)
         if self.index >= len(rows):
             return {"CANCELLED"}
         rows.remove(self.index)
@@ -81,31 +81,22 @@ class MU_OT_optimize(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        root = unit_object.active_root(context)
-        props, trouble = root.mu_optimize, ""
+    def trouble(cls, root):
+        props, why = root.mu_optimize, ""
         if optimization.OPTIMIZATION.is_running(root):
-            trouble = "This unit is being optimised"
+            why = "This unit is being optimised"
         elif props.source == "file":
-            trouble = "" if props.file else "Choose a design.toml first"
+            why = "" if props.file else "Choose a design.toml first"
         elif not props.targets or not props.freedoms:
-            trouble = f"Add a {'parameter that may change' if props.targets else 'target'} first"
-        trouble = trouble or start_child.lacking()
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
+            why = f"Add a {'parameter that may change' if props.targets else 'target'} first"
+        return super().trouble(root) or why or start_child.lacking()
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         studies.assign_folder(root)
         optimization.OPTIMIZATION.start(
             root, optimization.folder_of(root), lambda folder: optimization.write_inputs(root, folder)
         )
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class _OfProposed(UnitOperator):
@@ -114,14 +105,9 @@ class _OfProposed(UnitOperator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        found = optimization.findings(unit_object.active_root(context))
-        if found is None or not found.proposed:
-            cls.poll_message_set("No unit is proposed: run the optimisation first")
-            return False
-        return True
+    def trouble(cls, root):
+        found = optimization.findings(root)
+        return "" if found and found.proposed else "No unit is proposed: run the optimisation first"
 
 
 _NUMBER = IntProperty(name="Proposed Unit", description="Number of the proposed unit", default=1, min=1)
@@ -135,9 +121,7 @@ class MU_OT_optimize_apply(_OfProposed, bpy.types.Operator):
 
     number: _NUMBER
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core = attrs.evolve(optimization.proposed_unit(root, self.number), name=root.mu_unit.title)
         with updates.paused():
             from_unit(root.mu_unit, core)
@@ -155,9 +139,7 @@ class MU_OT_optimize_add(_OfProposed, bpy.types.Operator):
 
     number: _NUMBER
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core = optimization.proposed_unit(root, self.number)
         end = f" {self.number}"
         title = root.mu_unit.title[: LONGEST_TITLE - len(end)] + end
@@ -166,7 +148,6 @@ class MU_OT_optimize_add(_OfProposed, bpy.types.Operator):
         added = unit_object.create(context, attrs.evolve(core, name=title))
         added.location = root.matrix_world.translation
         landing.land(context, added)
-        return {"FINISHED"}
 
 
 CLASSES = (

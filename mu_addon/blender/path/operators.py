@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 from ...design.anchors import window
 from ..shared import updates
 from ..shared.displays import PART
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import UnitOperator
 from ..unit import object as unit_object
 from ..unit.drawing import CANDIDATE
 from ..unit.properties import to_unit
@@ -23,16 +23,13 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
 
     name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` removes the waveguide")
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         name = self.name or selected_candidate(context)
         if name and name != "none":
             name = window(to_unit(root.mu_unit), name).name
         with updates.paused():
             root.mu_unit.path = "" if name == "none" else name
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 def selected_candidate(context) -> str:

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator, reports_errors
+from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
@@ -23,19 +23,12 @@ class _Job(ValidUnitOperator):
     job = ""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        root = unit_object.active_root(context)
+    def trouble(cls, root):
         running = printing.PRINTING.is_running(root)
-        trouble = "A job for the printer is running" if running else printing.trouble(root, cls.job)
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
+        why = "A job for the printer is running" if running else printing.trouble(root, cls.job)
+        return super().trouble(root) or why
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         studies.assign_folder(root)
         printing.PRINTING.start(
             root,
@@ -43,7 +36,6 @@ class _Job(ValidUnitOperator):
             lambda folder: printing.write_inputs(root, self.job, folder),
         )
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_print_check(_Job, bpy.types.Operator):
@@ -110,14 +102,11 @@ class _OfCheck(UnitOperator):
     """An operator on a check's findings; greyed out without a check of the unit in its present state."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        found = printing.checked(unit_object.active_root(context))
-        if found is None or found.stale:
-            cls.poll_message_set(f"The check is stale: {found.stale}" if found else NOT_CHECKED)
-            return False
-        return True
+    def trouble(cls, root):
+        found = printing.checked(root)
+        if found is None:
+            return NOT_CHECKED
+        return f"The check is stale: {found.stale}" if found.stale else ""
 
 
 class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
@@ -127,10 +116,8 @@ class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
     bl_label = "Mark Places"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         marks.mark(root, printing.checked(root))
-        return {"FINISHED"}
 
 
 class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
@@ -141,17 +128,11 @@ class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not marks.mark_objects(unit_object.active_root(context)):
-            cls.poll_message_set("No place is marked")
-            return False
-        return True
+    def trouble(cls, root):
+        return "" if marks.mark_objects(root) else "No place is marked"
 
-    def execute(self, context):
-        marks.clear(unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        marks.clear(root)
 
 
 class MU_OT_print_show(_OfCheck, bpy.types.Operator):
@@ -176,9 +157,7 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
         name="Turn the View", description="Turn the 3D views to it", default=True, options={"SKIP_SAVE"}
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         found, settings = printing.checked(root), root.mu_print
         if self.finding >= len(found.findings):
             self.report({"ERROR"}, f"There are {len(found.findings)} findings")
@@ -221,9 +200,8 @@ class MU_OT_print_up(UnitOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def execute(self, context):
-        unit_object.active_root(context).mu_print.up = self.direction
-        return {"FINISHED"}
+    def act(self, context, root):
+        root.mu_print.up = self.direction
 
 
 class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
@@ -234,18 +212,12 @@ class MU_OT_print_layer(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not unit_object.solid_is_current(unit_object.active_root(context)):
-            cls.poll_message_set("Build the solid first")
-            return False
-        return True
+    def trouble(cls, root):
+        built = unit_object.solid_is_current(root)
+        return super().trouble(root) or ("" if built else "Build the solid first")
 
-    @reports_errors
-    def execute(self, context):
-        layer.put(unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        layer.put(root)
 
 
 class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
@@ -256,17 +228,11 @@ class MU_OT_print_layer_clear(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if layer.layer_object(unit_object.active_root(context)) is None:
-            cls.poll_message_set("No layer is shown")
-            return False
-        return True
+    def trouble(cls, root):
+        return "No layer is shown" if layer.layer_object(root) is None else ""
 
-    def execute(self, context):
-        layer.clear(unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        layer.clear(root)
 
 
 CLASSES = (

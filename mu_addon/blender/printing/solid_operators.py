@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 from ...design import settings
 from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
-from ..shared.operators import ValidUnitOperator, reports_errors
+from ..shared.operators import ValidUnitOperator
 from ..shared.texts import sentence
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
@@ -36,16 +36,13 @@ class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
         name="Quality", description=_FACETS, items=_QUALITY, default=settings.QUALITY.default
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core = to_unit(root.mu_unit)
         solid = unit_object.solid_of(root, core, self.quality)
         unit_object.put_solid(root, solid, core)
         layer.follow(root)
         gates = solid.gates
         self.report({"INFO"}, f"Watertight, {gates.triangles} triangles, {gates.volume_mm3 / 1000:.2f} cm3")
-        return {"FINISHED"}
 
 
 class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
@@ -71,16 +68,13 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
             self.report({"WARNING"}, f"The check found: {found.errors[0]['check']}. Do not print this")
         return ExportHelper.invoke(self, context, event)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core = to_unit(root.mu_unit)
         target = Path(bpy.path.abspath(self.filepath))
         if self.nodes:
             write_nodes(core, target.with_suffix(".txt"))
         write_stl(unit_object.solid_of(root, core, self.quality, str(target)), target)
         self.report({"INFO"}, f"Written: {target}")
-        return {"FINISHED"}
 
 
 CLASSES = (MU_OT_solid, MU_OT_export_stl)

@@ -10,7 +10,6 @@ from mathutils import Quaternion, Vector
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion_files import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
 from ..shared import updates, viewports
-from ..shared.operators import reports_errors
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places, run_motions
@@ -47,9 +46,7 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
         text = next(f.text for f in field_colours.FIELDS if f.name == properties.field)
         return f"{text}. Not here: {reason}" if reason else f"{cls.__doc__}: {text}"
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         motion = motion_parts.motion_of(root)
         name = whose(root, motion, self.field)
         if self.field == motion_parts.DIFFERENCE:

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import UnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import legend_object
@@ -27,13 +27,8 @@ class MotionOperator(UnitOperator):
     """An operator on the active unit whose study holds a motion."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if motion_parts.motion_of(unit_object.active_root(context)) is None:
-            cls.poll_message_set(NO_MOTION)
-            return False
-        return True
+    def trouble(cls, root):
+        return NO_MOTION if motion_parts.motion_of(root) is None else ""
 
 
 class MU_OT_motion(MotionOperator, bpy.types.Operator):
@@ -64,9 +59,7 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
         default=True,
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         motion = motion_parts.motion_of(root)
         if self.name not in (MODEL_A, *motion.paths):
             raise InputError(
@@ -94,12 +87,10 @@ class MU_OT_motion_clear(UnitOperator, bpy.types.Operator):
     bl_label = "Clear Motion"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         for name, what in motion_parts.shown(root):
             motion_parts.hide(root, name, what)
         legend_object.hide(root)
-        return {"FINISHED"}
 
 
 class MU_OT_motion_update(MotionOperator, bpy.types.Operator):
@@ -109,12 +100,9 @@ class MU_OT_motion_update(MotionOperator, bpy.types.Operator):
     bl_label = "Update Motion"
     bl_options = {"REGISTER", "UNDO"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         motion_parts.rebuild(root)
         root.mu_motion.trouble = ""
-        return {"FINISHED"}
 
 
 class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
@@ -124,11 +112,9 @@ class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
     bl_label = "Fit Range"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         settings = root.mu_motion
         settings.low, settings.high = motion_parts.extent(root, settings.field)
-        return {"FINISHED"}
 
 
 class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
@@ -140,11 +126,8 @@ class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         legend_object.show(root) if self.on else legend_object.hide(root)
-        return {"FINISHED"}
 
 
 class MU_OT_picture(UnitOperator, bpy.types.Operator):
@@ -156,9 +139,7 @@ class MU_OT_picture(UnitOperator, bpy.types.Operator):
 
     name: StringProperty(name="Picture", description="Name of its file in the study's folder")
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         path = studies.results_folder(root) / FOLDER / self.name
         if not self.name or not path.is_file():
             raise InputError("there is no such picture", str(path), "simulate first")

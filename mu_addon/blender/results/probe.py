@@ -13,12 +13,13 @@ from bpy_extras.view3d_utils import (
 )
 
 from ...usecases.simulate_and_place.motion_files import MODEL_A
+from ..shared.operators import UnitPoll
 from ..shared.overlay import Overlay
 from ..shared.texts import path_symbol
 from ..unit import object as unit_object
 from . import field_colours, legend, places
 from . import motion as motion_parts
-from .operators import MotionOperator
+from .operators import NO_MOTION
 
 SIDE = 5
 """Half the width of the mark at the largest value, in pixels at a scale of 1."""
@@ -48,7 +49,7 @@ def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
     return found
 
 
-class MU_OT_probe(MotionOperator, bpy.types.Operator):
+class MU_OT_probe(UnitPoll, bpy.types.Operator):
     """Read the field under the mouse: value, place and time. Esc or a right click ends it"""
 
     bl_idname = "mu.probe"
@@ -59,13 +60,9 @@ class MU_OT_probe(MotionOperator, bpy.types.Operator):
     """The running probe; there is one at a time."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not places.seen(unit_object.active_root(context)):
-            cls.poll_message_set("Show a motion first: Results, On the Model")
-            return False
-        return True
+    def trouble(cls, root):
+        shown = "" if places.seen(root) else "Show a motion first: Results, On the Model"
+        return NO_MOTION if motion_parts.motion_of(root) is None else shown
 
     def invoke(self, context, event):
         if context.area is None or context.area.type != "VIEW_3D":

@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 from ...errors import InputError
 from ...usecases.simulate_and_place import history
 from ..shared import updates
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import UnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import from_unit
@@ -20,13 +20,8 @@ class RunOperator(UnitOperator):
     """An operator on a run of the active unit: the one of its property `key`, else the shown one."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        if not studies.runs_of(unit_object.active_root(context)):
-            cls.poll_message_set("No run yet: simulate this unit first")
-            return False
-        return True
+    def trouble(cls, root):
+        return "" if studies.runs_of(root) else "No run yet: simulate this unit first"
 
     def run_of(self, root):
         """The run; raises InputError."""
@@ -52,11 +47,8 @@ class MU_OT_run_show(RunOperator, bpy.types.Operator):
 
     key: KEY
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         runs.show(root, self.run_of(root).key)
-        return {"FINISHED"}
 
 
 class MU_OT_run_compare(RunOperator, bpy.types.Operator):
@@ -68,16 +60,13 @@ class MU_OT_run_compare(RunOperator, bpy.types.Operator):
 
     key: KEY
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         study, run = root.mu_unit.study, self.run_of(root)
         shown = studies.shown_run(root)
         if shown is not None and run.key == shown.key:
             raise InputError("this run is the one that is shown", str(run.folder), "compare with another one")
         study.against = "" if study.against == run.key else run.key
         motion_parts.refresh(root)
-        return {"FINISHED"}
 
 
 class MU_OT_run_restore(RunOperator, bpy.types.Operator):
@@ -89,9 +78,7 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
 
     key: KEY
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         run, props = self.run_of(root), root.mu_unit
         title = props.title
         with updates.paused():
@@ -106,7 +93,6 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
                 {"WARNING"},
                 "The run had another body, other obstacles or other effects: those are not restored",
             )
-        return {"FINISHED"}
 
 
 class MU_OT_run_remove(RunOperator, bpy.types.Operator):
@@ -134,9 +120,7 @@ class MU_OT_run_remove(RunOperator, bpy.types.Operator):
             icon="WARNING",
         )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         run = self.run_of(root)
         history.remove(run)
         study = root.mu_unit.study
@@ -147,7 +131,6 @@ class MU_OT_run_remove(RunOperator, bpy.types.Operator):
                 motion_parts.hide(root, name, what)
         runs.refresh()
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 CLASSES = (MU_OT_run_show, MU_OT_run_compare, MU_OT_run_restore, MU_OT_run_remove)

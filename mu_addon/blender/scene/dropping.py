@@ -85,9 +85,8 @@ class MU_OT_drop_toml(_Dropped, bpy.types.Operator):
 class _Surface(_Dropped, UnitOperator):
     """A closed surface, in mm in the active unit's frame, put into the scene and then used."""
 
-    @reports_errors
-    def execute(self, context):
-        path, root = self.path(), unit_object.active_root(context)
+    def act(self, context, root):
+        path = self.path()
         body = read_body(path)
         mesh = bpy.data.meshes.new(path.stem)
         skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))

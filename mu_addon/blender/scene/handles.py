@@ -22,7 +22,7 @@ from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import viewports
 from ..shared.displays import editable
-from ..shared.operators import UnitOperator
+from ..shared.operators import UnitPoll
 from ..shared.wording import in_panel
 from ..steps import state as stack
 from ..unit import object as unit_object
@@ -103,7 +103,7 @@ def usable(root: Any | None, name: str) -> bool:
     return bool(unit_object.shows_result(root) == (name == PRESSURE))
 
 
-class MU_OT_drag(UnitOperator, bpy.types.Operator):
+class MU_OT_drag(UnitPoll, bpy.types.Operator):
     """Drag this with the mouse; Shift: finely, Ctrl: in whole steps, Esc or a right click: as it was"""
 
     bl_idname = "mu.drag"

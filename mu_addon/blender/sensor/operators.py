@@ -14,7 +14,6 @@ from ..results.operators import MotionOperator
 from ..shared import viewports
 from ..shared.operators import UnitOperator, reports_errors
 from ..simulate import study_folder as studies
-from ..unit import object as unit_object
 from . import state as sensor
 from . import twin
 from .session import Guide
@@ -26,14 +25,9 @@ class SessionOperator(UnitOperator):
     """An operator on the active unit whose sensor is connected."""
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        session = sensor.of(unit_object.active_root(context))
-        if session is None or not session.running:
-            cls.poll_message_set(NOT_CONNECTED)
-            return False
-        return True
+    def trouble(cls, root):
+        session = sensor.of(root)
+        return NOT_CONNECTED if session is None or not session.running else ""
 
 
 class MU_OT_sensor_ports(bpy.types.Operator):
@@ -59,9 +53,8 @@ class MU_OT_sensor_port(UnitOperator, bpy.types.Operator):
 
     name: StringProperty(name="Name", description="A port's device, or usb:VID:PID[:SERIAL]")
 
-    def execute(self, context):
-        unit_object.active_root(context).mu_sensor.port = self.name
-        return {"FINISHED"}
+    def act(self, context, root):
+        root.mu_sensor.port = self.name
 
 
 class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
@@ -72,27 +65,18 @@ class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        session = sensor.of(unit_object.active_root(context))
+    def trouble(cls, root):
+        session = sensor.of(root)
         if sensor.missing():
-            cls.poll_message_set(f"Not in this Blender: {', '.join(sensor.missing())}")
-            return False
-        if session is not None and session.running:
-            cls.poll_message_set("The sensor is connected")
-            return False
-        return True
+            return f"Not in this Blender: {', '.join(sensor.missing())}"
+        return "The sensor is connected" if session is not None and session.running else ""
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         settings = root.mu_sensor
         if settings.source == "replay" and not settings.replay:
             raise InputError("no recording is chosen", "Recording", "choose the folder of one")
         sensor.connect(root)
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
@@ -106,11 +90,9 @@ class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
         name="Others", description="The sensors of all other units instead", options={"SKIP_SAVE"}
     )
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         for uuid in sensor.others(root) if self.others else [root.mu_unit.uuid]:
             sensor.disconnect(uuid)
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
@@ -120,10 +102,9 @@ class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
     bl_label = "Release Port"
     bl_options = {"REGISTER"}
 
-    def execute(self, context):
-        session = sensor.of(unit_object.active_root(context))
+    def act(self, context, root):
+        session = sensor.of(root)
         session.child.send("resume" if session.state == "paused" else "pause")
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
@@ -138,11 +119,10 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
     def invoke(self, context, event):
         return context.window_manager.invoke_props_dialog(self)
 
-    def execute(self, context):
+    def act(self, context, root):
         # One line: a second would be another command.
         words = " ".join(self.words.split())
-        sensor.of(unit_object.active_root(context)).child.send(f"mark {words}")
-        return {"FINISHED"}
+        sensor.of(root).child.send(f"mark {words}")
 
 
 class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
@@ -152,8 +132,8 @@ class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
     bl_label = "Freeze"
     bl_options = {"REGISTER"}
 
-    def execute(self, context):
-        session = sensor.of(unit_object.active_root(context))
+    def act(self, context, root):
+        session = sensor.of(root)
         if session is None or session.traces is None:
             return {"CANCELLED"}
         session.frozen = session.traces.copy() if session.frozen is None else None
@@ -170,11 +150,10 @@ class MU_OT_sensor_channel(UnitOperator, bpy.types.Operator):
 
     name: StringProperty(name="Channel", description="Name of the channel")
 
-    def execute(self, context):
-        settings = unit_object.active_root(context).mu_sensor
+    def act(self, context, root):
+        settings = root.mu_sensor
         hidden = {name for name in settings.hidden.split(",") if name}
         settings.hidden = ",".join(sorted(hidden ^ {self.name}))
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
@@ -188,9 +167,7 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
         name="Begin", description="Begin a sweep, or stop it", default=True, options={"SKIP_SAVE"}
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         session = sensor.of(root)
         if not self.on:
             session.guide = None
@@ -216,25 +193,19 @@ class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        session = sensor.of(unit_object.active_root(context))
+    def trouble(cls, root):
+        if why := super().trouble(root):
+            return why
+        session = sensor.of(root)
         if session.guide is None:
-            cls.poll_message_set("Begin a guided sweep first")
-            return False
+            return "Begin a guided sweep first"
         if session.guide.holding:
-            cls.poll_message_set("Hold still: the angle is being read")
-            return False
-        if not session.fresh:
-            cls.poll_message_set("No samples are coming")
-            return False
-        return True
+            return "Hold still: the angle is being read"
+        return "" if session.fresh else "No samples are coming"
 
-    def execute(self, context):
-        sensor.hold(sensor.of(unit_object.active_root(context)))
+    def act(self, context, root):
+        sensor.hold(sensor.of(root))
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
@@ -257,9 +228,7 @@ class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         session = sensor.of(root)
         data = self.data or root.mu_sensor.data
         if not data and session is not None:
@@ -272,7 +241,6 @@ class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
             )
         sensor.calibrate(root, Path(bpy.path.abspath(data)))
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
@@ -282,12 +250,9 @@ class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
     bl_label = "Zero"
     bl_options = {"REGISTER"}
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         sensor.zero(root, root.mu_sensor.known_deg)
         viewports.redraw()
-        return {"FINISHED"}
 
 
 class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
@@ -299,11 +264,8 @@ class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
 
     on: BoolProperty(name="Show", description="Show or hide it", default=True)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         twin.show(root) if self.on else twin.hide(root)
-        return {"FINISHED"}
 
 
 def _path_of(root, what):

@@ -25,35 +25,6 @@ def linked(root) -> str:
     return f"{root.name} is linked from {name}: change it there, or use Object > Relations > Make Local"
 
 
-class UnitOperator:
-    """An operator on the active unit; greyed out, with the reason, where there is none or it is linked."""
-
-    find_root = staticmethod(active_root)
-    no_root = NO_UNIT
-
-    @classmethod
-    def poll(cls, context):
-        root = cls.find_root(context)
-        trouble = cls.no_root if root is None else linked(root)
-        if trouble:
-            cls.poll_message_set(trouble)
-        return not trouble
-
-
-class ValidUnitOperator(UnitOperator):
-    """An operator on the active unit that needs parameters within the design rules."""
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        trouble = active_root(context).mu_unit.trouble
-        if trouble:
-            cls.poll_message_set(f"A design rule is broken: {trouble.splitlines()[0]}")
-            return False
-        return True
-
-
 def reports_errors(execute):
     """Wrap `execute` to report a MuError, what, where and remedy, and cancel: no undo step, no traceback."""
 
@@ -85,6 +56,50 @@ def _again(uuid: str, name: str, values: dict) -> None:
             getattr(bpy.ops.mu, name.rpartition(".")[2].removeprefix("MU_OT_"))(
                 "INVOKE_DEFAULT", True, **values
             )
+
+
+class UnitPoll:
+    """The poll of an operator on the active unit: greyed out, with the reason, where it cannot run."""
+
+    find_root = staticmethod(active_root)
+    no_root = NO_UNIT
+    linked_too = False
+    """True if it also runs on what is linked from a library."""
+
+    @classmethod
+    def trouble(cls, root) -> str:
+        """Return the reason why the operator cannot run on `root` now; "" where it can."""
+        return ""
+
+    @classmethod
+    def poll(cls, context):
+        root = cls.find_root(context)
+        barred = "" if root is None or cls.linked_too else linked(root)
+        why = cls.no_root if root is None else barred or cls.trouble(root)
+        if why:
+            cls.poll_message_set(why)
+        return not why
+
+
+class UnitOperator(UnitPoll):
+    """An operator that acts at once on the active unit; errors of the core become messages."""
+
+    def act(self, context, root):
+        """Do the operator's work on `root`; returns None when it is done, {"CANCELLED"} for no undo step."""
+        raise NotImplementedError
+
+    @reports_errors
+    def execute(self, context):
+        return self.act(context, self.find_root(context)) or {"FINISHED"}
+
+
+class ValidUnitOperator(UnitOperator):
+    """An operator on the active unit that needs parameters within the design rules."""
+
+    @classmethod
+    def trouble(cls, root):
+        broken = root.mu_unit.trouble
+        return f"A design rule is broken: {broken.splitlines()[0]}" if broken else ""
 
 
 def open_file(context, path: Path) -> None:

@@ -8,8 +8,7 @@ from ...usecases.simulate_and_place import history
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
-from ..shared.operators import ValidUnitOperator, reports_errors
-from ..unit import object as unit_object
+from ..shared.operators import ValidUnitOperator
 from . import study_folder as studies
 from .job import SIMULATION, job_of
 
@@ -30,20 +29,11 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        root = unit_object.active_root(context)
-        if SIMULATION.is_running(root):
-            cls.poll_message_set("This unit is being simulated")
-            return False
-        if trouble := start_child.lacking():
-            cls.poll_message_set(trouble)
-        return not trouble
+    def trouble(cls, root):
+        running = SIMULATION.is_running(root)
+        return super().trouble(root) or ("This unit is being simulated" if running else start_child.lacking())
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         study = root.mu_unit.study
         job = job_of(root)
         # Imported late, with the solver's packages.
@@ -53,7 +43,6 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         options = ["--solver", study.solver, "--device", study.device]
         SIMULATION.start(root, folder, lambda folder: write_study(job, folder), options)
         viewports.redraw()
-        return {"FINISHED"}
 
 
 CLASSES = (

@@ -11,7 +11,7 @@ from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream
 from ..shared import updates
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import UnitOperator
 from ..shared.texts import sentence
 from ..unit import object as unit_object
 from ..unit.fields import TRUE, blender_property, exact, label, millimetres, step_of, tooltip, true_scale
@@ -54,9 +54,7 @@ class _OfStep(UnitOperator):
             self.muted = props.stack[self.step.name].muted
         return self.execute(context)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         props = root.mu_unit
         unit = to_unit(props)
         given: dict[str, dict] = {}
@@ -137,14 +135,11 @@ class MU_OT_mute(UnitOperator, bpy.types.Operator):
     )
     muted: BoolProperty(name="Mute", description="Whether the step is left out", default=True)
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         with updates.paused():
             stack.fill(root.mu_unit)
             root.mu_unit.stack[self.step].muted = self.muted
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 class MU_OT_again(UnitOperator, bpy.types.Operator):
@@ -156,12 +151,9 @@ class MU_OT_again(UnitOperator, bpy.types.Operator):
 
     step: StringProperty(name="Step", description="Name of a step of the design", default="profile")
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         stack.STACK.again(self.step, stack.given(root, to_unit(root.mu_unit)))
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 CLASSES = (

@@ -12,7 +12,7 @@ from ...design.quantity import describe
 from ...errors import InputError
 from ..scene import gestures, landing
 from ..shared import scene_units, updates, viewports
-from ..shared.operators import NO_UNIT, UnitOperator, reports_errors
+from ..shared.operators import UnitOperator, reports_errors
 from . import object as unit_object
 from . import presets
 from .broken import broken, description
@@ -101,8 +101,7 @@ class MU_OT_rebuild(UnitOperator, bpy.types.Operator):
     bl_label = "Rebuild Unit"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         if root.mode == "EDIT":
             bpy.ops.object.mode_set(mode="OBJECT")
         if not unit_object.rebuild(root):
@@ -127,9 +126,7 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
         """The full rule, for which the head of the panel may have no room."""
         return f"{properties.why}\n\nSet the nearest value that fits" if properties.why else cls.__doc__
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         found, value = broken(root), None
         if found is not None:
             mending = {(r.section, r.name): r.value for r in found.repairs}
@@ -143,7 +140,6 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
         setattr(getattr(root.mu_unit, self.section), self.name, value)
         # Another rule may still be broken, and has its own button.
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
@@ -160,9 +156,7 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
         found = None if root is None else broken(root)
         return "\n".join([cls.__doc__, *_repairs_in_words(root, found)]) if found else cls.__doc__
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         found = broken(root)
         if found is None or not found.repairs:
             raise InputError("no rule is broken", "design", "nothing is to be done")
@@ -177,7 +171,6 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
             self.report({"ERROR"}, root.mu_unit.trouble)
         else:
             self.report({"INFO"}, f"Set {', '.join(changes)}")
-        return {"FINISHED"}
 
 
 def _repairs_in_words(root, found) -> list[str]:
@@ -196,9 +189,8 @@ class MU_OT_delete(UnitOperator, bpy.types.Operator):
     bl_label = "Delete Unit"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
-        unit_object.delete(unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        unit_object.delete(root)
 
 
 class MU_OT_millimetres(bpy.types.Operator):
@@ -220,16 +212,10 @@ class MU_OT_select(UnitOperator, bpy.types.Operator):
     bl_label = "Select Unit"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context):
-        if unit_object.active_root(context) is None:
-            cls.poll_message_set(NO_UNIT)
-            return False
-        return True
+    linked_too = True
 
-    def execute(self, context):
-        unit_object.make_active(context, unit_object.active_root(context))
-        return {"FINISHED"}
+    def act(self, context, root):
+        unit_object.make_active(context, root)
 
 
 CLASSES = (MU_OT_add, MU_OT_rebuild, MU_OT_fit, MU_OT_fit_all, MU_OT_delete, MU_OT_millimetres, MU_OT_select)

@@ -22,16 +22,13 @@ class MU_OT_preset_load(UnitOperator, bpy.types.Operator):
 
     name: StringProperty(name="Preset", description="Name of a preset; your own begin with `user:`")
 
-    @reports_errors
-    def execute(self, context):
-        root = unit_object.active_root(context)
+    def act(self, context, root):
         core = presets.load(self.name)
         if not presets.is_named_after_one(root.name):
             core = attrs.evolve(core, name=root.mu_unit.title)  # the user's own name stays
         with updates.paused():
             from_unit(root.mu_unit, core)
         unit_object.rebuild(root)
-        return {"FINISHED"}
 
 
 class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
@@ -47,11 +44,9 @@ class MU_OT_preset_save(UnitOperator, bpy.types.Operator):
         self.name = unit_object.active_root(context).mu_unit.title
         return context.window_manager.invoke_props_dialog(self)
 
-    @reports_errors
-    def execute(self, context):
-        kept = presets.save(to_unit(unit_object.active_root(context).mu_unit), self.name)
+    def act(self, context, root):
+        kept = presets.save(to_unit(root.mu_unit), self.name)
         self.report({"INFO"}, f"Preset {kept.removeprefix(presets.USER)} saved")
-        return {"FINISHED"}
 
 
 class MU_OT_preset_remove(bpy.types.Operator):
