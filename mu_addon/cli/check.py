@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     from ..errors import InputError
     from ..usecases.check_print.job import Job, read_stl
     from ..usecases.check_print.run import USE_CASE
-    from ..usecases.export.limit_sheet import measured_limits
+    from ..usecases.export.sheets import measured_limits
 
     unit = unit_if_named(options)
     if unit is None and options.stl is None:

@@ -66,8 +66,8 @@ def add(commands: Commands[Any]) -> None:
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
     from ..usecases.export.job import Job, path_of, resin_of
-    from ..usecases.export.print_offsets import compensation_offsets
     from ..usecases.export.run import USE_CASE
+    from ..usecases.export.sheets import compensation_offsets
 
     unit = modelled_unit(options, context)
     path, name = path_of(unit, options.path, options.path_row)

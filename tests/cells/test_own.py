@@ -10,7 +10,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
-from mu_addon.usecases.export.limit_sheet import measured_limits
+from mu_addon.usecases.export.sheets import measured_limits
 from mu_addon.usecases.sensor.calibrate import _joined_angles
 from mu_addon.usecases.track_video.run import read_pixels
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.prediction.gauge import as_read, before_the_gauge
+from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose

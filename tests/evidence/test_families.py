@@ -12,10 +12,10 @@ from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
 from mu_addon.evidence.effect import Parameter
-from mu_addon.evidence.prediction.amplifier import filtered
 from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
 from mu_addon.evidence.prediction.hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
 from mu_addon.evidence.prediction.instants import finer
+from mu_addon.evidence.prediction.instruments import filtered
 from mu_addon.evidence.prediction.step import PressureStep
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
 from mu_addon.evidence.prediction.yielding import yielded

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from mu_addon.fem.laws.direction import require_unit, unit
 from mu_addon.fem.laws.green import of_green_strain, symmetric_identity
 from mu_addon.fem.laws.law import Array, Law
 from mu_addon.fem.laws.tensors import add_dyad, f64, mat33, mat99, vec3
-from mu_addon.fem.laws.valid import require, require_positive
+from mu_addon.fem.laws.valid import require, require_positive, require_unit, unit
 
 
 @wp.func

@@ -39,7 +39,7 @@ from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
 from mu_addon.usecases.chain.job import read_chain, read_pressures
 from mu_addon.usecases.export.job import path_of
-from mu_addon.usecases.export.print_offsets import read_sheet
+from mu_addon.usecases.export.sheets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
 from mu_addon.usecases.track_video.run import read_bench, read_pixels, read_pressure

@@ -30,9 +30,8 @@ from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
 from mu_addon.usecases.export.job import read_job as read_export
-from mu_addon.usecases.export.limit_sheet import measured_limits
-from mu_addon.usecases.export.print_offsets import compensation_offsets, gauge_sheet, read_sheet
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
+from mu_addon.usecases.export.sheets import compensation_offsets, gauge_sheet, measured_limits, read_sheet
 from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))

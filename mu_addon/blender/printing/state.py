@@ -24,7 +24,7 @@ from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
-from ...usecases.export.limit_sheet import measured_limits
+from ...usecases.export.sheets import measured_limits
 from ..body import state as bodies
 from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
 from ..shared.file_cache import FileCache
@@ -199,7 +199,7 @@ def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...usecases.export.job import LAYOUT, Job
-    from ...usecases.export.print_offsets import compensation_offsets
+    from ...usecases.export.sheets import compensation_offsets
 
     settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]

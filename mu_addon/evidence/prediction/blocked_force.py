@@ -13,10 +13,9 @@ from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
 from ..effect import Effect, Parameter
-from .amplifier import amplified, amplifier, filtered
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
-from .gauge import before_the_gauge
+from .instruments import amplified, amplifier, before_the_gauge, filtered
 from .unit import (
     GAUGE_SHARE,
     REFERENCE_C,

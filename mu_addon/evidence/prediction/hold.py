@@ -15,7 +15,7 @@ from ...measured.folder import ATMOSPHERE_kPa
 from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import first_order_lag
-from .gauge import CURVE, as_read, gauge
+from .instruments import CURVE, as_read, gauge
 from .unit import GAUGE_SHARE
 
 Array = np.ndarray[Any, Any]

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .drift import largest_reading
-from .gauge import before_the_gauge
+from .instruments import before_the_gauge
 from .unit import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
 
 Array = np.ndarray[Any, Any]

@@ -12,10 +12,10 @@ import numpy as np
 from ...errors import ConvergenceError
 from ...measured import Experiment
 from ..effect import Effect, Parameter
-from .amplifier import FILTERED, amplified, amplifier, filtered
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import decades_lag, first_order_lag, spread_lag
 from .instants import finer
+from .instruments import FILTERED, amplified, amplifier, filtered
 from .unit import REFERENCE_C, RELAXING, SPREADING, TIMED
 from .yielding import bouc_wen, elastic_strain, yielded, yielding
 

@@ -20,7 +20,7 @@ from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import in_the_chambers, play_operator, remembered
 from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
-from .gauge import before_the_gauge, gauge
+from .instruments import before_the_gauge, gauge
 from .marker_slip import Recordings, slip_effects, slipped
 
 Array = np.ndarray[Any, Any]

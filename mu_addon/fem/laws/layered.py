@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from .direction import require_unit, unit
 from .green import of_green_strain
 from .law import Array, Law
 from .tensors import f64, mat33, mat99, vec3
-from .valid import require
+from .valid import require, require_unit, unit
 
 _NORMAL = 2
 

@@ -1,4 +1,4 @@
-"""Checks of a law's parameters: errors name the parameter, its value and the remedy."""
+"""Checks and conversions of a law's parameters: errors name the parameter, its value and the remedy."""
 
 from __future__ import annotations
 
@@ -44,3 +44,19 @@ def shear_and_bulk(law: Any, modulus_MPa: Any, poisson: Any) -> tuple[Array, Arr
     remedy = "for a nearly incompressible body give 0.499 and a model with mean_dilatation"
     require((ratio > -1) & (ratio < 0.5), law, "Poisson's ratio", ratio, "above -1 and below 0.5", remedy)
     return modulus / (2 * (1 + ratio)), modulus / (3 * (1 - 2 * ratio))
+
+
+def unit(directions: Array) -> Array:
+    """Directions (3,) or (k, 3) of any length but 0 as unit vectors (k, 3)."""
+    directions = np.atleast_2d(np.asarray(directions, float))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def require_unit(law: Any, parameters: Array, first: int) -> None:
+    """Raise InputError unless parameters `first` to `first` + 2 of every row (k, count) are a unit vector.
+
+    Its length may differ from 1 by 1e-9. law: named in the error.
+    """
+    length = np.linalg.norm(parameters[:, first : first + 3], axis=1)
+    name = f"length of ({', '.join(law.parameter_names[first : first + 3])})"
+    require(np.abs(length - 1) < 1e-9, law, name, length, "1", f"let {law.__name__}.parameters make the row")

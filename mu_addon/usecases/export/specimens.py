@@ -30,8 +30,7 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
 from .job import UNIT, read_resin, resin_of, resin_text
-from .limit_sheet import limit_sheet
-from .print_offsets import gauge_sheet
+from .sheets import gauge_sheet, limit_sheet
 
 if TYPE_CHECKING:
     from ...materials.library import Material
