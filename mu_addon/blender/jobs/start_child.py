@@ -43,6 +43,8 @@ WRITERS = (
     "mu_addon.usecases.export.specimens",
     "mu_addon.usecases.check_print.job",
     "pyparsing",
+    "PIL.PngImagePlugin",
+    "dateutil.parser",
     "matplotlib",
 )
 """Modules that write a job's inputs or colour a result, each loaded in a tenth of a second; no solver."""
