@@ -19,8 +19,8 @@ from .simulator import Composite
 Array = np.ndarray[Any, Any]
 
 ITERATIONS = 25
-# Gain of chi squared below which a fit ends.
-GAIN = 1e-2
+# Gain of chi squared below which a fit ends, at least; or share of its excess over the noise.
+GAIN, RELATIVE = 1e-2, 1e-4
 # Group of prior knowledge.
 PRIOR = "known before"
 
@@ -272,7 +272,7 @@ class Fitter:
                     damping = max(damping / 10.0, 1e-9)
                     break
                 damping = max(damping * 10.0, 1e-6)
-            if not accepted or gained < GAIN:
+            if not accepted or gained < max(GAIN, RELATIVE * (chi2 - len(f))):
                 break
         return self._finished(tuple(effects), at(x), chi2 + held, r[: len(f)], f, keys, jacobian, measured)
 

@@ -170,12 +170,13 @@ def select(
     if len(chosen.effects) > 2:
         chosen = _without_superfluous(fitter, seen, base, chosen)
     doubted = doubted or _doubts(fitter, table_base, base, chosen)
-    causes = causes_of(fitter, effects, base, chosen, ps, levels)
+    table = tuple(strict_table(fitter, chosen))
+    accepted = not (doubted or structure(table))
+    causes = causes_of(fitter, effects, base, chosen, ps, levels, accepted)
     if len(causes) == 1 and CAMERA.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
         causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
-    table = tuple(strict_table(fitter, chosen))
-    if chosen is base and not doubted and not structure(table):
+    if chosen is base and accepted:
         table_base = table
         doubted = too_far(fitter, base)
     return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
@@ -339,8 +340,8 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
     table_base = tuple(dependence_table(fitter, base))
     doubted = doubted or sudden(table_base, base, chosen) or curved_reading(fitter, base, chosen)
     effects = [f.effects[0] for f in singles]
-    causes = causes_of(fitter, effects, base, chosen, ps, [singles])
     table = tuple(strict_table(fitter, chosen))
+    causes = causes_of(fitter, effects, base, chosen, ps, [singles], not (doubted or structure(table)))
     return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
 
 
@@ -398,7 +399,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     `MAINLY`, are its rivals; one that takes `MAINLY` has none that take less.
     """
     for several in (found, _without_the_least(fitter, found)):
-        if several is not None and len(several.causes) > 1 and _mainly_several(fitter, several):
+        if several is not None and _mainly_several(fitter, several):
             return several
     pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
     if not pool:
@@ -406,7 +407,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     best, base = pool[0], found.base
     left = max(1.0 - share_taken(fitter, base, best), 1e-6)
     sure = left <= 1.0 - MAINLY
-    if left > 1.0 - GRADED or (not sure and base.chi2 < 2.0 * len(fitter.record)):
+    if left > 1.0 - GRADED or base.chi2 < 2.0 * len(fitter.record):
         # Shares are meaningless for a misfit below the noise.
         return None
     others: dict[str, float] = {}
@@ -443,36 +444,51 @@ def _by_count(base: Fit, best: Fit, tried: int) -> float:
     return min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(best.keys) - len(base.keys))))
 
 
+def _with_rivals(fitter: Fitter, found: Selection) -> Selection:
+    """The selection with the rivals of its causes, which are not sought where it is not accepted."""
+    effects, ps = [f.effects[0] for f in found.singles], [c.p_value for c in found.causes]
+    causes = causes_of(fitter, effects, found.base, found.chosen, ps, [found.singles])
+    return attrs.evolve(found, causes=causes)
+
+
 def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
     """A selection of three causes or more without the least if that has rivals; else None.
 
     Such a cause compensates errors of the others' laws, and can push them to bounds that they do not need.
+    None too where the residual without it is too large for `_mainly_several`.
     """
-    if len(found.causes) < 3 or not found.causes[-1].rivals:
+    if len(found.causes) < 3:
         return None
     least = found.causes[-1].effect
     chosen = fitter.best([e for e in found.chosen.effects if e.keys != least.keys], [found.chosen.values])
-    effects = [f.effects[0] for f in found.singles]
     ps = [c.p_value for c in found.causes[:-1]]
-    causes = causes_of(fitter, effects, found.base, chosen, ps, [found.singles])
+    causes = causes_of(fitter, (), found.base, chosen, ps, [found.singles], accepted=False)
+    less = attrs.evolve(found, chosen=chosen, causes=causes)
+    if not _plain(fitter, less) or not _with_rivals(fitter, found).causes[-1].rivals:
+        return None
     doubted = _doubts(fitter, found.table_base, found.base, chosen)
-    table = tuple(strict_table(fitter, chosen))
-    return attrs.evolve(found, chosen=chosen, causes=causes, table=table, doubted=doubted)
+    return attrs.evolve(less, table=tuple(strict_table(fitter, chosen)), doubted=doubted)
+
+
+def _plain(fitter: Fitter, found: Selection) -> bool:
+    """Return True if several causes leave less than 1 - `GRADED` of each cause's loss."""
+    left = found.chosen.chi2 - len(fitter.record)
+    return len(found.causes) > 1 and all(left <= (1.0 - GRADED) * c.loss for c in found.causes)
 
 
 def _mainly_several(fitter: Fitter, found: Selection) -> bool:
-    """Return True if several causes take most of a misfit, each of them clearly, though structure is left.
+    """Return True if several causes take most of a misfit (`_plain`), though structure is left.
 
-    The residual is less than 1 - `GRADED` of each cause's loss, and no other effect in the place of one comes
-    within `CLEAR` times the residual. None has a value at a bound or rests on a single experiment.
+    No other effect in the place of one comes within `CLEAR` times the residual. None has a value at a bound
+    or rests on a single experiment.
     """
     base, chosen = found.base, found.chosen
-    if found.doubted or at_a_bound(chosen) or any(c.rivals for c in found.causes):
+    if found.doubted or at_a_bound(chosen) or not _plain(fitter, found):
+        return False
+    if any(c.rivals for c in _with_rivals(fitter, found).causes):
         return False
     left, taken = max(chosen.chi2 - len(fitter.record), 0.0), base.chi2 - chosen.chi2
     for c in found.causes:
-        if left > (1.0 - GRADED) * c.loss:
-            return False
         others = [e for e in chosen.effects if e is not c.effect]
         # So near a rival would have been reported (`causes_of`).
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
@@ -750,10 +766,12 @@ def causes_of(
     chosen: Fit,
     ps: Sequence[float],
     levels: Sequence[Sequence[Fit]],
+    accepted: bool = True,
 ) -> tuple[Cause, ...]:
     """The chosen effects, the most needed first, each with its rivals.
 
-    Rivals are also effects beside the others whose residual is within their law's error (`LAW`).
+    Rivals are also effects beside the others whose residual is within their law's error (`LAW`). Those of
+    several effects that are not accepted are not sought: that takes as long as the selection.
     """
     found = []
     for e in chosen.effects:
@@ -763,7 +781,7 @@ def causes_of(
             tried = [
                 fitter.best([*others, a], [{**chosen.values, **s} for s in a.starts()])
                 for a in effects
-                if a.name not in chosen.names
+                if accepted and a.name not in chosen.names
             ]
         less = fitter.best(others, [chosen.values])
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
@@ -811,7 +829,7 @@ def _by_numerics(
     explains the data as well once either has a free size of that error.
     """
     mesh = next((e for e in effects if e.name == NUMERICS), None)
-    if mesh is None or NUMERICS in chosen.names:
+    if mesh is None or NUMERICS in chosen.names or not tried:
         return {}
 
     def meshed(f: Fit) -> Fit:

@@ -24,7 +24,7 @@ from .owned import coincident_effects, coinciding, further_owners, select_owned
 from .plausibility import require_plausible
 from .pooled import select_pooled
 from .record import Record, record
-from .residuals import structure
+from .residuals import strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
 from .scatter import NEAR, with_bursts, within_scatter
 from .selection import (
@@ -313,13 +313,16 @@ def diagnose(
         if bursts:
             progress("noise in bursts")
             other = Fitter(measured, simulator, noise_of(measured, simulator, chosen.chosen.values))
-            anew = select(other, seen, progress)
-            if _kind(other, anew) != "unexplained":
-                fitter, base, chosen = other, anew.base, anew
-                set_aside = [*set_aside, *bursts]
+            # What is structure beside all causes and beside none is no burst.
+            both = (other.fit(effects, chosen.chosen.values) for effects in (chosen.chosen.effects, ()))
+            if not all(structure(strict_table(other, f)) for f in both):
+                anew = select(other, seen, progress)
+                if _kind(other, anew) != "unexplained":
+                    fitter, base, chosen = other, anew.base, anew
+                    set_aside = [*set_aside, *bursts]
     measured, sources = fitter.record, fitter.sources
     kind = _kind(fitter, chosen)
-    if kind == "unexplained" and (words := _of_no_size(fitter, chosen)):
+    if kind not in ("none", "unidentifiable") and (words := _of_no_size(fitter, chosen)):
         chosen = attrs.evolve(chosen, chosen=chosen.base, causes=(), doubted="", excused=words)
         set_aside = [*set_aside, words]
         kind = _kind(fitter, chosen)
@@ -387,11 +390,16 @@ def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
 
 
 def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Reason why a misfit without a significant effect is none, in words: it is as small as the scatter."""
+    """Reason why a misfit is none, in words: it is as small as the scatter, and without a cause of all.
+
+    Slow noise differs from record to record, as does what belongs to one specimen or experiment.
+    """
     left = fitter.record.values - fitter.predict(found.base.values)
-    if found.causes or not within_scatter(fitter.record, left):
+    alike = any(not (c.effect.whose or c.effect.among) for c in found.causes)
+    if alike or not within_scatter(fitter.record, left):
         return ""
-    on = ", ".join(n.replace("_", " ") for n in structure(found.table)) or "no quantity"
+    depends = [c.effect.title for c in found.causes] or structure(found.table) or ["no quantity"]
+    on = ", ".join(n.replace("_", " ") for n in depends)
     return (
         f"the residual depends on {on}, by less than {NEAR:g} times the scatter of the readings: slow or "
         "uneven noise of the instruments does that"

@@ -108,7 +108,12 @@ OUTSIDE: dict[str, dict[str, dict[str, Any]]] = {
     "blocked_force": {"outside_friction": {"share": (0.04, 0.15)}},
 }
 # Faults that the library has learned since they were made: by which name, where it names them.
-SINCE = {"outside_play": "waveguide_play", "outside_shut_later": "leak", "outside_valve": "leak"}
+SINCE = {
+    "outside_play": "waveguide_play",
+    "outside_shut_later": "leak",
+    "outside_valve": "leak",
+    "outside_cell_nonlinear": "force_nonlinearity",
+}
 # Two at once; each has its own law, as above.
 PAIRS: dict[str, list[tuple[str, str]]] = {
     "coupon": [
