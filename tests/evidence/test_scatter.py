@@ -6,6 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.evidence.second_code.judging import judged
+from benchmarks.evidence.second_code.sets import order
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record, repeats
@@ -186,3 +188,22 @@ def test_noise_that_grows_with_load_is_a_remark():
     ]
     found = diagnose(grown, Composite(bench_simulators(grown)))
     assert found.kind == "none"
+
+
+def test_what_records_are_off_by_within_their_scatter_is_slow_noise():
+    rng, made = np.random.default_rng(0), []
+    for off, period in ((1.5, 71.0), (-1.5, 17.0), (0.0, 29.0)):
+        t = np.linspace(0.0, 240.0, 120)
+        angle = 40.0 + 35.0 * np.sin(2.0 * np.pi * t / period)
+        volt = 1.5 * np.exp(-0.009 * angle) + 0.004 * (off + rng.normal(size=120))
+        columns = {"time_s": t, "angle_deg": angle, "voltage_V": volt}
+        made.append(experiment("waveguide_bending", columns, f"guide {period:g}"))
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert found.kind == "none"
+    assert "ambient light of experiment guide 71" in found.set_aside[-1]
+
+
+@pytest.mark.parametrize("number", [14, 36])
+def test_a_share_of_a_misfit_below_the_noise_names_nothing(number):
+    # A lamp of the room that comes and goes: the estimate of slow noise has it, a zero of one record a part.
+    assert judged(order("outside", number, 42261826))["verdict"] == "unexplained"
