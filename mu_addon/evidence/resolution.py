@@ -203,7 +203,8 @@ def clipped_readings(time_s: Array, values: Array) -> Array:
         if not len(runs) or runs.max() < CLIPPED:
             continue
         free = ~at
-        if np.count_nonzero(free) < 4 * CLIPPED:
+        if np.count_nonzero(free) < 4 * CLIPPED or stretch(y[free]) > CLIPPED:
+            # A coarse display stays at other readings too.
             continue
         noise = float(np.median(np.abs(divided(time_s[known[free]], y[free], 6))))
         if noise > 1e-6 * float(np.ptp(y)):

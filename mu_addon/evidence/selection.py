@@ -32,6 +32,8 @@ SEEDS = 4
 DRAWS = 20000
 # Faults of one camera, which has one at most: two of them imitate many pairs of physical effects.
 CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
+# Name of the test for a jump at one moment.
+JUMP = "jump"
 # Between the titles of two effects that are one rival together.
 TOGETHER = " with "
 # Error of the model's own mesh: present in every set of data, seen or not.
@@ -420,19 +422,22 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     of_all = any(best is f for f in found.singles)
     if of_all and near and (not sure or any(others[n] > 1.0 - MAINLY for n in near)):
         return None
-    if of_all and near and set(structure(strict_table(fitter, best))) - {OUTLIER}:
+    table = tuple(strict_table(fitter, best))
+    if of_all and near and set(structure(table)) - {OUTLIER}:
         # Effects that leave the same moment or the same waves are alike in what they are not.
+        return None
+    step = best.names[0] == STEP
+    if not (of_all or sure or step or any(n.startswith(STEP) for n in near)) and JUMP in structure(table):
+        # What changed in its owner at one moment is none of these.
         return None
     if of_all:
         shares = _share_by_experiment(fitter, best)
         if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
             return None
-    step = best.names[0] == STEP
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
         return None
     p = _by_count(base, best, len(found.singles) + len(found.wider))
     cause = Cause(best.effects[0], p, base.chi2 - best.chi2, tuple(near))
-    table = tuple(strict_table(fitter, best))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
 
 
@@ -564,9 +569,9 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
     named = base.chi2 - chosen.chi2 - 2.0 * (len(chosen.keys) - len(base.keys))
     for d in table:
         # A marker's slip is a jump; one that it leaves is structure of what remains.
-        if d.against == "jump" and SLIP in chosen.names:
+        if d.against == JUMP and SLIP in chosen.names:
             continue
-        gain = {"break": d.statistic, "jump": d.statistic**2}.get(d.against, 0.0)
+        gain = {"break": d.statistic, JUMP: d.statistic**2}.get(d.against, 0.0)
         if gain - 2.0 * (d.dof + 1) > named - margin:
             return f"a step change explains more than {' and '.join(chosen.names)}: {d.where}"
     return ""

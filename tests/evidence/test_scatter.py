@@ -203,7 +203,16 @@ def test_what_records_are_off_by_within_their_scatter_is_slow_noise():
     assert "ambient light of experiment guide 71" in found.set_aside[-1]
 
 
-@pytest.mark.parametrize("number", [14, 36])
-def test_a_share_of_a_misfit_below_the_noise_names_nothing(number):
-    # A lamp of the room that comes and goes: the estimate of slow noise has it, a zero of one record a part.
-    assert judged(order("outside", number, 42261826))["verdict"] == "unexplained"
+@pytest.mark.parametrize(
+    ("part", "number", "kind"),
+    [
+        ("outside", 14, "unexplained"),
+        ("outside", 36, "unexplained"),
+        ("lab", 39, "unexplained"),
+        ("clean", 75, "none"),
+    ],
+)
+def test_sets_of_the_second_code_that_had_misled(part, number, kind):
+    # A lamp of the room, of which a zero of one record took a share of what was less than the noise; a zero set
+    # anew in one block, which was its viscoelasticity; a coarse display at rest, which was a clipped one.
+    assert judged(order(part, number, 42261826))["verdict"] == kind

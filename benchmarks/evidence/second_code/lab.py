@@ -86,12 +86,12 @@ def _selfheat(rng: Rng, tests: Sequence[Trial], sd: float) -> list[Trial]:
 
 
 def _warming_room(rng: Rng, tests: Sequence[Trial], sd: float) -> list[Trial]:
-    """The room warms steadily by 2 to 5 K over each hold."""
-    kelvin = rng.uniform(2.0, 5.0)
+    """The room warms steadily by 4 to 11 K an hour."""
+    per_hour = rng.uniform(4.0, 11.0)
 
     def warmed(t: Trial) -> Trial:
         clock = t.columns["time_s"]
-        warm = 1.0 + kelvin / 296.0 * (clock - clock[0]) / (clock[-1] - clock[0])
+        warm = 1.0 + per_hour / 296.0 * (clock - clock[0]) / 3600.0
         return _with(t, t.channel, (t.columns[t.channel] + 101.325) * warm - 101.325)
 
     return [warmed(t) for t in tests]
