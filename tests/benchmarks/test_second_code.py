@@ -137,9 +137,9 @@ def test_mishaps_of_a_laboratory_are_counted():
         {**row, "faults": {"bursts": {}}, "verdict": "none", "outcome": "none", "error_over_noise": 2.0},
     ]
     words = report(rows)
-    assert "| none, where the error is above 5 times the noise | 1/1" in words
-    assert "| lab, mishap: right, in the set, or open | 1/2" in words
-    assert "| lab, model right: any verdict but none | 0/1" in words
+    assert "| none on an error above 5 times the noise | 1/1 | 100.0 %" in words
+    assert "| laboratory, mishap: in the set, or open | 1/2" in words
+    assert "| laboratory, model right: any verdict but none | 0/1" in words
 
 
 def test_rates_and_wrong_names_are_counted(tmp_path, monkeypatch, capsys):
@@ -149,7 +149,7 @@ def test_rates_and_wrong_names_are_counted(tmp_path, monkeypatch, capsys):
     open_ = {**row, "verdict": "unexplained", "outcome": "unexplained", "names": [], "ambiguity": []}
     assert [blames_physics(r) for r in (blamed, gauge, open_)] == [True, False, False]
     words = report([blamed, gauge, open_])
-    assert "| outside: physics named with confidence | 1/3, 33.3 %" in words
+    assert "| outside: physics named with confidence, and wrong | 1/3 | 33.3 %" in words
     assert "1 mullins_softening" in words
     rows = tmp_path / "rows.ndjson"
     (first, *_) = shuffled(["clean"], 1, 4)
@@ -160,7 +160,7 @@ def test_rates_and_wrong_names_are_counted(tmp_path, monkeypatch, capsys):
     # The second run finds its set in the file.
     (line,) = rows.read_text().splitlines()
     assert (json.loads(line)["part"], json.loads(line)["number"]) == first
-    assert "clean: called wrong" in capsys.readouterr().out
+    assert "clean: any verdict but none" in capsys.readouterr().out
 
 
 def test_a_round_has_each_set_once_in_an_order_of_its_seed():

@@ -213,6 +213,6 @@ def test_what_records_are_off_by_within_their_scatter_is_slow_noise():
     ],
 )
 def test_sets_of_the_second_code_that_had_misled(part, number, kind):
-    # A lamp of the room, of which a zero of one record took a share of what was less than the noise; a zero set
-    # anew in one block, which was its viscoelasticity; a coarse display at rest, which was a clipped one.
+    # A room's lamp, of which a zero of one record took a share below the noise; a zero set anew in one block,
+    # which was its viscoelasticity; a coarse display at rest, which was a clipped one.
     assert judged(order(part, number, 42261826))["verdict"] == kind

@@ -15,6 +15,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+from benchmarks.circumstances import circumstances
 from mu_addon.run.processes import end_with_parent, one_thread_each
 
 from .battery import ROUNDS, row_of, shuffled
@@ -51,7 +52,8 @@ def main() -> None:
                 with args.rows.open("a") as stream:
                     stream.write(json.dumps(row, default=float) + "\n")
                 rows.append(row)
-    print(report([r for r in rows if r["battery"] == args.seed]))
+    own = [r for r in rows if r["battery"] == args.seed]
+    print(f"{circumstances()}; {len(own)} sets\n\n{report(own)}")
 
 
 if __name__ == "__main__":

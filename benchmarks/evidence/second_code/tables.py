@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Callable, Iterable, Sequence
+import statistics
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from .judging import INSTRUMENTS
@@ -14,17 +15,19 @@ Row = dict[str, Any]
 GROSS = 5.0
 # Outcomes that name nothing, and trust nothing either.
 OPEN = ("unexplained", "unidentifiable", "refused")
+# Outcomes that name what is not there.
+WRONG = ("wrong", "wrong_set")
 
 
 def counted(rows: Sequence[Row], hit: Callable[[Row], bool]) -> str:
-    """How many rows, their share, and its exact interval of 95 % (Clopper and Pearson)."""
+    """How many rows, their share, and its exact 95 % interval (Clopper and Pearson), as cells of a table."""
     from scipy.stats import binomtest
 
     n, k = len(rows), sum(map(hit, rows))
     if not n:
-        return "none"
+        return ""
     low, high = binomtest(k, n).proportion_ci(method="exact")
-    return f"{k}/{n}, {100 * k / n:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+    return f"{k}/{n} | {100 * k / n:.1f} % | {100 * low:.1f} to {100 * high:.1f} %"
 
 
 def blames_physics(row: Row) -> bool:
@@ -42,70 +45,61 @@ def _outcomes(*which: str) -> Callable[[Row], bool]:
     return lambda row: row["outcome"] in which
 
 
-def _of_a_laboratory(rows: Sequence[Row]) -> list[tuple[str, str]]:
-    """Rates of mishaps: those that leave the model right, and those of tests, geometry and instruments."""
-    clean = [r for r in rows if CLEAN.issuperset(r["faults"])]
-    faulty = [r for r in rows if not CLEAN.issuperset(r["faults"])]
-    return [
-        ("lab, model right: any verdict but none", counted(clean, _called_wrong)),
-        ("lab, mishap: right, in the set, or open", counted(faulty, _outcomes("exact", "in_set", *OPEN))),
-        ("lab, mishap: right, or in the set", counted(faulty, _outcomes("exact", "in_set"))),
-        ("lab, mishap: wrong with confidence", counted(faulty, _outcomes("wrong"))),
-        ("lab, mishap: set without the truth", counted(faulty, _outcomes("wrong_set"))),
+def _rates(by: Mapping[str, Sequence[Row]]) -> list[tuple[str, str, str]]:
+    """What is counted, the cells of `counted`, and the goal."""
+    clean, single, two, outside, lab = (by[p] for p in ("clean", "single", "two", "outside", "lab"))
+    right = [r for r in lab if CLEAN.issuperset(r["faults"])]
+    faulty = [r for r in lab if not CLEAN.issuperset(r["faults"])]
+    errors = [r for r in [*faulty, *single, *two, *outside] if r.get("error_over_noise", 0.0) > GROSS]
+    named = ("exact", "in_set")
+    found = [
+        ("clean: a cause named, or several to choose from", counted(clean, _outcomes(*WRONG)), "3 %"),
+        ("clean: any verdict but none", counted(clean, _called_wrong), "3 %"),
+        ("another law: the mechanism named, or in the set", counted(single, _outcomes(*named)), "90 %"),
+        ("another law: wrong with confidence", counted(single, _outcomes("wrong")), ""),
+        ("two effects: both named, or in the set", counted(two, _outcomes(*named)), "75 %"),
+        ("outside: physics named with confidence, and wrong", counted(outside, blames_physics), "1 %"),
+        ("outside: right, since the library has it now", counted(outside, _outcomes(*named)), ""),
+        ("laboratory, model right: any verdict but none", counted(right, _called_wrong), "3 %"),
+        ("laboratory, mishap: in the set, or open", counted(faulty, _outcomes(*named, *OPEN)), ""),
+        ("laboratory, mishap: in the set", counted(faulty, _outcomes(*named)), ""),
+        ("laboratory, mishap: wrong", counted(faulty, _outcomes(*WRONG)), "1 %"),
+        (f"none on an error above {GROSS:g} times the noise", counted(errors, _outcomes("none")), "0"),
     ]
+    each = [{"in": v} for r in by["coverage"] for v in r["inside"].values()]
+    found.append(("95 % intervals that hold the truth", counted(each, lambda r: r["in"]), "93 to 97 %"))
+    return [row for row in found if row[1]]
+
+
+def _seconds(rows: Sequence[Row]) -> str:
+    """Median and longest processor time of a verdict by kind, as a row of the table."""
+    by: dict[str, list[float]] = collections.defaultdict(list)
+    for r in rows:
+        by[r["kind"].replace("_", " ")].append(r.get("seconds", 0.0))
+    each = (f"{kind} {statistics.median(own):.1f}, {max(own):.0f}" for kind, own in sorted(by.items()))
+    return f"| seconds, median and longest | {'; '.join(each)} |  |  |  |"
 
 
 def report(rows: Iterable[Row]) -> str:
-    """All rates of a battery's rows, then what was called what."""
+    """All rates of a battery's rows, and seconds by kind, then what was called what."""
+    rows = list(rows)
     by: dict[str, list[Row]] = collections.defaultdict(list)
     for row in rows:
         by[row["part"]].append(row)
-    lines = ["| what | rate (95 %) |", "| --- | --- |"]
-
-    def line(what: str, found: str) -> None:
-        if found != "none":
-            lines.append(f"| {what} | {found} |")
-
-    clean, single, two, outside = (by[p] for p in ("clean", "single", "two", "outside"))
-    line("clean: named or several to choose from", counted(clean, _outcomes("wrong", "wrong_set")))
-    line("clean: called wrong (any verdict but none)", counted(clean, _called_wrong))
-    for noise in dict.fromkeys(r["noise"] for r in clean):
-        line(
-            f"clean, {noise}: any verdict but none",
-            counted([r for r in clean if r["noise"] == noise], _called_wrong),
-        )
-    for kind in dict.fromkeys(r["kind"] for r in clean):
-        line(
-            f"clean, {kind}: any verdict but none",
-            counted([r for r in clean if r["kind"] == kind], _called_wrong),
-        )
-    line("another law: mechanism named, or in the set", counted(single, _outcomes("exact", "in_set")))
-    line("another law: mechanism named alone", counted(single, _outcomes("exact")))
-    line("another law: wrong with confidence", counted(single, _outcomes("wrong")))
-    line("outside: physics named with confidence", counted(outside, blames_physics))
-    line("outside: anything named with confidence", counted(outside, _outcomes("wrong")))
-    line("outside: named right, in the library since", counted(outside, _outcomes("exact", "in_set")))
-    line("outside: unexplained", counted(outside, _outcomes("unexplained")))
-    line("two effects: both named, or in the set", counted(two, _outcomes("exact", "in_set")))
-    line("two effects: both named alone", counted(two, _outcomes("exact")))
-    line("two effects: wrong with confidence", counted(two, _outcomes("wrong")))
-    for words, found in _of_a_laboratory(by["lab"]):
-        line(words, found)
-    errors = [r for r in by["lab"] + single + two + outside if r.get("error_over_noise", 0.0) > GROSS]
-    line(f"none, where the error is above {GROSS:g} times the noise", counted(errors, _outcomes("none")))
-    for noise in ("white", "slow", "quantised", ""):
-        own = [r for r in by["coverage"] if noise in ("", r["noise"])]
-        each = [{"in": v} for r in own for v in r["inside"].values()]
-        line(f"95 % intervals that hold the truth, {noise or 'all'}", counted(each, lambda r: r["in"]))
-    line("coverage sets: effect in the set", counted(by["coverage"], _outcomes("exact", "in_set")))
-    lines += ["", "| class | kind | hidden | called |", "| --- | --- | --- | --- |"]
+    lines = [
+        "| sets of a second code | found | rate | 95 % interval | goal |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    lines += [f"| {what} | {cells} | {goal} |" for what, cells, goal in _rates(by)]
+    lines.append(_seconds(rows))
+    lines.append("")
     for part, own in by.items():
         groups = collections.defaultdict(list)
         for r in own:
             groups[r["kind"], " + ".join(r["faults"]) or "nothing"].append(r)
         for (kind, hidden), members in sorted(groups.items()):
             called = collections.Counter(_called(r) for r in members).most_common()
-            lines.append(f"| {part} | {kind} | {hidden} | {', '.join(f'{n} {c}' for c, n in called)} |")
+            lines.append(f"- {part}, {kind}, {hidden}: {', '.join(f'{n} {c}' for c, n in called)}")
     return "\n".join(lines)
 
 
