@@ -1,6 +1,7 @@
 """The second code of measured data: right where both codes have one law, apart from the engine, counted."""
 
 import ast
+import contextlib
 import json
 import math
 from pathlib import Path
@@ -104,10 +105,10 @@ def test_every_order_makes_a_folder_that_is_read(tmp_path):
             of = order(part, number, 5)
             assert set(of.truth) <= set(LIBRARY)
             write(tmp_path / f"{part}{number}", made(of))
-            try:
+            # A unit that changes within a file is refused, where it is seen.
+            refused = [InputError] * ("unit_change" in of.faults)
+            with contextlib.suppress(*refused):
                 assert read_folder(tmp_path / f"{part}{number}").experiments
-            except InputError as error:
-                assert "unit_change" in of.faults and "as if the unit changed" in error.what
     assert order("single", 3, 5) == order("single", 3, 5) != order("single", 3, 6)
     assert {n for effects in SINGLE.values() for n in effects} <= set(LIBRARY)
 
