@@ -98,8 +98,11 @@ def lines(trimmed: TrimmedStruts | None, cut: bool) -> Skeleton | None:
     return None if trimmed is None else lattice(Struts(trimmed, None), cut)
 
 
-def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
-    """Struts as polylines with a ball at every node, or without a radius as lines; with `cut`, at x <= 0."""
+def lattice(struts: Struts | None, cut: bool, bladder: float = np.inf) -> Skeleton | None:
+    """Struts as polylines with a ball at every node, or without a radius as lines; with `cut`, at x <= 0.
+
+    bladder: outer radius in mm of the bladders.
+    """
     if struts is None:
         return None
     shown = struts.trimmed
@@ -111,7 +114,10 @@ def lattice(struts: Struts | None, cut: bool) -> Skeleton | None:
         # Cut where its axis meets the wall, a tube that grazes it would show its end: it goes on into it.
         radii = (INTO_CUT_WALL if cut else INTO_WALL) * _widest(struts.lattice)
         into = radii / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        first, last = np.maximum(first - into, 0.0), np.minimum(last + into, 1.0)
+        # Its node then lies within the bladders; of one that the user's own body cuts, outside.
+        inner = np.linalg.norm(ends[..., :2], axis=2) < 1.001 * bladder
+        first = np.where(inner[:, 0], np.maximum(first - into, 0.0), first)
+        last = np.where(inner[:, 1], np.minimum(last + into, 1.0), last)
     t = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, pieces + 1)
     edges = _polylines(len(ends), pieces + 1)
     points = along(ends, t)

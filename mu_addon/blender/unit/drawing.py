@@ -34,7 +34,7 @@ DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], Skeleton | None]]] = {
     "membranes": ("actuator", lambda value, given, cut: skeletons.actuator(value, cut)),
     "cells": ("cells", lambda value, given, cut: skeletons.boxes(value)),
     "trim": ("trim", lambda value, given, cut: skeletons.lines(value, cut)),
-    "struts": ("lattice", lambda value, given, cut: skeletons.lattice(value, cut)),
+    "struts": ("lattice", lambda value, given, cut: skeletons.lattice(value, cut, given.unit.dimensions.R)),
     "anchors": (
         "anchors",
         lambda value, given, cut: skeletons.anchor_skeleton(value, stack.STACK.value("struts", given)),
