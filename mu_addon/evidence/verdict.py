@@ -66,6 +66,18 @@ UNLIKELY = 3.0
 STRAINED = 5.0
 # Noise around the causes larger or smaller than around the base model by this factor replaces it.
 RENEWED = 1.5
+# What is off by as much in a whole record, or wanders in it, as slow noise does.
+ZEROS = frozenset(
+    (
+        "pressure_offset",
+        "pressure_drift",
+        "angle_offset",
+        "angle_drift",
+        "force_drift",
+        "led_drift",
+        "ambient_light",
+    )
+)
 # Times that causes are selected anew under noise that is quieter around those found before.
 QUIETER = 2
 # Number of times that isolated outliers are set aside.
@@ -390,13 +402,13 @@ def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
 
 
 def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Reason why a misfit is none, in words: it is as small as the scatter, and without a cause of all.
+    """Reason why a misfit is none, in words: it is as small as the scatter, with no cause but a record's zero.
 
-    Slow noise differs from record to record, as does what belongs to one specimen or experiment.
+    Slow noise differs from record to record, as zeros do.
     """
     left = fitter.record.values - fitter.predict(found.base.values)
-    alike = any(not (c.effect.whose or c.effect.among) for c in found.causes)
-    if alike or not within_scatter(fitter.record, left):
+    drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)
+    if not drifting or not within_scatter(fitter.record, left):
         return ""
     depends = [c.effect.title for c in found.causes] or structure(found.table) or ["no quantity"]
     on = ", ".join(n.replace("_", " ") for n in depends)
