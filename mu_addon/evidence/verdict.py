@@ -402,7 +402,7 @@ def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
 
 
 def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Reason why a misfit is none, in words: it is as small as the scatter, with no cause but a record's zero.
+    """Reason why a misfit is none, in words: as small as the scatter, with no cause but a record's zero.
 
     Slow noise differs from record to record, as zeros do.
     """
