@@ -1,4 +1,4 @@
-"""From the options of `design`, `simulate` and `place` to a study's job."""
+"""Build a study's job from the options of `design`, `simulate` and `place`."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ class Stack:
         self._values[name][keys(given)[name]] = value
 
     def has(self, name: str, given: StepInputs) -> bool:
-        """Whether a step's value is cached."""
+        """Return True if a step's value is cached."""
         return keys(given)[name] in self._values[name]
 
     def again(self, name: str, given: StepInputs) -> Any:

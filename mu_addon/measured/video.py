@@ -56,7 +56,7 @@ class Tracks:
 
 @attrs.frozen
 class View:
-    """How the camera sees the unit.
+    """View of the unit by the camera.
 
     base: two markers that are fixed to the base; places_mm: (y, z) in mm of each in the unit's frame; tip:
     two markers on the tip, or None if no angle is wanted; camera: "+x" or "-x", the side it stands on. The

@@ -1,4 +1,4 @@
-"""From voltage to bending angle: a monotone map fitted to sweeps, with a band that new sweeps keep to.
+"""Bending angle from voltage: a monotone map fitted to sweeps, with a band that new sweeps keep to.
 
 Model of the signal less its dark level: (1 + drift t) f(angle), f a cubic spline whose coefficients rise only
 or fall only, and so does f. Each voltage has one angle, or one interval where the sensor is blind. The band

@@ -91,7 +91,7 @@ def _value(number: str, unit: str | None) -> float:
 
 
 def why_unread(line: str) -> str:
-    """Why a line is neither pairs, CSV nor JSON, in words."""
+    """Return the reason why a line is neither pairs, CSV nor JSON."""
     if not any(character.isdigit() for character in line):
         return "it holds no number"
     if line.startswith("{"):

@@ -1,4 +1,4 @@
-"""What a window would stand still for, made in another process: a solid, a difference of runs, an embedding.
+"""Compute what is slow for a window in another process: a solid, a difference of runs, an embedding.
 
 prepared.npz: of `solid` its `vertices`, `triangles` and `gates` (JSON); of `difference` by region the
 distance and `REGION_unknown`; of `embedding` nothing, since the motion keeps it.
@@ -38,7 +38,7 @@ LAYOUT = FolderLayout("prepare.toml", "# What is prepared to be shown in a windo
 
 @attrs.frozen(eq=False)
 class Job:
-    """What to make, of `MAKERS`, and of what: texts and switches by name; a solid's unit and envelope."""
+    """Key in `MAKERS` of what to make, and its inputs: texts, switches; a solid's unit and envelope."""
 
     what: str
     of: Mapping[str, Any]
@@ -110,7 +110,7 @@ MAKERS = {"solid": _solid, "difference": _difference, "embedding": _embedding}
 
 
 def run(job: Job, folder: Path, context: RunContext) -> None:
-    """Make it, and leave its arrays in the folder; raises MuError."""
+    """Compute the arrays and write them into the folder; raises MuError."""
     with context.progress.stage(job.what, 3.0):
         write_npz(folder / RESULT, MAKERS[job.what](job, folder), packed=False)
 

@@ -1,7 +1,7 @@
-"""What the window would stand still for is made in a process of its own, and what asked for it asked again.
+"""Slow parts of operators, computed in a separate process; the operator is called again once they exist.
 
-In background, where timers never fire and no window waits, it is made at once; so it is for a script, which
-goes on with what is made.
+In background, where timers never fire, and for a script, which goes on with the result, they are computed
+at once.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _scripts = 0
 
 
 def at_once() -> bool:
-    """Whether nobody waits at a window: in background, and while a script calls an operator."""
+    """Return True if nobody waits at a window: in background, and while a script calls an operator."""
     return bool(bpy.app.background or _scripts)
 
 
 @contextmanager
 def called_by(script: bool) -> Iterator[None]:
-    """While the body runs an operator, called by a script or by a hand."""
+    """Have `at_once` return True within the body if a script called the operator."""
     global _scripts
     _scripts += script
     try:
@@ -41,10 +41,10 @@ def called_by(script: bool) -> Iterator[None]:
 
 @attrs.define(eq=False)
 class Elsewhere(Exception):
-    """Raised by who needs what is not there yet; `begin` has it made.
+    """Raised where a slow part is lacking; `begin` starts the process that computes it.
 
-    job: of `usecases.prepare`, done in `folder`; keep: told the arrays found, or None and what went wrong;
-    points (p, 3): in mm, where they are embedded; repeats: whether what asked is asked again.
+    job: of `usecases.prepare`, run in `folder`; keep: called with the arrays, or None and the error; points
+    (p, 3): points to embed, in mm; repeats: True if the operator is called again.
     """
 
     title: str
@@ -55,7 +55,7 @@ class Elsewhere(Exception):
     repeats: bool = True
 
     def begin(self, root: Any, again: Callable[[], None]) -> None:
-        """Start it, then `again`; for what is being made already, only remember that."""
+        """Start the process and call `again` at its end; if it runs already, only add the call."""
         kind = _kind(self, root)
         if kind.is_running(root):
             _waiting[kind.key(root)][1].append(again)
@@ -73,7 +73,7 @@ class Elsewhere(Exception):
 
 
 _waiting: dict[str, tuple[Elsewhere, list[Callable[[], None]]]] = {}
-"""By key of a job: what it makes, and what comes then."""
+"""By key of a job: what it makes, and the calls at its end."""
 
 
 def _kind(wanted: Elsewhere, root: Any) -> JobKind:
@@ -100,11 +100,11 @@ def _ended(key: str) -> None:
 
 
 def register() -> None:
-    """Hear when a job has ended."""
+    """Connect to the end of jobs."""
     JOB_ENDED.connect(_ended)
 
 
 def unregister() -> None:
-    """Hear no more of it."""
+    """Disconnect from it."""
     JOB_ENDED.disconnect(_ended)
     _waiting.clear()

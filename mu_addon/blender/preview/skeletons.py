@@ -29,7 +29,7 @@ AROUND = 48
 ALONG_STRUT = 4
 """Number of straight pieces of a strut, enough to show its taper."""
 INTO_WALL, INTO_CUT_WALL = 6.0, 0.4
-"""How far a strut goes on into the wall that cuts it, in radii; less where one sees into the chambers."""
+"""Length of a strut inside the wall that cuts it, in radii; less where one sees into the chambers."""
 WIDEST_LANE = 0.4
 """Largest distance, in cells, between candidate paths drawn side by side, if the lattice is wide enough."""
 CANDIDATE_RADIUS = 0.07

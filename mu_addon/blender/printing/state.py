@@ -120,7 +120,7 @@ def path_of(root: Any, unit: Unit) -> str:
 
 
 def trouble(root: Any, command: str) -> str:
-    """Why a job for the printer cannot be started now, or ""."""
+    """Return the reason why a job for the printer cannot be started now, or ""."""
     if absent := lacking(NEEDED):
         return absent
     settings = root.mu_print
@@ -264,7 +264,7 @@ def checked(root: Any) -> Checked | None:
 
 
 def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
-    """Why a check does not belong to the unit now, or ""."""
+    """Return the reason why a check is not of the unit in its present state, or ""."""
     try:
         if _shape(root, to_unit(root.mu_unit)) != shape:
             return "it belongs to other parameters"

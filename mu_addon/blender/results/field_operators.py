@@ -79,7 +79,7 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
 
 
 def lacking(root, field: str) -> str:
-    """Why the shown run does not have a field; empty if it has."""
+    """Return the reason why the shown run lacks a field, or ""."""
     motion = motion_parts.motion_of(root)
     if motion is None:
         return "there is no motion yet"

@@ -31,13 +31,13 @@ from ..unit.properties import to_unit
 
 PRESSURE = "pressure"
 FINE = 0.1
-"""What Shift makes of a drag."""
+"""Factor of a drag with Shift held."""
 
 
 @attrs.frozen
 class Handle:
-    """An arrow: whose parameter, none for the pressure, where it stands and points to in the unit's frame,
-    how many true millimetres the value grows by as its end moves by one, and its colour."""
+    """An arrow: its parameter (none for the pressure), position and direction in the unit's frame, growth
+    of the value in mm for a millimetre of its end, and colour."""
 
     section: str
     name: str
@@ -97,7 +97,7 @@ def to_pressure(root: Any, scene: Any, kPa: float) -> None:
 
 
 def usable(root: Any | None, name: str) -> bool:
-    """Whether a unit has that handle now: sizes while the design is seen, the pressure with its result."""
+    """Return True if a unit has that handle now: sizes with the design shown, pressure with its result."""
     if root is None or not editable(root) or root.mode != "OBJECT" or not root.visible_get():
         return False
     return bool(unit_object.shows_result(root) == (name == PRESSURE))
@@ -209,7 +209,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
 
 
 def _place(root: Any, name: str) -> tuple[Vector, Vector]:
-    """Where a handle stands, and where a millimetre along it leads, in the scene."""
+    """Position of a handle, and the point a millimetre along it, in the scene."""
     at, toward = HANDLES[name].stand(to_unit(root.mu_unit).dimensions)
     world = root.matrix_world
     return world @ Vector(at), world.to_3x3() @ Vector(toward)

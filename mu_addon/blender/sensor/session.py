@@ -68,7 +68,7 @@ class Session:
     reading: Reading | None = None
     guide: Guide | None = None
     trouble: str = ""
-    """Why the calibration cannot read this stream."""
+    """Reason why the calibration cannot read this stream."""
     _shown: tuple[Any, ...] = ()
     read_at: float = 0.0
 

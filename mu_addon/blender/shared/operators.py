@@ -17,7 +17,7 @@ NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
 
 
 def linked(root) -> str:
-    """Why a unit cannot be changed in this file: the library it is linked from, and what to do; else ""."""
+    """Return the reason why a unit cannot be changed here, its library, with the remedy; else ""."""
     if editable(root):
         return ""
     source = root if root.library is not None else root.override_library.reference

@@ -1,4 +1,4 @@
-"""From a clip in the Movie Clip Editor to an experiment in a folder of measured data."""
+"""Convert a clip of the Movie Clip Editor to an experiment in a folder of measured data."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 

@@ -1,4 +1,4 @@
-"""From recorded bending to a sensor's calibration, validated by leave-one-out, in one folder."""
+"""Calibrate a sensor from recorded bending, validated by leave-one-out, in one folder."""
 
 from __future__ import annotations
 

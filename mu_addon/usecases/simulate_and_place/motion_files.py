@@ -191,7 +191,7 @@ class Motion:
         return moved
 
     def embedding_file(self, points: Array) -> Path:
-        """Where the embedding of points (p, 3) in mm is kept."""
+        """Path of the cached embedding of points (p, 3) in mm."""
         return self.folder / PLAYED / f"embedding-{key(self.mesh.hash(), points)}.npz"
 
     def embedding(self, points: Array) -> Embedding:
