@@ -37,13 +37,13 @@ def full(body, freedom, value, asked):
     return np.array([q.value(moved, states) for q in asked])
 
 
-def largest_error(body, states, free, asked):
+def largest_error(body, states, free, asked, share=2e-4):
     values = np.array([q.value(body.structure, states) for q in asked])
     found = gradients(body.structure, states, asked, body.pairs(free))
     worst = 0.0
     for f, freedom in enumerate(free):
         value = float(freedom.value_of(UNIT))
-        step = 2e-4 * min(value, freedom.high - freedom.low)
+        step = share * min(value, freedom.high - freedom.low)
         slope = (full(body, freedom, value + step, asked) - full(body, freedom, value - step, asked)) / (
             2 * step
         )
@@ -60,7 +60,8 @@ def test_they_are_those_of_full_solutions_strut_by_strut():
         Angle("angle", 8.0), AirVolume("air", 8.0), Stretch("s", 8.0, "struts", 1.6), RestStiffness("k", "y"),
     ]  # fmt: skip
     states, _ = solve(body.structure, {c for q in asked for c in q.conditions})
-    assert largest_error(body, states, FREE, asked) < 1e-4
+    # Within a longer step another element has the largest stretch.
+    assert largest_error(body, states, FREE, asked, share=2e-5) < 1e-4
 
 
 @pytest.mark.slow

@@ -135,7 +135,7 @@ def test_noise_and_text_are_said_to_be_that(tmp_path: Path) -> None:
     assert "nothing lost" not in " ".join(shown)
     assert any("wrong baud rate" in line for line in shown)
     status = run_session(_Scripted(b"hello, this is no sensor!\n" * 100), tmp_path / "text", about={})
-    assert "text in no format" in status["complaint"][0]
+    assert "text in an unknown format" in status["complaint"][0]
 
 
 @pytest.mark.parametrize("turn", [100, 256, 1000, 65536])
