@@ -16,7 +16,7 @@ DELIMITERS = ("\t", ";", ",", "|", "spaces")
 _JUDGED = 400
 # Lines that a title in quotes may have.
 _MOST_LINES = 5
-_SPACES = re.compile(r"\s{2,}")
+_SPACES = re.compile(r"\s{2,}|\t")
 _BRACKET = re.compile(r"\s+(?=[(\[])")
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
@@ -78,12 +78,20 @@ def delimiter_of(lines: Sequence[str]) -> str:
     """The separator that leaves the largest share of numbers in most lines."""
     middle = max(0, len(lines) // 2 - _JUDGED // 2)
     sample = [*lines[:_JUDGED], *lines[max(_JUDGED, middle) : max(_JUDGED, middle) + _JUDGED]]
-    return max(DELIMITERS, key=lambda delimiter: sum(_share(split(line, delimiter)) for line in sample))
+    return max(DELIMITERS, key=lambda delimiter: sum(_worth(line, delimiter) for line in sample))
+
+
+def _worth(line: str, delimiter: str) -> float:
+    """Share of numbers in a line, less for spaces where tabs are: cells between these may be empty."""
+    share = _share(split(line, delimiter))
+    return 0.9 * share if delimiter == "spaces" and "\t" in line.strip() else share
 
 
 def _share(cells: Sequence[str]) -> float:
-    """Share of numbers among the cells of a row of two or more, 0 for other rows."""
+    """Share of numbers among the cells of a row of two or more, 0 for other rows or with tabs in cells."""
     filled = [cell for cell in cells if cell]
+    if any("\t" in cell for cell in filled):
+        return 0.0
     numbers = sum(is_reading(cell) or bool(unit_behind(cell)) for cell in filled)
     return numbers / len(filled) if numbers > 1 or (numbers and len(filled) > 1) else 0.0
 

@@ -48,6 +48,8 @@ def _malformed(name: str, why: str) -> InputError:
 
 
 def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangles]:
+    if content.startswith(b"PK\x03\x04"):
+        raise InputError("the file is an archive, as a 3MF, no STL", name, "export the part as STL")
     count = int.from_bytes(content[80:84], "little")
     binary = len(content) >= 84 and len(content) == 84 + 50 * count
     if not binary:
@@ -140,6 +142,11 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
     # Both names are in use.
     content = content.replace(b" vertex_index\n", b" vertex_indices\n", 1)
     try:
+        header = head[: head.index(b"end_header")]
+        if re.search(rb"element vertex +0\s", header):
+            raise ValueError("it has no points")
+        if header.count(b"property list") > 1:
+            return _ply_of_lists(content)
         mesh = read_buffer(io.BytesIO(content))
         corners = [np.asarray(face) for block in mesh.cells for face in block.data if len(face) > 2]
         if any(not np.issubdtype(face.dtype, np.integer) for face in corners):
@@ -153,3 +160,19 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         return points, _triangles(points, faces)
     except (*_DAMAGED, ReadError) as error:
         raise _malformed(name, str(error) or "the PLY file is damaged") from error
+
+
+def _ply_of_lists(content: bytes) -> tuple[Vertices, Triangles]:
+    """Surface of a file with more lists than the corners of its faces, such as places in a picture."""
+    from trimesh.exchange.ply import load_ply
+
+    # Comments may name a picture, which is not to be read.
+    header, body = content.split(b"end_header", 1)
+    content = re.sub(rb"(?m)^comment[^\n]*\n", b"", header) + b"end_header" + body
+    read = load_ply(io.BytesIO(content))
+    points, faces = np.asarray(read["vertices"], float), np.asarray(read["faces"])
+    if points.ndim != 2 or points.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+        raise ValueError("a point or a face without its numbers")
+    if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
+        raise ValueError("a face names a point that the file does not have")
+    return points, _triangles(points, faces.tolist())

@@ -7,6 +7,7 @@ are listed with lines and reason.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -175,8 +176,12 @@ class _Finding:
         for at, k in enumerate(filled):
             if len(self.numeric[k]) < 2:
                 continue
-            if any(len(self.numeric[k] & self.numeric[j]) >= 2 for j in filled[at + 1 : at + 4]):
-                return k
+            for j in filled[at + 1 : at + 4]:
+                if _names_columns(self.rows[j]) and self.numeric[k]:
+                    # Settings above the titles, as "range 0.0 3.0".
+                    break
+                if len(self.numeric[k] & self.numeric[j]) >= 2:
+                    return k
         return None
 
     def _extent(self, start: int) -> tuple[list[int], list[int], int]:
@@ -327,6 +332,13 @@ def _is_titles(row: Row) -> bool:
     return len(filled) >= 2 and not numbers
 
 
+def _names_columns(row: Row) -> bool:
+    """Return True if a row is titles without doubt: words in every cell, the first of which is a time."""
+    cells = row.cells
+    words = len(cells) > 1 and all(cell and not cell[0].isdigit() for cell in cells) and _is_titles(row)
+    return words and column(cells[0]).quantity == "time"
+
+
 def _is_units(row: Row) -> bool:
     """Return True if a row is of units: all in brackets, or most known and all short."""
     filled = row.filled
@@ -364,7 +376,12 @@ def _block(
     if len(named) > 1:
         upper = named[-2].cells
         if _is_label_row(named[-2], named[-1]):
-            labels = upper
+            # A cell above an empty one is the title of its column.
+            alone = {k for k, cell in enumerate(upper) if cell and not _cell(heads, k)}
+            labels = tuple("" if k in alone else cell for k, cell in enumerate(upper))
+            heads = tuple(
+                _cell(upper if k in alone else heads, k) for k in range(max(len(upper), len(heads)))
+            )
         else:
             heads = tuple(
                 f"{_cell(upper, k)} {_cell(heads, k)}".strip() for k in range(max(len(upper), len(heads)))
@@ -389,6 +406,8 @@ def _block(
                 )
         elif one.words:
             unread.append(Unread(_named(title, k), one.words))
+    beyond = ((k, title) for k, title in enumerate(heads) if k >= width and title)
+    unread += [Unread(_named(title, k), "no cell in it") for k, title in beyond]
     parts: list[Block] = []
     for group in _side_by_side(columns):
         values = np.stack([read[k].values for k in group], axis=1)
@@ -474,7 +493,7 @@ def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
     if sheet.forced:
         _require_forced(sheet, found.unreadable, apart, lines)
     if 2 * len(found.unreadable) >= len(filled):
-        words = max(set(filled), key=filled.count) if len(filled) < 10000 else filled[0]
+        words = Counter(filled).most_common(1)[0][0]
         same = (
             " in every row" if len(set(filled)) == 1 and len(filled) == len(cells) else f", such as {words!r}"
         )

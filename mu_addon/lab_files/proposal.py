@@ -154,8 +154,9 @@ class _Proposing:
             columns = self._of_kind(columns, kind)
             columns = self._complete(columns, kind)
             self._time(columns, kind)
-            self._signs(columns, kind)
+            # A place of the machine may be negative: its change tells the sign.
             self._zero(columns)
+            self._signs(columns, kind)
             self.keys = self._keys(columns, kind)
         else:
             columns = {name: values[self.keep] for name, values in columns.items()}
@@ -190,7 +191,7 @@ class _Proposing:
         one = self.block.columns[k]
         if one.quantity == "count":
             return "no quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
-        return f"its quantity is not known; answer with column.{one.name}=QUANTITY says it"
+        return f"its quantity is not known; answer with column.{self._name(one)}=QUANTITY says it"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
         """The columns of known quantity, in the units that are read, and the source of each."""
@@ -239,9 +240,16 @@ class _Proposing:
     def _again(self, k: int, first: int, one: Column) -> None:
         self.unread.append(Unread(self._title(k), f"another {one.quantity}: {self._title(first)} is read"))
 
+    def _name(self, one: Column) -> str:
+        """Name of a column in answers: its number if others have its title."""
+        alone = [other.title for other in self.block.columns].count(one.title) == 1
+        return one.name if alone else str(one.place)
+
     def _answer(self, key: str, one: Column) -> tuple[str, str | None]:
         """An answer about a column by its title, or by its number: its key and text."""
         keys = [f"{key}.{one.title}", f"{key}.{one.place}"] if one.title else [f"{key}.{one.place}"]
+        if self._name(one) != one.title:
+            keys.reverse()
         found = next((k for k in keys if k in self.answers), keys[0])
         return found, self.answers.get(found)
 
@@ -282,7 +290,7 @@ class _Proposing:
         if not one.title and "time" in quantities and k == 0 and (np.diff(values) > 0).all():
             proposed = "time"
         self.questions.append(
-            Question(f"column.{one.name}", f"what does {words} hold?", (*quantities, "none"), proposed)
+            Question(f"column.{self._name(one)}", f"what does {words} hold?", (*quantities, "none"), proposed)
         )
 
     def _unit(self, one: Column, k: int) -> Column:
@@ -317,8 +325,8 @@ class _Proposing:
             raise InputError(
                 f"{key} = {answer!r} is no unit of {one.quantity}",
                 self.where,
-                f"choose one of {', '.join(_OFTEN[wanted])}; column.{one.name}=QUANTITY says that it is no "
-                f"{one.quantity}",
+                f"choose one of {', '.join(_OFTEN[wanted])}; column.{self._name(one)}=QUANTITY says that "
+                f"it is no {one.quantity}",
             )
         return attrs.evolve(one, unit=answer, factor=known[1])
 

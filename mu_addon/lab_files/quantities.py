@@ -137,6 +137,7 @@ _WORDS = tuple(
             r"time|zeit|\btemps\b|tempo|tiempo|\bczas\b|elapsed|\btijd|\btid\b|\baika\b|\bido\b|\bcas\b|zaman|\bsure\b|"
             r"millis|micros|время|时间|時間|时刻|시간|seconds|\bsek",
         ),
+        ("position", r"absolut\w* (crosshead|traverse)|(crosshead|traverse) absolut"),
         ("volume", r"volume|volumen|objetosc|\binfused\b|dispensed|объем|体积"),
         ("tip_deflection", r"tip.deflection"),
         ("added_mass", r"added.mass|zusatzmasse"),
@@ -156,7 +157,7 @@ _WORDS = tuple(
         ),
         (
             "count",
-            r"\bnr\b|\bno\b|number|index|count|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
+            r"\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
         ),
     )
 )

@@ -14,6 +14,7 @@ from ..cells.dialect import Row, rows_of
 from ..cells.encoding import decoded
 from ..errors import InputError
 from ..reading import file_bytes, require_rows, unreadable
+from .labview import is_labview, rows_of_labview
 from .markup import is_markup, rows_of_markup
 from .quantities import known_words
 
@@ -64,6 +65,8 @@ def sheet_of_text(text: str, decimal: str | None = None, where: str = "") -> She
         rows, delimiter = rows_of(text)
         # A comma between columns is no decimal sign but in quotes.
         usual = "." if delimiter == "," and '"' not in text else ""
+        if is_labview(rows):
+            rows = rows_of_labview(rows)
         return Sheet("", rows, delimiter, usual, decimal or "")
     cells = rows_of_markup(text)
     if not cells:

@@ -1,6 +1,7 @@
 """A body of the user's own: what is wrong with it is found, and where; a sound one holds the lattice."""
 
 import os
+import struct
 
 import numpy as np
 import pytest
@@ -288,6 +289,40 @@ def test_a_file_whose_faces_are_no_numbers_of_points_is_refused(tmp_path):
     assert len(read_body(path).triangles) == 4
     path.write_text(PLY.format(corner="float", far=20))
     with pytest.raises(InputError, match="no body can be read"):
+        read_body(path)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_faces_with_places_in_a_picture_are_read(tmp_path, form):
+    """As a scanner writes them: a second list for each face, and the name of a picture that is not there."""
+    head = PLY.format(corner="int", far=20).split("end_header\n")[0].replace("ascii", form)
+    head = head.replace("element vertex", "comment TextureFile none.jpg\nelement vertex")
+    head += "property list uchar float texcoord\nend_header\n"
+    points = [[0, 0, 0], [20, 0, 0], [0, 20, 0], [0, 0, 20]]
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    if form == "ascii":
+        rows = [" ".join(map(str, p)) for p in points]
+        rows += [f"3 {a} {b} {c} 6 0 0 1 0 0 1" for a, b, c in faces]
+        body = ("\n".join(rows) + "\n").encode()
+    else:
+        body = b"".join(struct.pack("<3f", *p) for p in points)
+        body += b"".join(struct.pack("<B3iB6f", 3, *f, 6, 0, 0, 1, 0, 0, 1) for f in faces)
+    path = tmp_path / "scan.ply"
+    path.write_bytes(head.encode() + body)
+    found = read_body(path)
+    assert sorted(map(list, found.vertices.tolist())) == sorted(points)
+    assert len(found.triangles) == 4
+    assert flaws(found) == []
+
+
+def test_a_file_without_points_and_an_archive_are_named(tmp_path):
+    path = tmp_path / "scan.ply"
+    path.write_text(PLY.format(corner="int", far=20).replace("vertex 4", "vertex 0"))
+    with pytest.raises(InputError, match="it has no points"):
+        read_body(path)
+    path = tmp_path / "part.stl"
+    path.write_bytes(b"PK\x03\x04" + bytes(90))
+    with pytest.raises(InputError, match="an archive, as a 3MF"):
         read_body(path)
 
 

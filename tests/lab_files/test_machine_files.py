@@ -297,6 +297,97 @@ def test_commas_between_columns_and_in_numbers_are_refused(tmp_path):
     assert "line 2" in caught.value.where
 
 
+@pytest.mark.parametrize(("name", "begin"), [("Extension", 753.0), ("Extension", -753.0), ("Strain", 5.0)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_change_of_a_place_tells_its_sign(tmp_path, name, begin, way):
+    readings = (f"{0.1 * i:.1f},{0.5 * i:.2f},{begin + way * 0.1 * i:.2f}" for i in range(100))
+    p, _ = one(tmp_path, lines(f"Time (s),Load (N),{name} (mm)", *readings))
+    assert p.columns["displacement_mm"] == pytest.approx(0.1 * np.arange(100))
+    assert p.columns["force_N"] == pytest.approx(0.5 * np.arange(100))
+
+
+def test_an_extension_goes_before_the_absolute_travel_of_the_crosshead(tmp_path):
+    titles = "Test time;Absolute crosshead travel;Strain;Standard force"
+    readings = (f"{0.1 * i:.1f};{-700 + 0.2 * i:.2f};{0.1 * i:.2f};{i}" for i in range(50))
+    p, told = one(tmp_path, lines(titles, "s;mm;mm;N", *readings))
+    assert p.origin["displacement_mm"] == "'Strain' [mm]"
+    assert any("another position" in words for words in told)
+
+
+def labview(readings, titles, columns="One", decimal=".", step="0.5"):
+    """Text of a file of LabVIEW with two channels."""
+    return "\n".join(
+        (
+            "LabVIEW Measurement\t",
+            f"Writer_Version\t2\nSeparator\tTab\nDecimal_Separator\t{decimal}\nX_Columns\t{columns}",
+            f"Date\t2026/03/01\nTime\t10:00:00{decimal}5\n***End_of_Header***\t\n\t",
+            "Channels\t2\t\t\nSamples\t9\t9\t\nDate\t2026/03/01\t2026/03/01\t",
+            f"Time\t10:00:00{decimal}5\t10:00:00{decimal}5\t",
+            "Y_Unit_Label\tNewtons\tmm\t\nX_Dimension\tTime\tTime\t",
+            f"X0\t0{decimal}25\t0{decimal}25\t\nDelta_X\t{step}\t{step}\t\n***End_of_Header***\t\t\t",
+            titles,
+            *readings,
+            "",
+        )
+    )
+
+
+@pytest.mark.parametrize(("columns", "decimal"), [("No", ","), ("No", "."), ("One", "."), ("One", ",")])
+def test_a_file_of_labview_has_its_times_and_units(tmp_path, columns, decimal):
+    """The headers have numbers, the times may be given by their step alone."""
+    times = [f"{0.25 + 0.5 * i:.2f}" if columns == "One" else "" for i in range(9)]
+    readings = [f"{t}\t{1.5 * i:.1f}\t{0.2 * i:.1f}".replace(".", decimal) for i, t in enumerate(times)]
+    titles = "X_Value\tRam\tGauge\tComment"
+    text = labview(readings, titles, columns, decimal, f"0{decimal}5")
+    p, told = one(tmp_path, text, COUPON | {"column.Gauge [mm]": "displacement"}, name="a.lvm")
+    assert p.columns["time_s"] == pytest.approx(0.25 + 0.5 * np.arange(9))
+    assert p.columns["force_N"] == pytest.approx(1.5 * np.arange(9))
+    assert p.columns["displacement_mm"] == pytest.approx(0.2 * np.arange(9))
+    assert told == ["column 'Comment': no cell in it"]
+
+
+def test_settings_above_the_titles_are_no_reading(tmp_path):
+    """As in a tracker's file: the range of the time, a line of one word, titles divided by tabs."""
+    readings = (f"   {0.1 * i:.3f}\t   {2 * i:.3f}\t   {0.3 * i:.3f}" for i in range(30))
+    text = lines(
+        "walk", "rows 30", "columns 3", "range 0.0 2.9", "endheader", "time\tload\ttravel", *readings
+    )
+    p, _ = one(tmp_path, text, COUPON | {"unit.time": "s", "unit.load": "N", "unit.travel": "mm"})
+    assert p.lines[0] == 7
+    assert len(p.lines) == 30
+
+
+def test_a_title_above_an_empty_cell_is_its_columns_own(tmp_path):
+    readings = (f"{i + 1}\t{0.01 * i:.2f}\t{i}\t{2 * i}\t0.5\t{3 * i}\t{i}\t0.1" for i in range(20))
+    text = lines("Frame#\tTime\tknee\t\t\theel\t\t", "\t\tX1\tY1\tZ1\tX2\tY2\tZ2", *readings)
+    asked = [q.key for _, q in understood(tmp_path, text, {}).asked]
+    assert asked[:2] == ["unit.Time", "column.X1"]
+
+
+def test_a_title_of_two_columns_is_asked_for_by_number(tmp_path):
+    text = lines("Time (s),tip,tip", *rows())
+    assert [q.key for _, q in understood(tmp_path, text, {}).asked] == ["column.2", "column.3"]
+    p, _ = one(
+        tmp_path,
+        text,
+        COUPON | {"column.2": "force", "unit.2": "N", "column.3": "displacement", "unit.3": "mm"},
+    )
+    assert p.columns["force_N"][-1] == pytest.approx(49.5)
+
+
+def test_a_remark_beside_the_titles_is_listed(tmp_path):
+    titles = ("Time,Load,Extension,,10 mm/min", "(s),(N),(mm),,20 N preload")
+    p, told = one(tmp_path, lines(*titles, *(row + ",," for row in rows())))
+    assert len(p.lines) == 100
+    assert any("10 mm/min" in words for words in told)
+
+
+def test_vectors_within_tabs_are_no_columns(tmp_path):
+    text = lines("time\tball", *(f"{0.1 * i:.1f}\t{0.2 * i:.1f},0,0" for i in range(20)))
+    with pytest.raises(InputError, match="no table of measured data"):
+        understood(tmp_path, text)
+
+
 def test_a_table_below_titles_with_another_separator_or_a_comment_sign(tmp_path):
     p, _ = one(tmp_path, lines("# time_s force_N displacement_mm", *rows(40, " ")))
     assert p.columns["force_N"][-1] == 19.5

@@ -1,0 +1,63 @@
+"""Measurement files of LabVIEW (.lvm): headers within the file, times perhaps by their step alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+
+from ..cells.dialect import Row
+from ..cells.notation import number
+from .quantities import column, is_unit
+
+_MAGIC, _TITLES = "LabVIEW Measurement", "X_Value"
+
+
+def is_labview(rows: Sequence[Row]) -> bool:
+    """Return True for the rows of a measurement file of LabVIEW."""
+    return bool(rows) and rows[0].cells[:1] == (_MAGIC,)
+
+
+def rows_of_labview(rows: Sequence[Row]) -> tuple[Row, ...]:
+    """The rows with headers as lines of text, units in the titles, and a time in each row."""
+    found: list[Row] = []
+    header: dict[str, tuple[str, ...]] = {}
+    count = -1
+    for row in rows:
+        if row.cells[:1] == (_TITLES,):
+            count = 0
+            found.append(attrs.evolve(row, cells=_titles(row.cells, header)))
+        elif row.cells and not row.cells[0] and row.numeric and count >= 0:
+            found.append(attrs.evolve(row, cells=(_time(header, count), *row.cells[1:])))
+            count += 1
+        elif row.numeric and not row.cells[0][:1].isalpha() and count >= 0:
+            found.append(row)
+        else:
+            # A segment has a header of its own.
+            count = -1
+            if row.filled:
+                header[row.cells[0]] = row.cells[1:]
+            found.append(attrs.evolve(row, cells=(" ".join(row.filled),) if row.filled else ()))
+    return tuple(found)
+
+
+def _titles(cells: Sequence[str], header: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Titles with the units of the header where they have none."""
+    units, dimensions = header.get("Y_Unit_Label", ()), header.get("X_Dimension", ())
+    named = []
+    for k, title in enumerate(cells):
+        unit = units[k - 1] if 0 < k <= len(units) else ""
+        if title == _TITLES:
+            unit = "s" if dimensions[k : k + 1] == ("Time",) else ""
+        named.append(f"{title} [{unit}]" if is_unit(unit) and column(title).factor is None else title)
+    return tuple(named)
+
+
+def _time(header: dict[str, tuple[str, ...]], count: int) -> str:
+    """Time of a row by the beginning and step of its segment, "" where these are no numbers."""
+    decimal = (header.get("Decimal_Separator") or (".",))[0]
+    texts = [(header.get(key) or ("",))[0] for key in ("X0", "Delta_X")]
+    begin, step = (number(text, decimal) for text in texts)
+    if begin is None or step is None:
+        return ""
+    return f"{begin + count * step:.12g}".replace(".", decimal)
