@@ -90,7 +90,7 @@ class CloggedModel(Model):
             at = self._element_blocks + self._beyond[:, None] * self._pairs + np.arange(self._pairs)
             parts[at.ravel()] += self._lost_blocks.numpy()
             self._block_parts.assign(parts)
-        return self._values(self._gathered(u), u, pressure, m)
+        return self._values(u, pressure, m)
 
     def volume_beyond(self, u: Array) -> float:
         """Volume in mm3 that the cavity beyond the clog, the clog's cone and the mirror planes enclose.

@@ -146,8 +146,6 @@ class Model:
         self.obstacles: tuple[Obstacle, ...] = ()
         self.self_contact: SelfContact | None = None
         self._least_force = self._beam_forces = 0.0
-        # Stiffness of obstacles on surfaces of beams, by each obstacle, of the last `_gathered`.
-        self._on_beams: list[tuple[Array, Array]] = []
         # Position of the last forces, and these: they rotate with their sections.
         self._seen: tuple[Array, float, MaterialData, Array] | None = None
         self.reference = Reference(mesh, device)
@@ -637,19 +635,18 @@ class Model:
             inputs = [part_MPa, self._x, faces, *self._face_rule]
             inputs += [self._element_blocks + first * per_face, self._block_parts]
             wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
-        values = self._values(self._gathered(u), u, pressure, m, convex)
+        values = self._values(u, pressure, m, convex)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values
         return self._with_self_contact(values, u, convex)
 
-    def _values(
-        self, blocks: Array, u: Array, pressure: float, m: MaterialData, convex: bool = False
-    ) -> Array:
-        """The tangent's own values (nnz,) of its blocks (b, 3, 3), with beams and obstacles on them."""
+    def _values(self, u: Array, pressure: float, m: MaterialData, convex: bool = False) -> Array:
+        """The tangent's own values (nnz,) of the last element stiffness, with beams and obstacles."""
+        blocks, on_beams = self._gathered(u)
         if self._carried is not None:
             blocks = self._beam_tangent(u, pressure, m, blocks, convex)
         values = np.asarray(blocks.ravel()[self._scalar_map])
-        for pairs, added in self._on_beams:
+        for pairs, added in on_beams:
             self._add_on_beams(values, u, pairs, added)
         return values
 
@@ -732,12 +729,16 @@ class Model:
         keep = (rows >= columns) & (columns >= 0)
         return rows[keep], columns[keep], np.zeros(0) if values is None else values[keep]
 
-    def _gathered(self, u: Array) -> Array:
-        """The tangent's blocks (b, 3, 3) of their parts, and of contact with obstacles."""
+    def _gathered(self, u: Array) -> tuple[Array, list[tuple[Array, Array]]]:
+        """The tangent's blocks (b, 3, 3) of their parts, and of contact with obstacles.
+
+        Also returned, for each obstacle that touches beams: pairs (j, 2) of carried nodes, and their blocks
+        (j, 3, 3). A beam's elements have no blocks: these belong to its ends (`_add_on_beams`).
+        """
         inputs = [self._block_parts, *self._block_lists, self._blocks]
         self._launch(kernels.gather_blocks, len(self._blocks), inputs)
         blocks: Array = self._blocks.numpy()
-        self._on_beams = []
+        on_beams = []
         for obstacle in self.obstacles:
             pairs, added = obstacle.blocks(u)
             # Nodes of a face share an element, so each pair has its block; it is symmetric, as the pair is.
@@ -745,11 +746,11 @@ class Model:
             places = np.minimum(np.searchsorted(self._block_keys, keys), len(self._block_keys) - 1)
             own = self._block_keys[places] == keys
             np.add.at(blocks, places[own], added[own])
-            # But for those of a beam, whose elements have none: they belong to the beam's ends.
-            self._on_beams.append((pairs[~own], added[~own]))
+            if not own.all():
+                on_beams.append((pairs[~own], added[~own]))
         if self._folding is not None:
             blocks = self._folding(blocks)
-        return blocks
+        return blocks, on_beams
 
     def matrix(self, values: Array) -> sparse.csc_matrix:
         """The whole symmetric tangent (f, f) between the f free unknowns.
