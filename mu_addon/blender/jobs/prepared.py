@@ -40,7 +40,7 @@ def called_by(script: bool) -> Iterator[None]:
 
 
 @attrs.define(eq=False)
-class Elsewhere(Exception):
+class NotPrepared(Exception):
     """Raised where a slow part is lacking; `begin` starts the process that computes it.
 
     job: of `usecases.prepare`, run in `folder`; keep: called with the arrays, or None and the error; points
@@ -72,11 +72,11 @@ class Elsewhere(Exception):
             write_npz(folder / POINTS, {"points": self.points}, packed=False)
 
 
-_waiting: dict[str, tuple[Elsewhere, list[Callable[[], None]]]] = {}
+_waiting: dict[str, tuple[NotPrepared, list[Callable[[], None]]]] = {}
 """By key of a job: what it makes, and the calls at its end."""
 
 
-def _kind(wanted: Elsewhere, root: Any) -> JobKind:
+def _kind(wanted: NotPrepared, root: Any) -> JobKind:
     name = root.mu_unit.uuid
     return JobKind(f"prepare-{wanted.folder.name}", lambda _: name, lambda _: wanted.folder, wanted.title)
 

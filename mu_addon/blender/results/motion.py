@@ -26,7 +26,7 @@ from ...usecases.simulate_and_place.motion_files import (
     Motion,
     Skin,
 )
-from ..jobs.prepared import Elsewhere
+from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..shared import displays, handlers, updates
@@ -133,7 +133,7 @@ def follow(root: Any) -> None:
     for name, what in shown(root):
         try:
             show(root, name, what)
-        except Elsewhere as wanted:
+        except NotPrepared as wanted:
             uuid = root.mu_unit.uuid
             wanted.begin(root, lambda uuid=uuid: _follow(uuid))
         except MuError as error:
@@ -361,7 +361,7 @@ def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
         return kept
     try:
         apart = run_motions.apart(root, motion, name, body, cut)
-    except Elsewhere as wanted:
+    except NotPrepared as wanted:
         uuid = root.mu_unit.uuid
         wanted.begin(root, lambda: _refresh(uuid))
         return kept
@@ -376,7 +376,7 @@ def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
         try:
             carried = run_motions.embedded(root, motion, vertices_of(part.data))
             moved, still = (motion.carried(whose, carried) for whose in (_what(part)[0], MODEL_A))
-        except (InputError, Elsewhere):
+        except (InputError, NotPrepared):
             return None
         kept = _prints[key] = Played(motion, _distances(moved, still))
     return kept

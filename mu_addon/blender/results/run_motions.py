@@ -48,7 +48,7 @@ def apart(root: Any, motion: Motion, name: str, region: str, cut: bool) -> Any |
     kept = _apart.get(place)
     if kept is None or kept[0] is not motion or kept[1] is not other:
         if not prepared.at_once():
-            raise _elsewhere(root, motion, name, other, cut)
+            raise _wanted(root, motion, name, other, cut)
         try:
             found = difference(motion, name, motion.skin(region, cut), other, name)
         except MuError as error:
@@ -64,7 +64,7 @@ def _unknown(share: float) -> str:
     return f"{share:.0%} of the surface is not in the other unit: grey" if share else ""
 
 
-def _elsewhere(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> prepared.Elsewhere:
+def _wanted(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> prepared.NotPrepared:
     """Both regions' distances, made in another process."""
     from ...usecases.prepare import Job
 
@@ -78,18 +78,18 @@ def _elsewhere(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -
 
     of = {"one": str(one), "other": str(two), "name": name, "cut": cut}
     folder = studies.folder_of(root) / "difference"
-    return prepared.Elsewhere("difference of runs", folder, Job("difference", of), keep)
+    return prepared.NotPrepared("difference of runs", folder, Job("difference", of), keep)
 
 
 def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
-    """Points (p, 3) in mm of the unit's frame embedded in a motion's mesh; raises Elsewhere in a window."""
+    """Points (p, 3) in mm of the unit's frame embedded in a motion's mesh; raises NotPrepared in a window."""
     if not (prepared.at_once() or motion.embedding_file(points).is_file()):
         from ...usecases.prepare import Job
 
         of = {"one": str(motion.folder.parent), "points": key(points)}
         folder = studies.folder_of(root) / "embedding"
         job = Job("embedding", of)
-        raise prepared.Elsewhere("motion of the print", folder, job, lambda *_: None, points)
+        raise prepared.NotPrepared("motion of the print", folder, job, lambda *_: None, points)
     return motion.embedding(points)
 
 

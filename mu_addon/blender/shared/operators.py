@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import MuError
-from ..jobs.prepared import Elsewhere, called_by
+from ..jobs.prepared import NotPrepared, called_by
 from ..unit.object import active_root, by_uuid
 from .displays import editable
 from .wording import in_panel
@@ -33,7 +33,7 @@ def reports_errors(execute):
         try:
             with called_by(script=not self.options.is_invoke):
                 return execute(self, context)
-        except Elsewhere as wanted:
+        except NotPrepared as wanted:
             root = active_root(context)
             try:
                 wanted.begin(root, partial(_again, root.mu_unit.uuid, self.bl_idname, self.as_keywords()))

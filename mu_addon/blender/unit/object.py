@@ -263,7 +263,7 @@ def solid_is_current(root: Any) -> bool:
 
 
 def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "") -> Solid:
-    """The printable solid of a unit in the scene; raises InputError, GateError and, in a window, Elsewhere.
+    """The printable solid of a unit in the scene; raises InputError, GateError and, in a window, NotPrepared.
 
     stl: file to write it to, as made elsewhere; such a solid, of many facets, is not kept.
     """
@@ -283,7 +283,7 @@ def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "")
             stack.STACK.keep("solid", given, solid_of(arrays, job))
 
     folder = studies.folder_of(root) / ("stl" if stl else "solid")
-    raise prepared.Elsewhere(f"STL in {stl}" if stl else "solid", folder, job, keep, repeats=not stl)
+    raise prepared.NotPrepared(f"STL in {stl}" if stl else "solid", folder, job, keep, repeats=not stl)
 
 
 def put_envelope(root: Any, body: Body) -> Any:
