@@ -400,9 +400,11 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     experiment. Others that leave less than `APART` times as much, or `CLEAR` times where it takes less than
     `MAINLY`, are its rivals; one that takes `MAINLY` has none that take less.
     """
-    for several in (found, _without_the_least(fitter, found)):
-        if several is not None and _mainly_several(fitter, several):
-            return several
+    if _mainly_several(fitter, found):
+        return found
+    less = _without_the_least(fitter, found)
+    if less is not None and _mainly_several(fitter, less):
+        return less
     pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
     if not pool:
         return None

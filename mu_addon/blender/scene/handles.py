@@ -157,7 +157,8 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
 
     def _scale(self, context) -> tuple[Vector, float]:
         """Pixels (2,) on the screen of a millimetre along the arrow, and by how much a pixel changes it."""
-        at, toward = _place(self._root, self.what)
+        unit = to_unit(self._root.mu_unit)
+        at, toward = _place(self._root, self.what, unit.dimensions)
         ends = [
             location_3d_to_region_2d(context.region, context.region_data, end) for end in (at, at + toward)
         ]
@@ -167,7 +168,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         if self.what == PRESSURE:
             motion = motion_parts.motion_of(self._root)
             return pixels, float(np.ptp(motion.pressure_kPa)) / 300.0
-        description, unit = self._described(), to_unit(self._root.mu_unit)
+        description = self._described()
         if description.high <= 20.0:
             # A thin wall follows the mouse as its field in the panel does.
             return pixels, step_of(description.high) / 100.0
@@ -208,9 +209,9 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         return how
 
 
-def _place(root: Any, name: str) -> tuple[Vector, Vector]:
-    """Position of a handle, and the point a millimetre along it, in the scene."""
-    at, toward = HANDLES[name].stand(to_unit(root.mu_unit).dimensions)
+def _place(root: Any, name: str, dimensions: Dimensions) -> tuple[Vector, Vector]:
+    """Position of a unit's handle, and its direction times a millimetre, in the scene."""
+    at, toward = HANDLES[name].stand(dimensions)
     world = root.matrix_world
     return world @ Vector(at), world.to_3x3() @ Vector(toward)
 
@@ -242,9 +243,11 @@ class MU_GGT_handles(bpy.types.GizmoGroup):
         root = unit_object.active_root(context)
         for name, arrow in self.arrows.items():
             arrow.hide = not usable(root, name)
-            # A broken rule keeps the last good preview; its arrows wait where they were.
-            with suppress(InputError):
-                at, toward = _place(root, name)
+        # A broken rule keeps the last good preview; its arrows wait where they were.
+        with suppress(InputError):
+            dimensions = to_unit(root.mu_unit).dimensions
+            for name, arrow in self.arrows.items():
+                at, toward = _place(root, name, dimensions)
                 turn = toward.to_track_quat("Z", "Y").to_matrix().to_4x4()
                 arrow.matrix_basis = Matrix.Translation(at) @ turn
 

@@ -57,11 +57,11 @@ def test_an_arrow_stands_on_what_it_changes():
     wall = points_of(root, "actuator")
     mm = root.matrix_world.median_scale
     for name in SIZES[:2]:
-        at, toward = handles._place(root, name)
+        at, toward = handles._place(root, name, d)
         near = np.linalg.norm(wall - np.array(at) / mm, axis=1).min()
         assert near < 0.02 * d.cell
         assert toward.length / mm == pytest.approx(1.0, abs=1e-5)
-    assert handles._place(root, "cell")[0].z / mm == pytest.approx(d.height)
+    assert handles._place(root, "cell", d)[0].z / mm == pytest.approx(d.height)
 
 
 @pytest.mark.parametrize(
