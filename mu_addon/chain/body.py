@@ -15,10 +15,10 @@ from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
 from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
-from ..fem.rotations import skew
+from ..fem.rotations import rotation, skew
 from ..fem.unit_materials import materials_of
 from ..meshing.mesh import LATTICE, Mesh
-from .rigid_motion import exponential, inverse, logarithm, motion, slope
+from .rigid_motion import exponential, inverse, logarithm, motion, rotation_vector, slope
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit
@@ -85,7 +85,13 @@ def tip_nodes(mesh: Mesh) -> Array:
     """Nodes (t,) in the plane of a mesh's tip that follow no other node."""
     on = mesh.nodes[:, 2] == mesh.nodes[mesh.tip[0], 2]
     on[mesh.tied] = False
+    on[mesh.carried] = False
     return np.flatnonzero(on)
+
+
+def sections_on(mesh: Mesh, nodes: Array) -> Array:
+    """Rotation vectors (r,) of the beam nodes among some nodes."""
+    return np.unique(mesh.beams[:, 1::2][np.isin(mesh.beams[:, 0::2], nodes)])
 
 
 class PlateBody:
@@ -98,6 +104,8 @@ class PlateBody:
         self.mesh = mesh
         self.height = float(mesh.nodes[mesh.tip[0], 2])
         self.tip = tip_nodes(mesh)
+        self._turns = sections_on(mesh, self.tip)
+        self._clamped = np.concatenate([mesh.base, sections_on(mesh, mesh.base)])
         supports = np.zeros((len(mesh.nodes), 3), bool)
         supports[self.tip] = True
         materials = materials_of(unit, mesh)
@@ -114,7 +122,9 @@ class PlateBody:
         number = np.full(3 * len(mesh.nodes), -1)
         number[self._open.free] = np.arange(len(self._open.free))
         self._inside = number[self.equilibrium.model.free]
-        self._on_tip = number[(3 * self.tip[:, None] + np.arange(3)).ravel()]
+        # Unknowns of the plate: displacements of its nodes, then rotation vectors of its sections.
+        self._plate = (3 * np.concatenate([self.tip, self._turns])[:, None] + np.arange(3)).ravel()
+        self._on_plate = number[self._plate]
 
     @property
     def rest(self) -> Array:
@@ -131,10 +141,11 @@ class PlateBody:
 
         On the plate exact; between base and plate by the motion at the node's height share of both.
         """
-        found = spread(self.mesh.nodes, u, self._station, before, after)
+        found = spread(self.mesh, u, self._station, before, after)
         found[self.tip] = placed(self.mesh.nodes[self.tip], self.height, after)
-        found[self.mesh.base] = 0.0
-        return self.mesh.following(found)
+        found[self._turns] = after[:3]
+        found[self._clamped] = 0.0
+        return self.equilibrium.model.following(found)
 
     def solved(self, start: Array, before: Array, after: Array, pressure_MPa: float) -> Array:
         """Equilibrium (n, 3) with the plate at the logarithm `after`, from one at `before` at that pressure.
@@ -158,12 +169,15 @@ class PlateBody:
     def state(self, u: Array, eta: Array, pressure_MPa: float) -> PlateState:
         """Loads and stiffness of an equilibrium u (n, 3) with the plate at a logarithm eta (6,)."""
         model, x = self._open, self.mesh.nodes + u
-        force = model.residual(u, pressure_MPa, self.parameters)[self.tip]
-        at = x[self.tip]
+        forces = model.residual(u, pressure_MPa, self.parameters)
+        force, at = forces[self.tip], x[self.tip]
         wrench = np.concatenate([np.cross(at, force).sum(axis=0), force.sum(axis=0)])
+        to_twist = slope(eta)
         modes = np.zeros((len(self.mesh.nodes) * 3, 6))
-        on_tip = np.concatenate([-skew(at), np.tile(np.eye(3), (len(at), 1, 1))], axis=2)
-        modes[(3 * self.tip[:, None] + np.arange(3)).ravel()] = on_tip.reshape(-1, 6)
+        by_twist = np.concatenate([-skew(at), np.tile(np.eye(3), (len(at), 1, 1))], axis=2)
+        # The rotation vector of a section on the plate is that of the plate's logarithm.
+        of_turns = np.tile(np.eye(3, 6), (len(self._turns), 1, 1))
+        modes[self._plate] = np.concatenate([by_twist @ to_twist, of_turns]).reshape(-1, 6)
         stiffness = model.matrix(model.tangent(u, pressure_MPa, self.parameters)).tocsr()
         inner = self.equilibrium.model
         try:
@@ -172,21 +186,20 @@ class PlateBody:
             raise ConvergenceError("the equilibrium between plates is not stable") from None
         pulled = stiffness[self._inside] @ modes[model.free]
         modes[inner.free] = -inner.factor.solve(np.ascontiguousarray(pulled))
-        nodal = modes.reshape(-1, 3, 6)
-        self.mesh.following(nodal)
-        added = (stiffness[self._on_tip] @ modes[model.free]).reshape(-1, 3, 6)
-        turning = np.cross(at[:, None, :], added.transpose(0, 2, 1)).sum(axis=0).T
-        turning += np.cross(nodal[self.tip].transpose(0, 2, 1), force[:, None, :]).sum(axis=0).T
-        of_twist = np.vstack([turning, added.sum(axis=0)])
-        to_twist = slope(eta)
-        hessian = to_twist.T @ of_twist @ to_twist + _slope_of_gradient(eta, wrench)
+        plate = modes[self._plate]
+        added = plate.T @ (stiffness[self._on_plate] @ modes[model.free])
+        on_tip = plate[: 3 * len(self.tip)].reshape(-1, 3, 6)
+        turning = np.cross(on_tip.transpose(0, 2, 1), force[:, None, :]).sum(axis=0).T
+        gradient = to_twist.T @ wrench
+        gradient[:3] += forces[self._turns].sum(axis=0)
+        nodal = model.passed_back(u, modes).reshape(-1, 3, 6)
         return PlateState(
             pressure_MPa * 1e3,
             eta,
-            to_twist.T @ wrench,
-            hessian,
+            gradient,
+            added + to_twist[:3].T @ turning + _slope_of_gradient(eta, wrench),
             self._share @ x,
-            np.einsum("n,nik->ik", self._share, nodal) @ to_twist,
+            np.einsum("n,nik->ik", self._share, nodal),
         )
 
     def free(self, start: Array, eta: Array, pressure_MPa: float) -> tuple[Array, PlateState]:
@@ -258,13 +271,17 @@ def placed(nodes: Array, height: float, eta: Array) -> Array:
     return (nodes - [0.0, 0.0, height]) @ g[:3, :3].T + g[:3, 3] - nodes
 
 
-def spread(nodes: Array, u: Array, station: Array, before: Array, after: Array) -> Array:
-    """Displacements (n, 3) of nodes (n, 3) moved on as a plate goes from a logarithm (6,) to another.
+def spread(mesh: Mesh, u: Array, station: Array, before: Array, after: Array) -> Array:
+    """Displacements u (n, 3) of a mesh moved on as a plate goes from a logarithm (6,) to another.
 
-    station (n,): each node's share, from base 0 to plate 1, of the constant strain of both.
+    station (n,): each node's share, from base 0 to plate 1, of the constant strain of both. Sections of beams
+    turn with it.
     """
     g = exponential(station[:, None] * after) @ inverse(exponential(station[:, None] * before))
-    return np.einsum("nij,nj->ni", g[:, :3, :3], nodes + u) + g[:, :3, 3] - nodes
+    found = np.einsum("nij,nj->ni", g[:, :3, :3], mesh.nodes + u) + g[:, :3, 3] - mesh.nodes
+    turns = np.unique(mesh.beams[:, 1::2])
+    found[turns] = rotation_vector(g[turns, :3, :3] @ rotation(u[turns]))
+    return found
 
 
 def _slope_of_gradient(eta: Array, wrench: Array, step: float = 1e-5) -> Array:

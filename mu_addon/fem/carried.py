@@ -54,6 +54,24 @@ class Carried:
         by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
         return np.einsum("kiaj,ka->kij", by_axis[self._of], self._share[:, None] * self._arm)
 
+    def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array:
+        """Derivative (n, 3) by all nodes' places of forces (n, 3) times what carried nodes are given.
+
+        That is their displacement at u (n, 3) or, with a change v (n, 3) of u, its change. Arms alone depend
+        on places.
+        """
+        acting = self._share[:, None] * forces[self.nodes[self._own]]
+        if v is None:
+            turned = rotation(u[self._turns])[self._of]
+            by_arm = np.einsum("kij,ki->kj", turned, acting) - acting
+        else:
+            by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
+            by_arm = np.einsum("kiaj,ki,kj->ka", by_axis[self._of], acting, v[self._turn])
+        found = np.zeros_like(u)
+        np.add.at(found, self.nodes[self._own], by_arm)
+        np.subtract.at(found, self._node, by_arm)
+        return found
+
     def _axes(self) -> Array:
         """The three axes as arms of each turning section, (3, t, 3)."""
         return np.broadcast_to(np.eye(3)[:, None], (3, len(self._turns), 3))

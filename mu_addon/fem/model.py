@@ -312,13 +312,13 @@ class Model:
         return self.mesh.folded(loads.reshape(len(u), 3, -1)).reshape(loads.shape)
 
     def passed_back(self, u: Array, changes: Array) -> Array:
-        """Changes (3 n, c) of displacement of all nodes, from those of free nodes."""
+        """Changes (3 n, c) of displacement of all nodes about u (n, 3) in mm, from those of free nodes."""
         changes = self.mesh.following(changes.reshape(len(u), 3, -1)).reshape(changes.shape)
         if self._carried is None:
             return changes
         return np.asarray(self._carried.map(u, np.arange(len(u))) @ changes)
 
-    def _unknowns_of_beams(self, u: Array) -> Array:
+    def unknowns_of_beams(self, u: Array) -> Array:
         """Unknowns (e, 12) of the beams' ends at u (n, 3)."""
         return np.asarray(u.ravel()[self._three])
 
@@ -329,7 +329,7 @@ class Model:
         found = np.zeros((len(self._all_keys), 3, 3))
         of_own, of_beams, of_carried = self._beam_places
         found[of_own] = own
-        stiffness = m.beams.stiffness(self._unknowns_of_beams(u)).reshape(-1, 4, 3, 4, 3)
+        stiffness = m.beams.stiffness(self.unknowns_of_beams(u)).reshape(-1, 4, 3, 4, 3)
         a, b = np.tril_indices(4)
         blocks = stiffness[:, a, :, b].transpose(1, 0, 2, 3).reshape(-1, 3, 3)
         blocks = np.where(self._beam_turned[:, None, None], blocks.transpose(0, 2, 1), blocks)
@@ -371,9 +371,6 @@ class Model:
         stiffness = np.zeros(len(self.mesh.tets))
         points = self._dV.shape[1]
         layers = []
-        young, poisson = np.zeros(len(covered)), np.zeros(len(covered))
-        if len(self.mesh.beams):
-            young, poisson = materials.small_strain(len(covered))
         solid = self.mesh.solid
         if not solid.all():
             self._require_neo_hookean_beams(materials)
@@ -407,7 +404,17 @@ class Model:
                 "add a layer that covers them",
             )
         least = LEAST_STRAIN * np.linalg.norm(stiffness * self.volumes ** (2 / 3))
-        return MaterialData(tuple(layers), float(least), self._beams(young, poisson))
+        return MaterialData(tuple(layers), float(least), self.beams_of(materials))
+
+    def beams_of(self, materials: Materials) -> Beams | None:
+        """Beams of the mesh, of a body's materials, or None."""
+        if not len(self.mesh.beams):
+            return None
+        return self._beams(*materials.small_strain(len(self.mesh.tets)))
+
+    def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array | float:
+        """Derivative (n, 3) by places of forces times what carried nodes are given (`Carried.by_places`)."""
+        return 0.0 if self._carried is None else self._carried.by_places(u, forces, v)
 
     def _require_neo_hookean_beams(self, materials: Materials) -> None:
         for layer in materials.layers:
@@ -418,16 +425,19 @@ class Model:
                     "choose fidelity solid",
                 )
 
-    def _beams(self, modulus_MPa: Array, poisson: Array) -> Beams | None:
-        """Beams of the mesh, of the mean modulus and Poisson's ratio (m,) of their elements, or None."""
+    @property
+    def shares_of_beams(self) -> tuple[Array, Array]:
+        """Elements (k,) that are parts of beams, and each one's share (k,) of its beam's volume."""
         mesh = self.mesh
-        if not len(mesh.beams):
-            return None
-        count = len(mesh.beams)
         part = np.flatnonzero(~mesh.solid)
-        of, weight = mesh.beam_of[part], self.volumes[part]
-        total = np.bincount(of, weight, count)
-        E, nu = (np.bincount(of, weight * a[part], count) / total for a in (modulus_MPa, poisson))
+        of, volume = mesh.beam_of[part], self.volumes[part]
+        return part, volume / np.bincount(of, volume, len(mesh.beams))[of]
+
+    def _beams(self, modulus_MPa: Array, poisson: Array) -> Beams:
+        """Beams of the mesh, of the mean modulus and Poisson's ratio (m,) of their elements."""
+        mesh, (part, share) = self.mesh, self.shares_of_beams
+        of = mesh.beam_of[part]
+        E, nu = (np.bincount(of, share * a[part], len(mesh.beams)) for a in (modulus_MPa, poisson))
         chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
         sections = sections_of(np.linalg.norm(chord, axis=1), mesh.flexible, E, nu)
         return Beams(chord, frames_along(chord), sections)
@@ -549,7 +559,7 @@ class Model:
         if self.self_contact is not None:
             work -= self.self_contact.energy_mJ(u)
         if m.beams is not None:
-            work -= float(m.beams.energy_mJ(self._unknowns_of_beams(u)).sum())
+            work -= float(m.beams.energy_mJ(self.unknowns_of_beams(u)).sum())
         return float(self._energy.numpy().sum() - work)
 
     def _pressures(self, pressure: float) -> list[tuple[float, int, wp.array]]:
@@ -588,7 +598,7 @@ class Model:
             self._seen = u.copy(), pressure, m, found.copy()
             self._carried.fold(u, found)
             assert m.beams is not None
-            forces = m.beams.forces(self._unknowns_of_beams(u))
+            forces = m.beams.forces(self.unknowns_of_beams(u))
             found += np.bincount(self._three.ravel(), forces.ravel(), found.size).reshape(-1, 3)
             self._beam_forces = float(np.einsum("ij,ij->", forces, forces))
         return self.mesh.folded(found)

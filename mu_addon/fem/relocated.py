@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..meshing.mesh import Mesh
+from .carried import Carried
 from .model import Model
 from .reference import Reference
 from .self_contact import SelfContact
@@ -38,6 +39,8 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
         return found
     found.mesh = mesh
     found.reference = Reference(mesh, model.device, model.reference)
+    if len(mesh.beams):
+        found._carried = Carried(mesh)
     if not np.array_equal(mesh.tied_weights, model.mesh.tied_weights):
         found._folding = _refused
     return found

@@ -340,14 +340,15 @@ class SelfContact:
             total[plane.nodes, plane.column] += plane.area * plane.side * slope
         return np.asarray(total[self._nodes])
 
-    def by_places(self, u: Array, along: Sequence[Array]) -> list[Array]:
-        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the positions of the undeformed
-        nodes.
+    def by_places(self, u: Array, along: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the displacements, and by the
+        positions of the undeformed nodes, which the displaced ones follow.
 
         u and v: displacements (n, 3) in mm, which stay; gap and stiffness stay, too. Without friction.
         """
         stiffness = self.stiffness(u).tocsr()
-        found = [np.asarray(stiffness @ v.ravel()).reshape(-1, 3) for v in along]
+        by_u = [np.asarray(stiffness @ v.ravel()).reshape(-1, 3) for v in along]
+        found = [one.copy() for one in by_u]
         own = np.stack([v[self._nodes] for v in along])
         for total, of_surface in zip(found, self._by_rest(u, own), strict=True):
             total[self._nodes] += of_surface
@@ -357,7 +358,7 @@ class SelfContact:
                 of_node = np.zeros(len(self._rest))
                 of_node[plane.nodes] = slope * plane.side * v[plane.nodes, plane.column]
                 self._add_by_area(total, of_node)
-        return found
+        return by_u, found
 
     def _by_rest(self, u: Array, along: Array) -> Array:
         """Derivatives (v, j, 3) of v . forces (v, j, 3) by the undeformed surface at a fixed deformed one.

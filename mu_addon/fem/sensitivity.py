@@ -31,8 +31,9 @@ Array = np.ndarray[Any, Any]
 class Sensitivity:
     """Derivatives of a number by a mesh, at fixed displacements of its untied nodes.
 
-    nodes (n, 3) by places, per mm; filled (m, q) by shares of volume; tied_weights (t, k) by weights of ties;
-    stiffness (m,) by the logarithm of each element's stiffness.
+    nodes (n, 3) by places, per mm, of beams' ends only as far as their sections carry nodes; filled (m, q) by
+    shares of volume; tied_weights (t, k) by weights of ties; stiffness (m,) by the logarithm of each
+    element's stiffness.
     """
 
     nodes: Array
@@ -54,8 +55,9 @@ def of_residual(
 ) -> list[Sensitivity]:
     """Sensitivities of v . r(u), in mJ, r the elements' and the pressure's forces, for each v of `along`.
 
-    u and each v: displacements (n, 3) in mm that tied nodes follow; pressure in MPa. Forces of contact and
-    dead loads are left out: their derivatives are computed elsewhere.
+    u and each v: displacements (n, 3) in mm that tied and carried nodes follow, v to first order about u;
+    pressure in MPa. Forces of contact and dead loads are left out, and so is what beams do as their ends
+    move: their derivatives are computed elsewhere.
     """
     mesh = model.mesh
     G, dV = model.reference.at.gradients, model.reference.filled_volumes
@@ -86,25 +88,36 @@ def of_residual(
             D[k][e] += weight[:, None, None, None] * change
             s[k][e] += weight[:, None] * (_dot(stress, H[e]) + further[:, None] * excess[e])
     pressing = _of_pressure(model, u, pressure, along)
+    of_beams = _of_beams(model, u, m, along)
     volumes = model.reference.at.volumes
     found = []
     for k, (H, v) in enumerate(zip(slopes, along, strict=True)):
         moved = -(_turned(slope_u) @ D[k]) - _turned(H) @ S
         moved[..., range(3), range(3)] += s[k][..., None]
         ties = np.zeros_like(mesh.tied_weights)
-        if len(mesh.tied):
-            at_tied = np.isin(mesh.tets, mesh.tied).any(axis=1)
-            force, stiff = (_gathered(mesh, G, dV, part, at_tied)[mesh.tied] for part in (S, D[k]))
-            ties = np.einsum("ti,tki->tk", force, v[mesh.tied_to])
-            ties += np.einsum("ti,tki->tk", stiff, u[mesh.tied_to])
-        found.append(
-            Sensitivity(
-                _gathered(mesh, G, dV, moved, slice(None)) + pressing[k],
-                volumes * s[k],
-                ties,
-                (dV * _dot(S, H)).sum(axis=1),
-            )
-        )
+        nodes = _gathered(mesh, G, dV, moved, slice(None)) + pressing[k]
+        followers = np.concatenate([mesh.tied, mesh.carried])
+        if len(followers):
+            around = np.isin(mesh.tets, followers).any(axis=1)
+            force, stiff = (_gathered(mesh, G, dV, part, around) for part in (S, D[k]))
+            ties = np.einsum("ti,tki->tk", force[mesh.tied], v[mesh.tied_to])
+            ties += np.einsum("ti,tki->tk", stiff[mesh.tied], u[mesh.tied_to])
+            nodes += model.by_places(u, stiff) + model.by_places(u, force, v)
+        stiffness = (dV * _dot(S, H)).sum(axis=1) + of_beams[k]
+        found.append(Sensitivity(nodes, volumes * s[k], ties, stiffness))
+    return found
+
+
+def _of_beams(model: Model, u: Array, m: MaterialData, along: Sequence[Array]) -> Array:
+    """Derivatives (v, m) of the beams' part by the logarithm of each element's stiffness."""
+    found = np.zeros((len(along), len(model.mesh.tets)))
+    if m.beams is None:
+        return found
+    forces = m.beams.forces(model.unknowns_of_beams(u))
+    part, share = model.shares_of_beams
+    for k, v in enumerate(along):
+        work = np.einsum("ei,ei->e", forces, model.unknowns_of_beams(v))
+        found[k, part] = share * work[model.mesh.beam_of[part]]
     return found
 
 

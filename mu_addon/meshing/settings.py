@@ -82,11 +82,6 @@ class MeshSettings:
         """True if struts are meshed as printed."""
         return self.fidelity != HOMOGENISED
 
-    @property
-    def without_beams(self) -> MeshSettings:
-        """The same with every strut solid, for jobs that do not support beams yet."""
-        return attrs.evolve(self, fidelity=SOLID) if self.fidelity == RESOLVED else self
-
     def table(self) -> dict[str, Any]:
         """Settings as a table of a file of inputs; fidelity only where it is not homogenised."""
         found = attrs.asdict(self)

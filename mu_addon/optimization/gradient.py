@@ -52,8 +52,9 @@ def adjoint(structure: Structure, states: States, quantities: Sequence[Quantity]
     found = {}
     for condition, served in wanted.items():
         factor, model = _tangent_factor(structure, states, condition)
-        loads = np.stack([model.mesh.folded(slope).ravel()[model.free] for _, slope in served], axis=1)
-        found[condition] = tuple(n for n, _ in served), factor.solve(loads)
+        slopes = np.stack([slope.ravel() for _, slope in served], axis=1)
+        loads = model.passed_on(states[condition], slopes)[model.free]
+        found[condition] = tuple(n for n, _ in served), factor.solve(np.ascontiguousarray(loads))
     return Adjoint(found)
 
 
@@ -97,8 +98,8 @@ def gradients(
     if direct and held:
         moving = _displacement_derivatives(structure, states, forces)
         for f, (plus, minus, step) in enumerate(held):
-            forward = {c: states[c] + 0.5 * step * moving[c][f] for c in own}
-            backward = {c: states[c] - 0.5 * step * moving[c][f] for c in own}
+            forward = {c: plus.following(states[c] + 0.5 * step * moving[c][f]) for c in own}
+            backward = {c: minus.following(states[c] - 0.5 * step * moving[c][f]) for c in own}
             for number, q in enumerate(quantities):
                 if q in direct:
                     found[number, f] = (q.value(plus, forward) - q.value(minus, backward)) / step
@@ -111,17 +112,18 @@ def _changes(
     """Quantities that each condition of an adjoint serves, and the change of lambda . r."""
     found = {}
     for condition, (numbers, lam) in solved.of.items():
-        along = [_everywhere(structure, column) for column in lam.T]
-        found[condition] = list(numbers), ResidualChange(structure, condition, states[condition], along)
+        u = states[condition]
+        along = [_everywhere(structure, u, column) for column in lam.T]
+        found[condition] = list(numbers), ResidualChange(structure, condition, u, along)
     return found
 
 
-def _everywhere(structure: Structure, free: Array) -> Array:
-    """A vector (free,) as one at the nodes (n, 3)."""
+def _everywhere(structure: Structure, u: Array, free: Array) -> Array:
+    """A change (free,) of the displacements u (n, 3) as one at the nodes (n, 3)."""
     model = structure.model
-    found = np.zeros(model.mesh.nodes.size)
-    found[model.free] = free
-    return np.asarray(model.mesh.following(found.reshape(-1, 3)))
+    found = np.zeros_like(u)
+    found.ravel()[model.free] = free
+    return structure.following_change(u, found)
 
 
 def _residual_change(plus: Structure, minus: Structure, condition: Condition, states: States) -> Array:
@@ -151,5 +153,5 @@ def _displacement_derivatives(
     for condition, changes in forces.items():
         factor, _ = _tangent_factor(structure, states, condition)
         moved = factor.solve(-np.stack(changes, axis=1))
-        found[condition] = [_everywhere(structure, column) for column in moved.T]
+        found[condition] = [_everywhere(structure, states[condition], column) for column in moved.T]
     return found

@@ -279,7 +279,8 @@ class Stretch:
         factor = 1.0 if self.elongation is None else -self.elongation / max(mean - 1.0, 1e-9) ** 2
         by_u = self.slope(structure, states)[self.conditions[0]]
         ties = np.einsum("ti,tki->tk", by_u[mesh.tied], u[mesh.tied_to])
-        return Sensitivity(factor * nodes, factor * filled, ties, np.zeros(len(mesh.tets)))
+        nodes = factor * nodes + structure.model.by_places(u, by_u)
+        return Sensitivity(nodes, factor * filled, ties, np.zeros(len(mesh.tets)))
 
     def _known(self, structure: Structure, states: States) -> Any:
         """Result of `_most` for a body, computed once."""
@@ -364,11 +365,14 @@ class RestStiffness:
 
     def _work(self, structure: Structure, model: Model, moved: Array, small: float) -> list[ResidualChange]:
         """The work along a small displacement of itself, and the other way round."""
-        v = np.zeros_like(model.mesh.nodes)
-        v.ravel()[model.free] = small * moved
-        v = model.mesh.following(v)
-        rest = Condition(WITHOUT, 0.0)
-        return [ResidualChange(structure, rest, side, [side], model) for side in (v, -v)]
+        found, rest = [], Condition(WITHOUT, 0.0)
+        for sign in (1.0, -1.0):
+            u, v = (np.zeros_like(model.mesh.nodes) for _ in range(2))
+            v.ravel()[model.free] = u.ravel()[model.free] = sign * small * moved
+            u = model.following(u)
+            v = model.passed_back(u, v.reshape(-1, 1)).reshape(u.shape)
+            found.append(ResidualChange(structure, rest, u, [v], model))
+        return found
 
     def _side(self, structure: Structure) -> tuple[Model, Array]:
         """The model whose supports admit the direction, and the weights (n, 3) of the tip's displacement."""
@@ -379,7 +383,8 @@ class RestStiffness:
         tip = _tip(structure)
         weights = np.zeros_like(model.mesh.nodes)
         weights[tip.nodes, axis] = tip.area / tip.area.sum()
-        return model, model.mesh.folded(weights)
+        at_rest = np.zeros_like(weights)
+        return model, model.passed_on(at_rest, weights.reshape(-1, 1)).reshape(weights.shape)
 
     def _moved(self, structure: Structure, model: Model, weights: Array) -> Array:
         """Displacement (free,) under the weights as forces in N, found once for one body."""
@@ -456,7 +461,11 @@ def _odd(structure: Structure) -> Model:
 
     def made() -> Model:
         held = np.zeros((len(mesh.nodes), 3), bool)
-        held[mesh.symmetry_nodes("x"), 1:] = True
+        plane = mesh.symmetry_nodes("x")
+        held[plane, 1:] = True
+        # A section in the plane turns about the axes in it alone.
+        ends = np.isin(mesh.beams[:, 0::2], plane)
+        held[mesh.beams[:, 1::2][ends], 0] = True
         return Model(whole, supports=held, threads=structure.model.threads)
 
     return relocated(structure.once("odd", made), whole)

@@ -20,8 +20,8 @@ Array = np.ndarray[Any, Any]
 class ResidualChange:
     """Changes of v . r(u) at a body's displacements u, for each v of `along`.
 
-    u and each v: (n, 3) in mm, tied nodes following; of a neighbour by its own ties. model: another one of
-    the body's mesh than its own.
+    u and each v: (n, 3) in mm, tied and carried nodes following, v to first order about u; of a neighbour by
+    its own ties and arms. model: another one of the body's mesh than its own.
     """
 
     def __init__(
@@ -49,6 +49,7 @@ class ResidualChange:
         if first is not second:
             found += [one.between(first, second) for one in self.sensitivities]
             found += [np.vdot(one, first.nodes - second.nodes) for one in self._contact_by_places]
+            found += self._by_beams(plus.model, minus.model)
         found += self._by_gap(plus, minus)
         return found + self._by_rest(plus) - self._by_rest(minus)
 
@@ -68,6 +69,15 @@ class ResidualChange:
         change = (sides[0] - sides[1]).ravel()[self._model.free]
         return np.array([v.ravel()[self._model.free] @ change for v in self._along])
 
+    def _by_beams(self, plus: Model, minus: Model) -> Array:
+        """Change by the beams' lengths, directions and sections, of the body's own materials."""
+        sides = [side.beams_of(self._own) for side in (plus, minus)]
+        if None in sides:
+            return np.zeros(len(self._along))
+        x = self._model.unknowns_of_beams(self._u)
+        ahead, behind = (side.forces(x) for side in sides if side is not None)
+        return np.array([np.vdot(self._model.unknowns_of_beams(v), ahead - behind) for v in self._along])
+
     @cached_property
     def _touches(self) -> bool:
         contact = self._model.self_contact
@@ -76,10 +86,16 @@ class ResidualChange:
     @cached_property
     def _contact_by_places(self) -> list[Array]:
         """Derivatives (n, 3) by the nodes' places of self-contact's part; its nodes are not tied."""
-        contact = self._model.self_contact
+        model, u, contact = self._model, self._u, self._model.self_contact
         if contact is None or not self._touches:
-            return [np.zeros_like(self._u) for _ in self._along]
-        return contact.by_places(self._u, self._along)
+            return [np.zeros_like(u) for _ in self._along]
+        forces = np.zeros_like(u)
+        nodes, acting = contact.forces(u)
+        forces[nodes] += acting
+        return [
+            one + model.by_places(u, by_u) + model.by_places(u, forces, v)
+            for by_u, one, v in zip(*contact.by_places(u, self._along), self._along, strict=True)
+        ]
 
     def _by_gap(self, plus: Structure, minus: Structure) -> Array:
         """Change by gap and stiffness of self-contact."""
@@ -104,7 +120,7 @@ class ResidualChange:
         u = side.following(self._u)
         forces = [obstacle.forces(u) for obstacle in model.obstacles]
         for k, v in enumerate(self._along):
-            own = side.following(v)
+            own = side.following_change(self._u, v)
             found[k] = sum(float(np.vdot(own[nodes], parts)) for nodes, parts in forces)
             if model.load is not None:
                 found[k] -= float(np.vdot(own, model.load))

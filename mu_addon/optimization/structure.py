@@ -70,12 +70,16 @@ class Structure:
         return known[1]
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, 3) in mm with tied nodes following by this body's ties.
+        """Displacements u (n, 3) in mm with tied and carried nodes following by this body's ties and arms.
 
-        A similar body ties struts to its wall by other weights.
+        A similar body ties struts to its wall by other weights, and has other sections.
         """
         mesh = self.model.mesh
-        return np.asarray(mesh.following(u.copy())) if len(mesh.tied) else u
+        return np.asarray(self.model.following(u.copy())) if len(mesh.tied) or len(mesh.carried) else u
+
+    def following_change(self, u: Array, v: Array) -> Array:
+        """A change v (n, 3) of displacements u (n, 3) in mm, with `following` to first order."""
+        return np.asarray(self.model.passed_back(u, v.reshape(-1, 1).copy()).reshape(v.shape))
 
     def under(self, condition: Condition) -> Model:
         """Model of a condition: the body's own, or one with the wall that holds its tip."""

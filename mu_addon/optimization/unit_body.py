@@ -95,8 +95,7 @@ class UnitBody:
     def mesh(self) -> Mesh:
         """The unit's own mesh. Raises InputError and MeshingError."""
         m = self.mechanics
-        settings = m.settings.without_beams
-        return mesh_of(self.printed, settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
+        return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
 
     @property
     def envelope(self) -> Body | None:

@@ -72,13 +72,23 @@ def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: f
     parts that struts stand on; reach_mm: below which a layer stays solid. Rotation vectors are nodes added at
     the end.
     """
-    lattice = lattice_of(d)
-    parts = _Layers(mesh, lattice, layers)
+    parts = Layers(mesh, lattice_of(d), layers)
     whole = parts.whole(mesh, clear, reach_mm)
     return parts.replaced(mesh, whole, zones_of(d))
 
 
-class _Layers:
+def rotation_nodes(beams: Array, nodes: Array) -> tuple[Array, Array]:
+    """The axis nodes (b,) of beams (e, 4), ascending, and the places (b, 3) in mm of their rotation vectors.
+
+    nodes (n, 3) in mm. Each rotation vector stands on one of its node's beams, a share of its length away.
+    """
+    own = np.unique(beams[:, 0::2])
+    other = np.empty(len(nodes), int)
+    other[beams[:, 0]], other[beams[:, 2]] = beams[:, 2], beams[:, 0]
+    return own, np.asarray(nodes[own] + _OFF * (nodes[other[own]] - nodes[own]))
+
+
+class Layers:
     """The layers of the struts in a resolved mesh.
 
     elements (k,): those of struts; strut, layer (k,): of each. Of each pair of a node and a strut that it
@@ -145,27 +155,27 @@ class _Layers:
         at = np.flatnonzero(self.on_axis & (self.level % 2 == 0))
         axis[self.node_strut[at], self.level[at] // 2] = self.node[at]
         first, second = axis[strut, layer], axis[strut, layer + 1]
-        own = np.unique(np.concatenate([first, second]))
+        own, places = rotation_nodes(np.column_stack([first, first, second, second]), mesh.nodes)
         turn = np.full(len(mesh.nodes), -1)
         turn[own] = len(mesh.nodes) + np.arange(len(own))
         beams = np.column_stack([first, turn[first], second, turn[second]])
         carried = self._carried(mesh, whole, axis, turn)
         return attrs.evolve(
             mesh,
-            nodes=np.vstack([mesh.nodes, mesh.nodes[own] + _OFF * self._towards(beams, own, mesh.nodes)]),
+            nodes=np.vstack([mesh.nodes, places]),
             beams=beams,
-            flexible=self._flexible(strut, layer, zones),
+            flexible=self.flexible(self.lattice, strut, layer, zones),
             beam_of=beam_of,
             carried=carried[0],
             carriers=carried[1],
             shares=carried[2],
         )
 
-    def _towards(self, beams: Array, own: Array, nodes: Array) -> Array:
-        """Vectors (b, 3) in mm from each beam node (b,) to the other end of one of its beams."""
-        other = np.empty(len(nodes), int)
-        other[beams[:, 0]], other[beams[:, 2]] = beams[:, 2], beams[:, 0]
-        return np.asarray(nodes[other[own]] - nodes[own])
+    def of_beams(self, mesh: Mesh) -> tuple[Array, Array]:
+        """Strut (e,) and layer (e,) of each beam of the mesh that `replaced` made."""
+        beam = mesh.beam_of[self.elements]
+        first = np.unique(beam, return_index=True)[1][-len(mesh.beams) :]
+        return self.strut[first], self.layer[first]
 
     def _carried(self, mesh: Mesh, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
         """Carried nodes (c,), their carriers (c, 4) and the first one's shares (c,)."""
@@ -180,9 +190,12 @@ class _Layers:
         carriers = np.column_stack([low, turn[low], high, turn[high]])
         return node, carriers, np.where(level % 2 == 0, 1.0, 0.5)
 
-    def _flexible(self, strut: Array, layer: Array, zones: Zones) -> Array:
-        """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`."""
-        lattice, ends = self.lattice, self.ends[strut]
+    def flexible(self, lattice: Lattice, strut: Array, layer: Array, zones: Zones) -> Array:
+        """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`.
+
+        lattice: this one, or one of as many struts with other radii.
+        """
+        ends = self.ends[strut]
         way = lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]
         length = np.linalg.norm(way, axis=1)
         start, stop = layer / self.count * length, (layer + 1) / self.count * length

@@ -1,8 +1,9 @@
 """The mesh of a slightly different printed unit: same elements, with nodes, ties and shares moved.
 
-The wall's grid moves to its exact new position. Struts stay, or are swept again with another radius. Tied
-nodes of struts keep their position in the wall, with weights continued to first order. For an element that
-the wall's profile cuts, the share outside changes as the profile moves through it.
+The wall's grid moves to its exact new position. Struts stay, or are swept again with another radius, and
+beams get the flexibility of their new sections. Tied nodes of struts keep their position in the wall, with
+weights continued to first order. For an element that the wall's profile cuts, the share outside changes as
+the profile moves through it.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
-from ..design.lattice import graph_of, with_struts
+from ..design.lattice import Lattice, graph_of, with_struts
 from ..design.parameters import Unit
 from ..errors import InputError, MeshingError
 from ..fem.elements import even_points, shape_functions, shape_gradients
@@ -21,16 +22,20 @@ from ..meshing.mesh import Array, Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
+from .beams import Layers, rotation_nodes
+from .joints import zones_of
 from .lattice import clearance, cuts
 from .octants import SweptNodes
 from .strut import is_half_diagonal
-from .unit import Sizes, wall_grid, wall_of
+from .unit import Sizes, beam_layers, wall_grid, wall_of
 
 # An element that the wall cuts is divided this often along each edge to tell the share outside.
 _STEPS = 8
 # Half the width, in distances between those points, over which one passes from inside to outside. Narrower,
 # the share goes in steps; wider, it reaches beyond the elements that are in the mesh.
 _BLUR = 1.0
+# Of a length in each of a beam's integrals (`fem.beams.sections_of`).
+_POWERS = np.array([-1.0, -3.0, -3.0, -2.0, -1.0, -1.0])
 
 
 class PrintedMorph:
@@ -44,17 +49,21 @@ class PrintedMorph:
         a = drawn.printed
         self.mesh, self.drawn, self._body = mesh, drawn, body
         self._full = body is not None or settings.fraction == "full"
-        self._grid = wall_grid(a, Sizes().refined(settings.refine))
+        sizes = Sizes().refined(settings.refine)
+        self._grid = wall_grid(a, sizes)
         wall = wall_of(self._grid.membrane, a)
         wall = mirror(wall, "x") if self._full else wall
         self._count = count = len(wall.nodes)
         if len(mesh.nodes) <= count or not np.array_equal(mesh.nodes[:count], wall.nodes):
             raise _failed("it is no printed unit's, or has other settings")
-        self._struts = mesh.nodes[count:]
+        turns = np.unique(mesh.beams[:, 1::2])
+        # Rotation vectors of beams are the last nodes, and follow the others.
+        self._struts = mesh.nodes[count : len(mesh.nodes) - len(turns)]
         covered = self._covering(a)
         self._graph = graph_of(covered)
         self._lattice = with_struts(self._graph, covered)
         self._swept = SweptNodes(self._lattice, self._struts) if is_half_diagonal(a) else None
+        self._layers = Layers(mesh, self._lattice, beam_layers(sizes)) if len(turns) else None
         self._footholds = Footholds.of(wall, mesh.nodes[mesh.tied])
         self._cut, self._outside = self._cut_elements(a)
         self._before = self._shares(mesh.nodes, a, np.arange(len(self._cut)))
@@ -79,7 +88,7 @@ class PrintedMorph:
         if not same_wall:
             half = wall_of(self._grid.of(near), a)
             wall = (mirror(half, "x") if self._full else half).nodes
-        nodes = np.vstack([wall, self._struts_of(near)])
+        nodes, flexible = self._with_struts(wall, near)
         moved = (nodes != mesh.nodes).any(axis=1)
         filled, weights = mesh.filled, mesh.tied_weights
         rows = np.flatnonzero(moved[mesh.tets[self._cut]].any(axis=1) | (not same_wall))
@@ -90,14 +99,30 @@ class PrintedMorph:
         if len(rows):
             weights = weights.copy()
             weights[rows] = self._footholds.moved(wall, nodes[mesh.tied], rows)
-        found = attrs.evolve(mesh, nodes=factor * nodes, filled=filled, tied_weights=weights)
+        if factor != 1.0 and len(flexible):
+            flexible = flexible * factor**_POWERS
+        found = attrs.evolve(
+            mesh, nodes=factor * nodes, filled=filled, tied_weights=weights, flexible=flexible
+        )
         if checked:
             check_positive(found)
         return found
 
-    def _struts_of(self, d: Dimensions) -> Array:
-        """The struts' nodes (n, 3) in mm for other dimensions; raises InputError."""
-        other = with_struts(self._graph, self._covering(d))
+    def _with_struts(self, wall: Array, d: Dimensions) -> tuple[Array, Array]:
+        """Nodes (n, 3) in mm of a wall (w, 3) and the struts of other dimensions, and the flexibility (e, 6)
+        of beams; raises InputError."""
+        mesh, other = self.mesh, with_struts(self._graph, self._covering(d))
+        struts = self._struts_of(d, other)
+        nodes = np.vstack([wall, struts])
+        if self._layers is None:
+            return nodes, mesh.flexible
+        nodes = np.vstack([nodes, rotation_nodes(mesh.beams, nodes)[1]])
+        if struts is self._struts:
+            return nodes, mesh.flexible
+        return nodes, self._layers.flexible(other, *self._layers.of_beams(mesh), zones_of(d))
+
+    def _struts_of(self, d: Dimensions, other: Lattice) -> Array:
+        """The struts' nodes (n, 3) in mm of another lattice of other dimensions; raises InputError."""
         if self._swept is not None:
             return self._swept.of(other)
         own, sizes = self._lattice, ("junction_radius", "midspan_radius", "growth")

@@ -9,7 +9,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from ..design.body import Body
+from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import InputError
@@ -60,6 +60,11 @@ class Sizes:
         )
 
 
+def beam_layers(sizes: Sizes) -> int:
+    """Layers of a strut where struts are beams: they cost little, so that only the wall gets coarser."""
+    return max(sizes.layers, Sizes().layers)
+
+
 def mesh_of(
     unit: Unit,
     settings: MeshSettings,
@@ -89,7 +94,8 @@ def mesh_printed(
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
     the wall. Struts that are half diagonals are beams where they are whole (`with_beams`), unless the
-    settings ask for the fidelity "solid". The base is clamped, the inlet is left out.
+    settings ask for the fidelity "solid" or the wall has a law of its own. The base is clamped, the inlet is
+    left out.
 
     settings: of it fidelity, fraction ("half" or "full") and `refine` count. cache: folder for the octants
     of lattices other than body-centred. body: a closed surface
@@ -105,11 +111,12 @@ def mesh_printed(
             'choose order 2, or fidelity "homogenised"',
         )
     d = unit.printed
-    beams = s.fidelity != SOLID and is_half_diagonal(d)
+    own = d if body is None else covering(d, body)
+    # Beams are neo-Hookean: a wall's own law is that of struts, too.
+    beams = s.fidelity != SOLID and is_half_diagonal(d) and not unit.wall.names
     sizes = (sizes or Sizes()).refined(s.refine)
     if beams:
-        # Beams cost little: a coarser mesh is one of the wall.
-        sizes = attrs.evolve(sizes, layers=max(sizes.layers, Sizes().layers))
+        sizes = attrs.evolve(sizes, layers=beam_layers(sizes))
     report("mesh of the wall", 0.0)
     full = body is not None or s.fraction == "full"
     wall = wall_mesh(d, sizes)
@@ -125,7 +132,7 @@ def mesh_printed(
     if beams:
         reach = REACH * d.junction_diameter
         mesh = with_beams(
-            mesh, d, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach
+            mesh, own, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach
         )
     report("mesh", 1.0)
     return mesh

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem import Equilibrium, Model, materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.unit import mesh_of
 from mu_addon.run.cache import Cache
 
 from .joined import full_model
@@ -37,8 +39,17 @@ def learned(unit, mesh):
     return learn("mu-1.0x", unit, mesh, sampling.pressures(0.0, 40.0), sampling, DENSITY)
 
 
+def printed(unit):
+    """A short printed unit and its mesh, whose struts are beams up to the plate."""
+    short = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
+    return short, mesh_of(short, MeshSettings(refine=0.3, fraction="full", fidelity="resolved"))
+
+
 @pytest.mark.slow
-def test_stiffness_between_plates_is_symmetric_and_that_of_differences(unit, mesh):
+@pytest.mark.parametrize("struts", ["homogenised", "beams"])
+def test_stiffness_between_plates_is_symmetric_and_that_of_differences(unit, mesh, struts):
+    if struts == "beams":
+        unit, mesh = printed(unit)
     body = PlateBody(unit, mesh, DENSITY)
     eta = body.rest + np.array([0.1, 0.05, -0.08, 1.0, -0.5, 1.5])
     u = body.solved(np.zeros_like(mesh.nodes), body.rest, eta, 0.01)

@@ -18,7 +18,7 @@ from mu_addon.optimization.unit_body import Mechanics, UnitBody
 
 MADE = load_preset("mu-1.0x")
 UNIT = attrs.evolve(MADE, chambers=attrs.evolve(MADE.chambers, count=3))
-SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
+SETTINGS = MeshSettings(refine=0.3, fidelity="resolved")
 FREE = [
     Freedom("chambers.wall_mm", 0.6, 1.4),
     Freedom("chambers.neck_diameter_mm", 9.0, 15.0),
@@ -71,7 +71,8 @@ def test_they_are_those_of_full_solutions_where_walls_touch():
     states, _ = solve(body.structure, {c for q in asked for c in q.conditions})
     (u,) = states.values()
     assert body.structure.model.self_contact.count(u) > 10, "it touches itself"
-    assert largest_error(body, states, FREE[::2], asked) < 1e-4
+    # Distances of touching pairs have kinks in their slope: a difference errs in proportion to its step.
+    assert largest_error(body, states, FREE[::2], asked, share=1e-5) < 1e-4
 
 
 def test_a_printed_units_sensor_is_refused_and_its_own_body_is_kept():

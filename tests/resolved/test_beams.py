@@ -3,8 +3,10 @@
 import attrs
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
+from mu_addon.design.body import Body
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.wall import Wall
 from mu_addon.errors import InputError
@@ -50,6 +52,19 @@ def test_beams_bend_a_unit_as_solid_struts_do(mesh):
     (angle, unknowns), (solid_angle, solid_unknowns) = found
     assert angle == pytest.approx(solid_angle, rel=0.05)
     assert unknowns < 0.6 * solid_unknowns
+
+
+def test_a_users_own_body_beyond_the_box_has_beams_in_all_of_it():
+    box = trimesh.creation.box(bounds=[[-28.0, -18.0, 0.0], [28.0, 42.0, SMALL.printed.height]])
+    mesh = mesh_printed(SMALL, MeshSettings(refine=0.3), body=Body(box.vertices, box.faces))
+    assert (mesh.nodes[mesh.beams[:, 0], 1] > SMALL.printed.bounds[1][1]).any()
+    lengths = np.linalg.norm(mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]], axis=1)
+    np.testing.assert_allclose(lengths, np.sqrt(3) / 2 * SMALL.printed.cell / Sizes().layers)
+
+
+def test_a_wall_with_a_law_of_its_own_keeps_its_struts_solid():
+    own = attrs.evolve(SMALL, wall=Wall(law="prony", prony_g1=0.3, prony_tau1_s=1.0))
+    assert not len(mesh_printed(own, MeshSettings(refine=0.3)).beams)
 
 
 def test_whole_layers_away_from_the_wall_are_beams_and_no_others(mesh):

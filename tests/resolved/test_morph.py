@@ -13,6 +13,7 @@ from mu_addon.resolved.morph import PrintedMorph
 from mu_addon.resolved.unit import mesh_printed
 
 SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
+BEAMS = MeshSettings(refine=0.3, fidelity="resolved")
 
 
 def unit(scale=1.0, **values):
@@ -71,6 +72,24 @@ def test_tied_nodes_stay_where_the_wall_has_them(morph):
     before = np.einsum("tk,tki->ti", base.tied_weights, base.nodes[base.tied_to])
     held = np.abs(before - base.nodes[base.tied]).max(axis=1) > 1e-6
     np.testing.assert_allclose(place[~held], moved.nodes[moved.tied][~held], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"lattice__junction_diameter_mm": 1.52, "lattice__midspan_diameter_mm": 2.01},
+        {"grading__plus_y": 1.05},
+        {"scale": 1.1},
+    ],
+)
+def test_beams_are_those_of_a_unit_that_is_meshed_anew(values):
+    drawn, other = unit(), unit(**values)
+    moved = PrintedMorph(mesh_printed(drawn, BEAMS), drawn, BEAMS).to(other)
+    anew = mesh_printed(other, BEAMS)
+    assert np.array_equal(moved.beams, anew.beams)
+    np.testing.assert_allclose(moved.flexible, anew.flexible, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(moved.nodes[moved.beams], anew.nodes[moved.beams], atol=1e-6)
+    np.testing.assert_allclose(moved.nodes[moved.carried], anew.nodes[moved.carried], atol=1e-6)
 
 
 def test_another_scale_scales_all_of_it(morph):

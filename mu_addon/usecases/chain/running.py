@@ -112,8 +112,7 @@ class Running:
         pressures = job.joint.pressures(*span)
         with progress.stage(f"mesh of unit {number}"), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            settings = job.mesh.without_beams
-            mesh = mesh_of(unit, settings, lambda _, share: progress.update(share), cache=self.cache.folder)
+            mesh = mesh_of(unit, job.mesh, lambda _, share: progress.update(share), cache=self.cache.folder)
         for warning in caught:
             if issubclass(warning.category, MeshingWarning):
                 self.warn(str(warning.message))
@@ -295,7 +294,7 @@ class Running:
                 for table in (learned.free_u, joint.eta0)
             )
             station = np.clip(mesh.nodes[:, 2] / float(mesh.nodes[mesh.tip[0], 2]), 0.0, 1.0)
-            x = mesh.nodes + spread(mesh.nodes, u, station, eta0, state.eta[i])
+            x = mesh.nodes + spread(mesh, u, station, eta0, state.eta[i])
             own = base @ frame(one.turn_deg)
             found.append(x @ own[:3, :3].T + own[:3, 3])
         return np.concatenate(found)

@@ -336,12 +336,7 @@ class Job:
         return to_obj(self.obstacles) if self.obstacles else None
 
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
-        """Settings of a mesh for this unit and its obstacles.
-
-        Of the whole unit where one is not its own mirror image; solid where the wall has a law of its own.
-        """
-        if self.unit.wall.names:
-            settings = settings.without_beams
+        """Settings of a mesh: of the whole unit where an obstacle is not its own mirror image."""
         if not self.obstacles or mirrored(self.obstacles):
             return settings
         return attrs.evolve(settings, fraction="full")
