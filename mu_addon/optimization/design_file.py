@@ -19,16 +19,16 @@ from ..design.settings import USUAL_RESIN
 from ..design.toml_text import nearest
 from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
-from ..meshing.settings import FIDELITIES, FIDELITY, HOMOGENISED, MeshSettings
+from ..meshing.settings import FIDELITY, HOMOGENISED, RESOLVED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
-from .freedoms import PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import OF_LATTICE, PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
 from .settings import FINER
-from .targets import Supplies, Target, read_targets
+from .targets import OF_SENSOR, Supplies, Target, read_targets
 from .uncertainty import Uncertainty
 from .unit_quantities import Mass
 
@@ -38,7 +38,7 @@ HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit tha
 _KEYS = (
     "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
-    "orientation_deg", "robust", "check_fidelity", "self_contact", "body",
+    "orientation_deg", "robust", "self_contact", "body",
 )  # fmt: skip
 
 
@@ -51,9 +51,10 @@ class Design:
     resin's modulus as a share of it, for the proposals' uncertainty. document: the file's own tables;
     material: the resin's, for density and elongation at break. orientation_deg: of the unit under its weight,
     0 hanging, tip down, turned about x; None: without weight. robust: targets must be met within the
-    uncertainty. check_struts: proposals are also simulated strut by strut. materials: the resins that the
-    freedom `resin` is among, by name; body: a closed surface in place of the lattice's box, in the unit's
-    frame; self_contact: of walls and struts of a resolved unit.
+    uncertainty. materials: the resins that the freedom `resin` is among, by name; body: a closed surface in
+    place of the lattice's box, in the unit's frame; self_contact: of walls and struts of a resolved unit.
+    why_homogenised: what the printed body cannot answer, where no fidelity is given and for that alone the
+    lattice is homogenised, else "".
     """
 
     unit: Unit
@@ -70,10 +71,10 @@ class Design:
     material: Material
     orientation_deg: float | None = None
     robust: bool = settings_of.ROBUST.default
-    check_struts: bool = False
     materials: Mapping[str, Material] = attrs.field(factory=dict)
     body: Body | None = None
     self_contact: bool = settings_of.SELF_CONTACT.default
+    why_homogenised: str = ""
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -245,10 +246,6 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     fixed = fixed_values(tables["freedom"], where["freedom"])
     base = changed_unit(base, [Freedom(name) for name in fixed], list(fixed.values()))
     freedoms = read_freedoms(tables["freedom"], where["freedom"], base)
-    settings = MeshSettings(
-        refine=number(settings_of.REFINE),
-        fidelity=_word(document, "fidelity", FIDELITY.default, origin, FIDELITY.choices),
-    )
     resin, printer = (
         _word(document, "resin", USUAL_RESIN, origin),
         _word(document, "printer", DEFAULT, origin),
@@ -262,12 +259,6 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     }
     if body is None and "body" in document:
         body = read_body(folder / _word(document, "body", "", origin))
-    self_contact = _flag(document, settings_of.SELF_CONTACT, text, origin)
-    if self_contact and not settings.resolved:
-        raise InputError(
-            "a homogenised lattice has no struts that could touch",
-            f"{origin}, {_line(text, 'self_contact')}, self_contact", 'write fidelity = "resolved" too',
-        )  # fmt: skip
     counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
     paths = [w.name for w in windows(min(counts))]
     turned = number(settings_of.ORIENTATION) if "orientation_deg" in document else None
@@ -290,8 +281,19 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
                 raise InputError(
                     f"{path!r} is not a path of the unit", f"{place}, values", f"of: {', '.join(paths)}"
                 )
+    why = "" if "fidelity" in document else _beyond_the_printed_body(freedoms, targets, fixed)
+    settings = MeshSettings(
+        refine=number(settings_of.REFINE),
+        fidelity=_word(document, "fidelity", HOMOGENISED if why else RESOLVED, origin, FIDELITY.choices),
+    )
+    self_contact = _flag(document, settings_of.SELF_CONTACT, text, origin)
     if not settings.resolved:
-        _require_homogenised(freedoms, targets, tables["freedom"], where["freedom"])
+        if self_contact:
+            raise InputError(
+                "a homogenised lattice has no struts that could touch" + (f": {why}" if why else ""),
+                f"{origin}, {_line(text, 'self_contact')}, self_contact", "leave one of them out",
+            )  # fmt: skip
+        _require_homogenised(freedoms, targets, tables["freedom"], where["freedom"], why)
     search = SearchSettings(
         evaluations=int(number(settings_of.EVALUATIONS)),
         batch=int(number(settings_of.BATCH)),
@@ -302,10 +304,8 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
         number(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
         printer, resin,
         number(settings_of.PRINT_TOLERANCE), number(settings_of.MODULUS_TOLERANCE), document,
-        material, turned, _flag(document, settings_of.ROBUST, text, origin),
-        not settings.resolved
-        and _word(document, "check_fidelity", HOMOGENISED, origin, FIDELITIES) != HOMOGENISED,
-        materials, body, self_contact,
+        material, turned, _flag(document, settings_of.ROBUST, text, origin), materials, body, self_contact,
+        why,
     )  # fmt: skip
 
 
@@ -331,24 +331,45 @@ def _places_of(
     return rows[: len(freedoms)]
 
 
+def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fixed: Mapping[str, Any]) -> str:
+    """What only a homogenised lattice answers, in words, or ""."""
+    for target in targets:
+        if target.kind in OF_SENSOR:
+            return f"{target.kind} is of a sensor, which a printed body has meshed into it"
+    for name in (*(f.name for f in freedoms), *fixed):
+        if name == PATH:
+            return "a path is a freedom, and a printed body has its sensor meshed into it"
+        if name in OF_LATTICE:
+            return f"{name} is of a homogenised lattice: printed struts have the resin's"
+    return ""
+
+
 def _require_homogenised(
-    freedoms: list[Freedom], targets: list[Target], tables: list[dict[str, Any]], where: list[str]
+    freedoms: list[Freedom],
+    targets: list[Target],
+    tables: list[dict[str, Any]],
+    where: list[str],
+    why: str,
 ) -> None:
-    """Raise InputError for requests that need struts, which a homogenised lattice has not."""
+    """Raise InputError for requests that need struts, which a homogenised lattice has not.
+
+    why: that it is homogenised though no fidelity is given, or "".
+    """
+    remedy = "leave one of them out" if why else 'leave out fidelity = "homogenised"'
+    because = f" ({why})" if why else ""
     places = {table.get("parameter"): place for table, place in zip(tables, where, strict=True)}
     for freedom in freedoms:
         if freedom.name in UNSEEN:
             raise InputError(
-                f"the homogenised lattice does not see {freedom.name}: its modulus is a parameter",
+                f"the homogenised lattice does not see {freedom.name}: its modulus is a parameter{because}",
                 places.get(freedom.name, freedom.name),
-                'free material.lattice_modulus_kPa instead, or write fidelity = "resolved"',
+                remedy,
             )
     for target in targets:
         if getattr(target.quantity, "region", "") == "struts":
             raise InputError(
-                "a homogenised lattice has no struts to stretch", f"{target.line}, region",
-                'write fidelity = "resolved"',
-            )  # fmt: skip
+                f"a homogenised lattice has no struts to stretch{because}", f"{target.line}, region", remedy
+            )
 
 
 def _unit(document: Mapping[str, Any], origin: str, folder: Path) -> Unit:

@@ -15,7 +15,7 @@ from ..design.printing.printer import Printer
 from ..design.solid import build_solid
 from ..errors import MuError
 from .evaluation import evaluate
-from .targets import OF_SENSOR, Target
+from .targets import Target
 from .uncertainty import SURE, Uncertainty
 from .unit_body import Mechanics
 
@@ -29,8 +29,6 @@ class Verified:
     values (q,), and standard errors (q,) by mesh, print and resin, in the quantities' units; robust (q,):
     mask of targets met for all values within `SURE` errors, met (q,): for the value itself; why: the reason
     of a failure, else "". print_worst: of the printability check, "" without one, and its findings in words.
-    with_struts (q,): values of the body as printed, strut by strut, nan without them, and struts_why, the
-    reason of its failure.
     """
 
     values: Array
@@ -42,10 +40,6 @@ class Verified:
     why: str = ""
     print_worst: str = ""
     print_findings: tuple[str, ...] = ()
-    with_struts: Array = attrs.field(
-        default=attrs.Factory(lambda self: np.full_like(self.values, np.nan), True)
-    )
-    struts_why: str = ""
 
     @property
     def error(self) -> Array:
@@ -65,22 +59,19 @@ def verified(
     finer: Mechanics,
     uncertainty: Uncertainty,
     printer: Printer | None = None,
-    as_printed: Mechanics | None = None,
 ) -> Verified:
     """Simulate a unit with values `coarse` (q,) on the search's mesh again on a finer mesh.
 
     The print's uncertainty acts to first order, by adjoint gradients on the finer mesh. The mesh's error is
     taken as the difference of the two meshes, an upper bound for a converging method. printer: the
-    printability check (thickness, chambers) is run where it is given. as_printed: of the resolved body, which
-    is also simulated if given.
+    printability check (thickness, chambers) is run where it is given.
     """
     found = evaluate(unit, targets, (), finer, uncertainty=uncertainty)
     zero = np.zeros(len(targets))
-    struts = {} if as_printed is None else _with_struts(unit, targets, as_printed)
     worst, words = ("", ()) if printer is None else _print_check(unit, printer, finer.body)
     if not found.sound:
         none = np.zeros(len(targets), bool)
-        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words, **struts)
+        return Verified(found.values, zero, zero, zero, none, none, found.why, worst, words)
     by_mesh = np.nan_to_num(np.abs(found.values - coarse))
     by_print, by_resin = found.by_print, found.by_resin
     error = np.sqrt(by_mesh**2 + by_print**2 + by_resin**2)
@@ -91,16 +82,7 @@ def verified(
         elif t.goal is None:
             met[i] = t.met(found.values[i])
             robust[i] = t.met(found.values[i], SURE * float(error[i]))
-    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words, **struts)
-
-
-def _with_struts(unit: Unit, targets: Sequence[Target], as_printed: Mechanics) -> dict[str, Any]:
-    """Values (q,) of the resolved body and why there are none; those along a sensor's path are nan."""
-    asked = [i for i, t in enumerate(targets) if t.quantity is not None and t.kind not in OF_SENSOR]
-    found = evaluate(unit, [targets[i] for i in asked], (), as_printed)
-    values = np.full(len(targets), np.nan)
-    values[asked] = found.values
-    return {"with_struts": values, "struts_why": found.why}
+    return Verified(found.values, by_mesh, by_print, by_resin, met, robust, "", worst, words)
 
 
 def _print_check(unit: Unit, printer: Printer, body: Body | None) -> tuple[str, tuple[str, ...]]:

@@ -141,13 +141,33 @@ def read(found):
 
 
 def test_self_contact_is_of_struts_as_printed():
-    both = HEAD + 'fidelity = "resolved"\nself_contact = true\n' + ANGLE + WALL
+    both = HEAD + "self_contact = true\n" + ANGLE + WALL
     assert design(both).self_contact
     assert read(design(both)).self_contact
-    assert not design(HEAD + 'fidelity = "resolved"\n' + ANGLE + WALL).self_contact
+    assert not design(HEAD + ANGLE + WALL).self_contact
     with pytest.raises(InputError, match="no struts that could touch") as error:
-        design(HEAD + "self_contact = true\n" + ANGLE + WALL)
-    assert error.value.where.endswith("line 3, self_contact")
+        design(HEAD + HOMOGENISED + "self_contact = true\n" + ANGLE + WALL)
+    assert error.value.where.endswith("line 4, self_contact")
+
+
+HOMOGENISED = 'fidelity = "homogenised"\n'
+SOFT = '[[freedom]]\nparameter = "material.lattice_modulus_kPa"\nlow = 5\nhigh = 60\n'
+THICK = '[[freedom]]\nparameter = "lattice.junction_diameter_mm"\nlow = 1.2\nhigh = 1.8\n'
+J_OF_ALPHA1 = (
+    '[[target]]\nkind = "deviation"\npath = "alpha1"\npressures_kPa = [10]\nobjective = "minimise"\n'
+)
+
+
+def test_the_printed_body_is_searched_unless_it_cannot_answer():
+    assert design(HEAD + ANGLE + WALL + THICK).settings.fidelity == "resolved"
+    for text, why in ((ANGLE + J_OF_ALPHA1 + WALL, "sensor"), (ANGLE + WALL + SOFT, "lattice_modulus_kPa")):
+        found = design(HEAD + text)
+        assert found.settings.fidelity == "homogenised"
+        assert why in found.why_homogenised
+        assert not read(design(HEAD + HOMOGENISED + text)).why_homogenised
+    with pytest.raises(InputError, match="does not see") as error:
+        design(HEAD + ANGLE + J_OF_ALPHA1 + THICK)
+    assert "sensor" in error.value.what
 
 
 @pytest.mark.parametrize(
@@ -236,11 +256,11 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + 'fidelty = "resolved"\n' + ANGLE + WALL, "did you mean 'fidelity'", "line 3"),
         (HEAD + ANGLE + KIND, "no value of", "line 9"),
         (
-            HEAD + ANGLE + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
+            HEAD + HOMOGENISED + ANGLE + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
             "does not see",
-            "line 7",
+            "line 8",
         ),
-        (HEAD + ANGLE.replace("angle", "stretch") + 'region = "struts"\n' + WALL, "has no struts", "line"),
+        (HEAD + HOMOGENISED + ANGLE.replace("angle", "stretch") + 'region = "struts"\n' + WALL, "has no struts", "line"),
         (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "not an axis", "direction"),
         (HEAD + SENSOR + WALL, "path", "path"),
         (ANGLE + WALL, "format", "format"),

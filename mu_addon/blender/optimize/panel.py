@@ -62,8 +62,8 @@ def _more(layout, props) -> None:
     if not body:
         return
     body.prop(props, "robust")
-    body.prop(props, "printed_struts")
-    if props.printed_struts:
+    body.prop(props, "homogenised")
+    if not props.homogenised:
         body.prop(props, "self_contact")
     row = body.row()
     row.prop(props, "has_gravity")

@@ -12,7 +12,7 @@ from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit_materials import materials_of
-from ...meshing.settings import RESOLVED, MeshSettings
+from ...meshing.settings import MeshSettings
 from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
 from ...optimization.settings import WORKERS
 from ...optimization.unit_body import Mechanics
@@ -81,16 +81,13 @@ def read_job(folder: Path) -> Job:
 
 
 def mechanics_of(
-    design: Design, model: ExtendedModel | None, refine: float | None = None, with_struts: bool = False
+    design: Design, model: ExtendedModel | None, refine: float | None = None
 ) -> tuple[Mechanics, list[str]]:
     """Mechanics of the design's units, and the effects of the model left out, in words.
 
-    refine: of the mesh, by default the search's; with_struts: as printed, strut by strut. Raises InputError
-    where the unit cannot have the model.
+    refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
     """
     settings = design.settings if refine is None else attrs.evolve(design.settings, refine=refine)
-    if with_struts:
-        settings = attrs.evolve(settings, fidelity=RESOLVED)
     if model is None:
         effects, left_out = _with_weight(NamedEffects(), design), []
         if not effects:

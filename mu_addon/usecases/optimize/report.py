@@ -34,10 +34,11 @@ def report(found: Optimised) -> str:
         ]
     )
     d = found.design
+    limits = [f"Simulated with a homogenised lattice: {d.why_homogenised}."] if d.why_homogenised else []
     return page(
         f"Optimisation of {d.unit.name}",
         f"{len(d.targets)} targets, {len(d.freedoms)} freedoms, {d.settings.fidelity}",
-        note([f"Not in the simulation: {words}." for words in found.left_out]),
+        note([*limits, *(f"Not in the simulation: {words}." for words in found.left_out)]),
         lead,
         [
             ("front", "Front", _front(found)),
@@ -105,27 +106,21 @@ def _targets(found: Optimised) -> str:
         rows = []
         for i, t in enumerate(found.design.targets):
             c = p.checked
-            struts = [] if not d.check_struts else [_printed_value(c.with_struts[i])]
             if t.quantity is None:
                 verdict = _verdict(c.met[i], c.robust[i])
-                rows.append(
-                    ([t.name, t.words, c.print_worst, "", "", "", "", *("" for _ in struts), verdict], False)
-                )
+                rows.append(([t.name, t.words, c.print_worst, "", "", "", "", verdict], False))
                 continue
             cells = [f"{v:.3g}" for v in (c.by_mesh[i], c.by_print[i], c.by_resin[i])]
             values = [number(float(f"{v:.5g}")) for v in (p.values[i], c.values[i])]
             verdict = _verdict(c.met[i], c.robust[i]) if t.goal is None else "objective"
             name = f"{t.name} [{t.unit}]" if t.unit else t.name
-            rows.append(([name, t.words, *values, *cells, *struts, verdict], False))
+            rows.append(([name, t.words, *values, *cells, verdict], False))
         head = [
             ("target", ""), ("asked", ""), ("found", "n"), ("on a finer mesh", "n"), ("± mesh", "n"),
-            ("± print", "n"), ("± resin", "n"), *([("strut by strut", "n")] if d.check_struts else []),
-            ("verdict", ""),
+            ("± print", "n"), ("± resin", "n"), ("verdict", ""),
         ]  # fmt: skip
         caption = f"Unit {p.place}" + (f": {p.checked.why}" if p.checked.why else "")
         html += table(caption, head, rows)
-        if p.checked.struts_why:
-            html += note([f"Strut by strut it fails: {p.checked.struts_why}."])
         if p.checked.print_findings:
             html += note(p.checked.print_findings)
     words = (
@@ -135,10 +130,6 @@ def _targets(found: Optimised) -> str:
         "together."
     )
     return f"<p>{escape(words)}</p>{html}" if html else ""
-
-
-def _printed_value(value: float) -> str:
-    return "" if np.isnan(value) else number(float(f"{value:.5g}"))
 
 
 def _verdict(met: bool, robust: bool) -> str:

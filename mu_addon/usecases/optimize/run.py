@@ -25,7 +25,7 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from . import charts
 from .expected import MOST_CHECKED, search_plan
-from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
+from .job import DESIGN, FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .results import Optimised, Proposal
 from .words import changes, outcome, reasons, verdict
@@ -49,6 +49,8 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
     mechanics, left_out = mechanics_of(design, job.model)
     for words in left_out:
         progress.warning(f"the model's {words}", MODEL)
+    if design.why_homogenised:
+        progress.warning(f"simulated with a homogenised lattice: {design.why_homogenised}", DESIGN)
     run = _Run(job, folder, context, mechanics.settings.refine)
     texts = job.texts()
     origin = "\n".join(texts.get(name, "") for name in (MODEL,)) + run.asked
@@ -233,21 +235,14 @@ class _Run:
                 result = self.rows[number][1]
                 assert result is not None
                 name = key(
-                    "verified 2", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
+                    "verified 3", attrs.evolve(unit, name="unit").hash(), self.asked, design.check_refine,
                     design.print_tolerance_mm, design.modulus_tolerance, design.printer if printer else "",
-                    self._model_text, design.check_struts,
+                    self._model_text,
                     [(t.value, t.tolerance, t.low, t.high, t.goal) for t in design.targets], choice,
                 )  # fmt: skip
                 checked = self._kept(name)
                 if checked is None:
-                    struts = (
-                        asked_of(self.job, choice, design.check_refine, True)[1]
-                        if design.check_struts
-                        else None
-                    )
-                    checked = verified(
-                        unit, result.values, targets, finer, design.uncertainty, printer, struts
-                    )
+                    checked = verified(unit, result.values, targets, finer, design.uncertainty, printer)
                     self._keep(name, checked)
                 write_unit(unit, self.folder / f"proposed-{place}.toml")
                 charts.picture(unit, self.folder / f"proposed-{place}.png", design.body)
@@ -276,9 +271,9 @@ class _Run:
         found = None if self.evaluator.cache is None else self.evaluator.cache.get("verified", name)
         if found is None:
             return None
-        why, worst, struts_why = (str(found.pop(k)) for k in ("why", "print_worst", "struts_why"))
+        why, worst = (str(found.pop(k)) for k in ("why", "print_worst"))
         findings = tuple(map(str, found.pop("print_findings")))
-        return Verified(**found, why=why, print_worst=worst, print_findings=findings, struts_why=struts_why)
+        return Verified(**found, why=why, print_worst=worst, print_findings=findings)
 
     def write(self, proposed: Sequence[int]) -> None:
         """Write designs.csv: a row for every design, failed ones included."""
@@ -347,7 +342,6 @@ def _judged(found: Optimised, proposal: Proposal) -> list[dict[str, Any]]:
             "objective": t.goal is not None,
             "met": bool(checked.met[i]),
             "robust": bool(checked.robust[i]),
-            "with_struts": None if np.isnan(checked.with_struts[i]) else float(checked.with_struts[i]),
         }
         for i, t in enumerate(found.design.targets)
     ]
@@ -368,7 +362,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 def plan_of(job: Job) -> Plan:
     """Stages of an optimisation with the expected seconds of each on two cores."""
     design = job.design
-    return search_plan(design.search.evaluations, design.settings.refine, design.check_refine)
+    return search_plan(design.search.evaluations, design.settings, design.check_refine, design.self_contact)
 
 
 USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary, plan=plan_of)

@@ -55,11 +55,11 @@ def run_task(task: Task) -> dict[str, Any]:
 
 
 def asked_of(
-    job: Job, choice: Mapping[str, str], refine: float | None = None, with_struts: bool = False
+    job: Job, choice: Mapping[str, str], refine: float | None = None
 ) -> tuple[Sequence[Target], Mechanics]:
     """Targets of a chosen path and resin, and the mechanics of such units; see `mechanics_of`."""
     design = job.design.chosen(choice)
-    return design.targets, mechanics_of(design, job.model, refine, with_struts)[0]
+    return design.targets, mechanics_of(design, job.model, refine)[0]
 
 
 def several(

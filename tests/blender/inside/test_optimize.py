@@ -156,7 +156,7 @@ def test_path_resin_kind_and_struts_as_printed_are_asked_for_by_name(tmp_path):
     assert "does not see lattice.kind" in refused(bpy.ops.mu.optimize)
     root.mu_optimize.targets.remove(0)
     target(root, "angle", ask="low", low=5.0)
-    root.mu_optimize.printed_struts = root.mu_optimize.self_contact = True
+    root.mu_optimize.self_contact = True
     optimization.write_inputs(root, tmp_path / "run")
     design = read_job(tmp_path / "run").design
     assert (design.settings.fidelity, design.self_contact) == ("resolved", True)
