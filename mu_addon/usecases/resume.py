@@ -19,6 +19,7 @@ from ..run.usecase import UseCase
 MODULES = {
     "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
+    "live.toml": ".live_bending.run",
     "check.toml": ".check_print.run",
     "export.toml": ".export.run",
     "specimens.toml": ".export.specimens",

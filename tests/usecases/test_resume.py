@@ -33,6 +33,7 @@ from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
 from mu_addon.usecases.grip.grasp import Cube, Grip
 from mu_addon.usecases.homogenize import job as homogenize
+from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.optimize import job as optimize
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.run import Job as ParameterStudyJob
@@ -80,6 +81,7 @@ def jobs(folder):
     yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
     yield specimens.Job(UNIT, resin)
     yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)
+    yield live_bending.Job()
     yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 2 / 3)
     yield homogenize.Job(UNIT, homogenize.resin_of(None, load_preset("mu-1.5x")), frictions=())
     yield grip.Job(

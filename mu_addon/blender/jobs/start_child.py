@@ -39,6 +39,7 @@ WRITERS = (
     "mu_addon.placement.graph",
     "mu_addon.usecases.simulate_and_place.named_effects",
     "mu_addon.usecases.simulate_and_place.job",
+    "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",
     "mu_addon.usecases.export.specimens",
     "mu_addon.usecases.check_print.job",
@@ -87,7 +88,10 @@ def start(
 ) -> Child:
     """Start one command line of the core for a run in `folder`; raises MuError. See `Child`."""
     command = worker_command(CHILD_MAIN, arguments, bpy.app.binary_path)
-    return Child(command, folder / OWN_FOLDER, environment(), ends_with_parent, plan, waits)
+    # A controlled one reads its input by itself.
+    watches = ends_with_parent and "--controlled" not in arguments
+    given = environment() | ({"MU_ENDS_WITH_INPUT": "1"} if watches else {})
+    return Child(command, folder / OWN_FOLDER, given, ends_with_parent, plan, waits)
 
 
 @attrs.frozen(eq=False)
@@ -154,6 +158,11 @@ def child_of(key: str) -> Child | None:
 def running() -> list[str]:
     """Keys of the running or waiting jobs, in the order in which they were started."""
     return [key for key, child in _children.items() if child.state in (RUNNING, WAITING)]
+
+
+def is_busy() -> bool:
+    """Return True if a job that takes the machine for minutes runs."""
+    return any(key in _heavy for key in running())
 
 
 def title_of(key: str) -> str:

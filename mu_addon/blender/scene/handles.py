@@ -18,6 +18,7 @@ from mathutils import Matrix, Vector
 
 from ...design.dimensions import Dimensions
 from ...errors import InputError
+from ..live import state as live
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import viewports
@@ -78,14 +79,19 @@ ITEMS = [
 
 
 def pressure_of(root: Any, scene: Any) -> float:
-    """Pressure in kPa at the scene's frame, of the motion that a unit shows."""
+    """Pressure in kPa of a unit bent live, or at the scene's frame of the motion that it shows."""
+    if live.is_seen(root):
+        return float(root.mu_live.pressure_kPa)
     motion = motion_parts.motion_of(root)
     assert motion is not None
     return float(np.interp(motion_parts.time_of(motion, scene), motion.time_s, motion.pressure_kPa))
 
 
 def to_pressure(root: Any, scene: Any, kPa: float) -> None:
-    """Go to the frame at which the shown motion has a pressure, of several the nearest in time."""
+    """Bend a unit live by a pressure, or go to the motion's frame with it, of several the nearest in time."""
+    if live.is_seen(root):
+        root.mu_live.pressure_kPa = kPa
+        return
     motion = motion_parts.motion_of(root)
     assert motion is not None
     frames = np.arange(scene.frame_start, motion_parts.last_frame(motion, scene) + 1)
@@ -97,9 +103,11 @@ def to_pressure(root: Any, scene: Any, kPa: float) -> None:
 
 
 def usable(root: Any | None, name: str) -> bool:
-    """Return True if a unit has that handle now: sizes with the design shown, pressure with its result."""
+    """Return True if a unit has that handle now: sizes with the design shown, pressure where it is bent."""
     if root is None or not editable(root) or root.mode != "OBJECT" or not root.visible_get():
         return False
+    if name == PRESSURE and live.is_seen(root):
+        return True
     return bool(unit_object.shows_result(root) == (name == PRESSURE))
 
 
@@ -166,8 +174,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         if pixels.length < 1e-3:  # it points at the eye
             pixels = Vector((0.0, 1.0))
         if self.what == PRESSURE:
-            motion = motion_parts.motion_of(self._root)
-            return pixels, float(np.ptp(motion.pressure_kPa)) / 300.0
+            return pixels, (live.most_kPa(self._root) or _range_kPa(self._root)) / 300.0
         description = self._described()
         if description.high <= 20.0:
             # A thin wall follows the mouse as its field in the panel does.
@@ -207,6 +214,10 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         context.area.header_text_set(None)
         viewports.redraw()
         return how
+
+
+def _range_kPa(root: Any) -> float:
+    return float(np.ptp(motion_parts.motion_of(root).pressure_kPa))
 
 
 def _place(root: Any, name: str, dimensions: Dimensions) -> tuple[Vector, Vector]:

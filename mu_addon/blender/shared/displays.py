@@ -26,11 +26,13 @@ LEGEND = "mu_legend"
 """Mark of the objects of a legend in the scene, see `results.legend_object`."""
 TWIN = "mu_twin"
 """Mark of the objects that move as the real unit does, see `sensor.twin`."""
+LIVE = "mu_live_part"
+"""Mark of the objects that show a unit bent while it is designed, see `live.state`."""
 PAINTED = "mu_painted"
 """Mark of the object on which factors of the struts are painted, see `grading.state`."""
 GRIPPER = "mu_grip"
 """Mark of the cube of a gripper and the parts that play its grasp, see `gripper.object`."""
-MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, PAINTED, GRIPPER)
+MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, LIVE, PAINTED, GRIPPER)
 OWNER = "mu_of"
 """On each: UUID of its unit or gripper."""
 
@@ -38,9 +40,9 @@ ON_UNIT = "mu_on_unit"
 """On a hidden motion's object: the unit shows it in its own place."""
 
 
-def on_unit(root: Any) -> list[Any]:
-    """Objects whose motion a unit shows in its own place, by name."""
-    found = (child for child in root.children if child.get(MOTION) and child.get(ON_UNIT))
+def on_unit(root: Any, mark: str = MOTION) -> list[Any]:
+    """Objects with a mark whose shape a unit shows in its own place, by name."""
+    found = (child for child in root.children if child.get(mark) and child.get(ON_UNIT))
     return sorted(found, key=lambda child: str(child.name))
 
 

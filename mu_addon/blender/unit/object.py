@@ -210,7 +210,12 @@ def show(root: Any) -> None:
     skinned = mesh == props.preview
     if modifier.show_viewport != skinned:
         modifier.show_viewport = modifier.show_render = skinned
-    played = displays.on_unit(root) if props.show == RESULT else []
+    played = []
+    if props.show == RESULT:
+        played = displays.on_unit(root)
+    elif mesh == props.preview and not props.candidates:
+        # Candidates lie on the unit at rest.
+        played = displays.on_unit(root, displays.LIVE)
     set_modifier_input(modifier, unit_group.SHOW_RESULT, bool(played))
     for name, part in zip(unit_group.RESULTS, [*played, None, None], strict=False):
         set_modifier_input(modifier, name, part)

@@ -7,6 +7,7 @@ import bpy
 from ..body import panel as body_panel
 from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
+from ..live import words as live_words
 from ..node_tree import following
 from ..shared import scene_units
 from ..shared.operators import NO_UNIT, linked
@@ -64,6 +65,7 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row = layout.row()
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
+        live_words.draw(layout, root)
         _head(layout, root)
 
 

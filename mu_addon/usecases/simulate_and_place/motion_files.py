@@ -218,19 +218,23 @@ def write_model_a(
     trajectory: Trajectory,
     history: Callable[[int], Sequence[Array]] = lambda number: (),
     contact_kPa: Sequence[Array] = (),
+    fields: bool = True,
 ) -> None:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
 
     history: of materials with memory in a state, by its number; contact_kPa: of every state the pressure (n,)
-    at the mesh's nodes where the unit touches itself, or none without self-contact.
+    at the mesh's nodes where the unit touches itself, or none without self-contact. fields: write stress and
+    stretch, too.
     """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
     surfaces = {name: surface_of(mesh, region) for name, region in REGIONS.items()}
     for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
-    looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
-    found = looked.of_states([state.u for state in trajectory.solved], materials, history)
+    found = {}
+    if fields:
+        looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
+        found = looked.of_states([state.u for state in trajectory.solved], materials, history)
     for name, surface in surfaces.items() if len(contact_kPa) else ():
         found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
     write_npz(folder / FOLDER / "mesh.npz", arrays, packed=False)
@@ -356,6 +360,8 @@ def _motion(
 
 
 def _fields(model: dict[str, Array], region: str) -> dict[str, Array]:
+    if not any(f"{region}_{name}" in model for name in FIELDS):
+        return {}
     names = FIELDS + (CONTACT_PRESSURE,) * (f"{region}_{CONTACT_PRESSURE}" in model)
     return {name: model[f"{region}_{name}"] for name in names}
 

@@ -1,0 +1,37 @@
+"""Settings of live bending, kept on a unit's root object."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+from ..shared.registration import property_group_factory
+from ..shared.updates import Signal
+
+SWITCHED, PRESSED = Signal(), Signal()
+"""Sent with a root whose live bending was switched, and with one bent by another pressure."""
+
+
+class MU_PG_live(bpy.types.PropertyGroup):
+    """Bending of a unit while it is designed."""
+
+    on: BoolProperty(
+        name="Bend Live",
+        description="Bend the unit while it is designed: a coarse solution of the printed body after every "
+        "change, then finer ones. Without self-contact, and not while a simulation runs",
+        update=lambda live, context: SWITCHED.send(live.id_data),
+    )
+    pressure_kPa: FloatProperty(
+        name="Pressure (kPa)",
+        description="Pressure at which the unit is shown bent; suction is simulated only",
+        default=40.0,
+        min=0.0,
+        soft_max=40.0,
+        max=200.0,
+        step=100,
+        precision=1,
+        update=lambda live, context: PRESSED.send(live.id_data),
+    )
+
+
+register, unregister = property_group_factory(bpy.types.Object, "mu_live", (MU_PG_live,))

@@ -1,0 +1,330 @@
+"""A unit bent while it is designed: the process that finds its shapes, and the objects that show them.
+
+The process (`usecases.live_bending`) waits between changes; a timer asks it once the parameters rest, and
+shows what it answers in the unit's own place. It ends while a job that takes the machine runs.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...errors import InputError, MuError
+from ...placement.sampling import polynomials
+from ...reading import file_bytes, parse_json
+from ...run.child import RUNNING, Child
+from ...run.folder import write_run
+from ...usecases.simulate_and_place.motion_files import REGIONS, Motion, read_motion
+from ..jobs import start_child
+from ..preview import materials, skeletons
+from ..shared import displays, handlers, viewports
+from ..shared.displays import LIVE
+from ..simulate import job as simulation
+from ..simulate import study_folder as studies
+from ..unit import object as unit_object
+from .properties import PRESSED, SWITCHED
+
+RESTS_S = 0.35
+"""Seconds without a change after which the unit is bent anew."""
+TICK_S = 0.1
+_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice"}
+
+
+@attrs.frozen(eq=False)
+class Shape:
+    """The unit's shapes (s, v, 3) in mm by region at pressures (s,), its triangles, and its angles (s,)."""
+
+    pressure_kPa: Any
+    angle_deg: Any
+    vertices: dict[str, Any]
+    triangles: dict[str, Any]
+    error: float
+    finished: bool
+
+    def share(self, kPa: float) -> Any:
+        """Weights (s,) of the shapes at a pressure up to the largest one."""
+        return polynomials(self.pressure_kPa, np.array([min(kPa, self.pressure_kPa[-1])]))[0]
+
+
+@attrs.define(eq=False)
+class Live:
+    """A unit's live bending: its process, the latest request, and the shape that answers it."""
+
+    folder: Path
+    child: Child | None = None
+    number: int = 0
+    design: str = ""
+    due_s: float | None = None
+    motion: Motion | None = None
+    shape: Shape | None = None
+    trouble: str = ""
+    _read_ns: int = 0
+
+    def end(self) -> None:
+        """End the process."""
+        if self.child is not None:
+            self.child.kill()
+        self.child, self._read_ns = None, 0
+
+
+_every: dict[str, Live] = {}
+"""By UUID of the unit."""
+
+
+def of(root: Any) -> Live | None:
+    """Live bending of a unit, or None where it is off."""
+    return _every.get(root.mu_unit.uuid)
+
+
+def parts(root: Any) -> list[Any]:
+    """The objects of a unit's live shape: one a region."""
+    return [child for child in root.children if child.get(LIVE)]
+
+
+def angle_at(shape: Shape, kPa: float) -> float:
+    """Bending angle in degrees at a pressure."""
+    return float(shape.share(kPa) @ shape.angle_deg)
+
+
+def is_seen(root: Any) -> bool:
+    """Return True if a unit is shown bent live."""
+    return root.mu_unit.show == "preview" and bool(displays.on_unit(root, LIVE)) and of(root) is not None
+
+
+def most_kPa(root: Any) -> float:
+    """Largest pressure of a unit that is shown bent live; 0 where it is not."""
+    live = of(root)
+    return (
+        0.0 if live is None or live.shape is None or not is_seen(root) else float(live.shape.pressure_kPa[-1])
+    )
+
+
+def _switched(root: Any) -> None:
+    uuid = root.mu_unit.uuid
+    if not uuid:
+        return
+    if root.mu_live.on:
+        live = _every.setdefault(uuid, Live(studies.folder_of(root) / "live"))
+        live.design = ""
+        _changed(root)
+        return
+    found = _every.pop(uuid, None)
+    if found is not None:
+        found.end()
+        shutil.rmtree(found.folder, ignore_errors=True)
+    for part in parts(root):
+        displays.remove(part)
+    unit_object.show(root)
+
+
+def _changed(root: Any) -> None:
+    """Show the design at rest once its parameters have changed, and bend it as soon as they rest."""
+    live = of(root)
+    if live is None:
+        return
+    design = studies.design_of(root)
+    if design == live.design:
+        return
+    live.design, live.shape, live.trouble = design, None, ""
+    live.due_s = time.monotonic() + RESTS_S if design else None
+    _seen(root, False)
+    _tick_soon()
+
+
+def _pressed(root: Any) -> None:
+    """Bend the shape to another pressure; beyond its largest one it is found anew."""
+    live = of(root)
+    if live is None or live.shape is None:
+        return
+    pose(root, live.shape)
+    if root.mu_live.pressure_kPa > live.shape.pressure_kPa[-1] and live.shape.finished:
+        live.due_s = time.monotonic() + RESTS_S
+        _tick_soon()
+
+
+def _tick_soon() -> None:
+    if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=TICK_S, persistent=True)
+
+
+def _tick() -> float | None:
+    for uuid, live in list(_every.items()):
+        root = unit_object.by_uuid(uuid)
+        if root is None or not root.mu_live.on:
+            # Deleted; undo may bring it back, and then it begins anew.
+            live.end()
+            del _every[uuid]
+            continue
+        try:
+            _follow(root, live)
+        except MuError as error:
+            live.trouble, live.due_s = error.what, None
+            viewports.redraw()
+    return TICK_S if any(live.due_s or live.child for live in _every.values()) else None
+
+
+def _follow(root: Any, live: Live) -> None:
+    """Ask the process what is due, and show what it has found."""
+    if start_child.is_busy():
+        if live.child is not None:
+            live.end()
+            # What was not found yet is asked for after that job.
+            if live.shape is None or not live.shape.finished:
+                live.due_s = time.monotonic()
+        return
+    if live.due_s is not None and time.monotonic() >= live.due_s:
+        live.due_s = None
+        _ask(root, live)
+        viewports.redraw()
+    if live.child is None:
+        return
+    live.child.poll()
+    if live.child.state != RUNNING:
+        live.trouble = (live.child.error or {}).get("what", live.child.state)
+        live.child = None
+        viewports.redraw()
+    elif _answered(root, live):
+        viewports.redraw()
+
+
+def _ask(root: Any, live: Live) -> None:
+    # Imported late, with the solver's packages.
+    from ...usecases.live_bending import requests
+
+    study = simulation.job_of(root)
+    if live.child is None:
+        shutil.rmtree(live.folder, ignore_errors=True)
+        write_run(live.folder, requests.LAYOUT, requests.Job().texts())
+    live.number += 1
+    requests.ask(live.folder, live.number, study, root.mu_live.pressure_kPa)
+    if live.child is None:
+        command = ["resume", str(live.folder), "--json"]
+        live.child = start_child.start(command, live.folder, ends_with_parent=True)
+
+
+def _answered(root: Any, live: Live) -> bool:
+    """Read the process's latest answer and show it; return True if it is new."""
+    from ...usecases.live_bending.requests import BENT
+
+    path = live.folder / BENT
+    try:
+        changed = path.stat().st_mtime_ns
+        if changed == live._read_ns:
+            return False
+        answer: Any = parse_json(file_bytes(path), BENT)
+    except (OSError, InputError):
+        return False
+    live._read_ns = changed
+    if answer["number"] != live.number:
+        return False
+    if answer["trouble"]:
+        live.trouble = answer["trouble"]
+        return True
+    live.motion = read_motion(live.folder / answer["folder"])
+    live.shape = _shape(root, live.motion, answer)
+    place(root)
+    return True
+
+
+def _shape(root: Any, motion: Motion, answer: dict[str, Any]) -> Shape:
+    cut = bool(root.mu_unit.cut and motion.halved)
+    vertices, triangles = {}, {}
+    for region in REGIONS:
+        skin = motion.skin(region, cut)
+        moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
+        vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
+    pressure, angle = np.array(answer["states"]).T
+    return Shape(pressure, angle, vertices, triangles, answer["error"], answer["finished"])
+
+
+def place(root: Any) -> None:
+    """Show a unit's latest shape in its own place."""
+    live = of(root)
+    if live is None or live.shape is None:
+        return
+    there = {part[LIVE]: part for part in parts(root)}
+    for region in REGIONS:
+        triangles, part = live.shape.triangles[region], there.get(region)
+        if part is None:
+            part = displays.add(root, LIVE, region, bpy.data.meshes.new(f"Live {region}"))
+            displays.lock(part)
+            part.hide_viewport = part.hide_render = True
+        if part.data.get("mu_triangles") != len(triangles):
+            skeletons.write(part.data, skeletons.Skeleton(live.shape.vertices[region][0], faces=(triangles,)))
+            part.data["mu_triangles"] = len(triangles)
+            materials.assign(part.data, _LOOKS[region])
+    pose(root, live.shape)
+    _seen(root, True)
+
+
+def pose(root: Any, shape: Shape) -> None:
+    """Bend the shown parts to the pressure of the slider."""
+    share = shape.share(root.mu_live.pressure_kPa).astype(np.float32)
+    for part in parts(root):
+        now = np.tensordot(share, shape.vertices[part[LIVE]], axes=1)
+        if len(part.data.vertices) == len(now):
+            part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(now).ravel())
+            part.data.update()
+
+
+def _seen(root: Any, seen: bool) -> None:
+    for part in parts(root):
+        part[displays.ON_UNIT] = seen
+    unit_object.show(root)
+
+
+@persistent
+def _restored(*_: Any) -> None:
+    """After undo, redo or load: no shape is shown that belongs to another design or to no process."""
+    for root in unit_object.roots():
+        if not root.mu_live.on or of(root) is None:
+            if parts(root):
+                _seen(root, False)
+            if root.mu_live.on:
+                _switched(root)
+        else:
+            _changed(root)
+            place(root)
+
+
+def _job_ended(_key: str) -> None:
+    if _every:
+        _tick_soon()
+
+
+_HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _restored)
+_CONNECTIONS = (
+    (SWITCHED, _switched),
+    (PRESSED, _pressed),
+    (unit_object.REBUILT, _changed),
+    (start_child.JOB_ENDED, _job_ended),
+)
+
+
+def register() -> None:
+    """Register handlers and the signals that bend a unit anew."""
+    handlers.add(_HANDLERS)
+    for signal, function in _CONNECTIONS:
+        signal.connect(function)
+
+
+def unregister() -> None:
+    """Unregister them, and end every process."""
+    for signal, function in _CONNECTIONS:
+        signal.disconnect(function)
+    handlers.remove(_HANDLERS)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    for live in _every.values():
+        live.end()
+        with suppress(OSError):
+            shutil.rmtree(live.folder)
+    _every.clear()

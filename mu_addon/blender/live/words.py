@@ -1,0 +1,64 @@
+"""What live bending has found, in words: in the panel, and over the viewport."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..jobs import start_child
+from ..results import legend
+from ..shared.overlay import Overlay
+from ..unit import object as unit_object
+from . import state
+
+LEAST_DEG = 0.1
+"""Least stated error of an angle."""
+
+
+def draw(layout: Any, root: Any) -> None:
+    """Draw the switch, the slider beside it, and what was found; of the same height in every state."""
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.active = root.mu_unit.show == "preview"
+    row.prop(root.mu_live, "on", toggle=True, icon="MOD_SIMPLEDEFORM", text="Bend")
+    right = row.row(align=True)
+    right.active = root.mu_live.on
+    right.prop(root.mu_live, "pressure_kPa", text="kPa", slider=True)
+    if root.mu_live.on:
+        layout.label(text=words(root), icon="MOD_SIMPLEDEFORM")
+
+
+def words(root: Any) -> str:
+    """Angle with its error, or what is being done."""
+    live = state.of(root)
+    if live is None:
+        return ""
+    if root.mu_unit.trouble:
+        return "A design rule is broken"
+    if start_child.is_busy():
+        return "After the running job"
+    if live.trouble:
+        return live.trouble[:1].upper() + live.trouble[1:]
+    if live.shape is None:
+        return "Bending..."
+    kPa = min(root.mu_live.pressure_kPa, float(live.shape.pressure_kPa[-1]))
+    angle = state.angle_at(live.shape, kPa)
+    if live.shape.finished:
+        return f"{angle:.1f}° at {kPa:.4g} kPa, as simulated"
+    error = max(live.shape.error * abs(angle), LEAST_DEG)
+    return f"{angle:.1f} ± {error:.1f}° at {kPa:.4g} kPa, refining"
+
+
+def _draw() -> None:
+    root = unit_object.active_root(bpy.context)
+    live = None if root is None else state.of(root)
+    if root is None or live is None or root.mu_unit.show != "preview":
+        return
+    scale = bpy.context.preferences.system.ui_scale
+    left = legend.beside_tools(bpy.context.area) + legend.LEFT * scale
+    legend.write(words(root), left, legend.BOTTOM * scale / 2.0, round(14 * scale))
+
+
+_overlay = Overlay(_draw)
+register, unregister = _overlay.register, _overlay.unregister

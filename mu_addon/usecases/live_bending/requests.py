@@ -1,0 +1,71 @@
+"""Requests to the process that bends a unit live; no solver is loaded.
+
+request.json: `number` of the latest request, whose study is in `asked/NUMBER`, and `pressure_kPa`, found
+first. bent.json: `number` of the request that it answers, `folder` of the motion, `states` as pairs of kPa
+and degrees, `error` of the angle as a share, `finished`, and `trouble` where no shape was found.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import attrs
+
+from ...errors import InputError
+from ...files import write_json
+from ...meshing.settings import RESOLVED, MeshSettings
+from ...resolved.strut import is_half_diagonal
+from ...run.folder import FolderLayout
+from ...run.inputs import FORMAT, read_inputs
+from ...toml_writer import toml_text
+from ..simulate_and_place.job import Job as Study
+from ..simulate_and_place.job import write_study
+
+REQUEST, BENT, ASKED = "request.json", "bent.json", "asked"
+LAYOUT = FolderLayout(
+    "live.toml", "# Shapes of a unit while it is designed.", (REQUEST, BENT, ASKED, "shape-*")
+)
+LEVELS = ((0.35, 0.09), (0.5, 0.03), (1.0, 0.0))
+"""Refinements in their order, and the error of each level's angle as a share of that at a refinement of 1, of
+Simulate: a little more than the largest found (docs/engineering/decisions.md)."""
+
+
+@attrs.frozen
+class Job:
+    """A process without inputs of its own: they come with each request."""
+
+    def texts(self) -> dict[str, str]:
+        """Text of live.toml, by its name."""
+        return {LAYOUT.inputs: toml_text({"format": FORMAT}, LAYOUT.header)}
+
+
+def read_job(folder: Path) -> Job:
+    """The job of a folder; raises InputError."""
+    read_inputs(folder / LAYOUT.inputs)
+    return Job()
+
+
+def trouble_of(study: Study) -> str:
+    """Reason why a study's unit is not bent live, or ""."""
+    if study.obstacles:
+        return "beside obstacles a unit is bent by Simulate only"
+    if study.in_time:
+        return "a wall with memory is bent by Simulate only"
+    if not is_half_diagonal(study.unit.printed):
+        return "live bending knows body-centred lattices only"
+    return ""
+
+
+def ask(folder: Path, number: int, study: Study, pressure_kPa: float) -> None:
+    """Write a request to the process of a folder: bend this study's unit. Raises InputError, OutputError.
+
+    pressure_kPa: found first, and above the protocol's pressures the largest.
+    """
+    mesh = MeshSettings(refine=LEVELS[0][0], fidelity=RESOLVED)
+    study = attrs.evolve(
+        study, mesh=mesh, self_contact=False, self_friction=0.0, stages=("design", "simulate")
+    )
+    if reason := trouble_of(study):
+        raise InputError(reason, "live bending", "switch it off, or change the unit")
+    write_study(study, folder / ASKED / str(number))
+    write_json(folder / REQUEST, {"number": number, "pressure_kPa": pressure_kPa})

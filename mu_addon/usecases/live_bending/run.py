@@ -1,0 +1,218 @@
+"""Bend a printed unit under pressure at once, coarsely and then finer, in a process that waits for changes.
+
+Between two designs it keeps mesh, model and states, from which the next one starts. Without self-contact, so
+for pressures above 0 only: suction closes walls.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ...design.dimensions import Dimensions
+from ...design.quantity import in_kPa, in_MPa
+from ...errors import ConvergenceError, InputError, MeshingError, MuError
+from ...fem.equilibrium import Equilibrium
+from ...fem.kinematics import TipSection
+from ...fem.model import Model
+from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ...fem.state import State, rest
+from ...fem.trajectory import Trajectory
+from ...files import write_json
+from ...meshing.mesh import Mesh
+from ...reading import file_bytes, parse_json
+from ...resolved.morph import PrintedMorph
+from ...resolved.unit import mesh_of
+from ...run.context import RunContext
+from ...run.usecase import UseCase
+from ..simulate_and_place.job import Job as Study
+from ..simulate_and_place.job import read_job as read_study
+from ..simulate_and_place.motion_files import write_model_a
+from .requests import ASKED, BENT, LAYOUT, LEVELS, REQUEST, Job, read_job
+
+RUNGS = 4
+"""Number of pressures solved between 0 and the largest."""
+NEWTON: NewtonSettings = attrs.evolve(
+    RESOLVED_NEWTON, tolerance=1e-6, max_step_MPa=0.02, easy_factorisations=12, follow_snaps=False
+)
+LOOK_S = 0.05
+"""Interval in s at which a new request is looked for."""
+RESTS_S = 2.0
+"""Time in s without a new request before a finer level, whose mesh and model no request interrupts."""
+_FAR = 0.5
+"""Share of the largest displacement by which a state may differ from that of the design before."""
+
+
+class _Superseded(Exception):
+    """A newer request is there."""
+
+
+@attrs.frozen(eq=False)
+class _Watched:
+    """A solver of linear systems that raises _Superseded where a newer request is there."""
+
+    solver: Any
+    look: Any
+
+    def factor(self, values: Any) -> Any:
+        self.look()
+        return self.solver.factor(values)
+
+    def solve(self, b: Any) -> Any:
+        self.look()
+        return self.solver.solve(b)
+
+
+@attrs.frozen(eq=False)
+class _Solved:
+    """A unit on one mesh: its model, its states by pressure in kPa, and what moves the mesh."""
+
+    study: Study
+    mesh: Mesh
+    model: Model
+    states: dict[float, State]
+    morph: PrintedMorph | None
+
+
+class LiveBending:
+    """Answers the requests of a folder, each by finer and finer shapes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._number = 0
+        self._shape = 0
+        self._levels: dict[float, _Solved] = {}
+        self._seen: tuple[int, dict[str, Any]] = 0, {}
+
+    def request(self) -> dict[str, Any]:
+        """The latest request; empty before the first."""
+        with suppress(OSError, InputError):
+            changed = (self.folder / REQUEST).stat().st_mtime_ns
+            if changed != self._seen[0]:
+                self._seen = changed, parse_json(file_bytes(self.folder / REQUEST), REQUEST)
+        return self._seen[1]
+
+    def step(self) -> bool:
+        """Answer the latest request as far as no newer one comes; return False if there is none."""
+        request = self.request()
+        number = int(request.get("number", 0))
+        if number <= self._number:
+            return False
+        self._number = number
+        try:
+            study = read_study(self.folder / ASKED / str(number))
+            for refine, error in LEVELS:
+                if refine != LEVELS[0][0]:
+                    self._rest()
+                self._level(study, refine, error, float(request["pressure_kPa"]))
+        except _Superseded:
+            pass
+        except MuError as error:
+            write_json(self.folder / BENT, {"number": number, "trouble": error.what})
+        return True
+
+    def _look(self) -> None:
+        if int(self.request().get("number", 0)) != self._number:
+            raise _Superseded
+
+    def _rest(self) -> None:
+        """Wait for a newer request."""
+        until = time.monotonic() + RESTS_S
+        while time.monotonic() < until:
+            self._look()
+            time.sleep(LOOK_S)
+
+    def _level(self, study: Study, refine: float, error: float, first_kPa: float) -> None:
+        """Bend the unit on a mesh of one refinement, the first pressure first, and tell of every state."""
+        self._look()
+        study = attrs.evolve(study, mesh=attrs.evolve(study.mesh, refine=refine))
+        before = self._levels.get(refine)
+        found = self._begun(study, before)
+        old = {} if before is None or before.mesh.nodes.shape != found.mesh.nodes.shape else before.states
+        body = Equilibrium(found.model, study.materials(found.mesh), NEWTON, explains=False)
+        top = max(float(study.protocol.pressure_kPa.max()), first_kPa, 1.0)
+        halfway = [first_kPa / 2.0] if first_kPa > in_kPa(NEWTON.max_step_MPa) and not old else []
+        rungs = [*halfway, first_kPa, *(top * (k + 1) / RUNGS for k in range(RUNGS))]
+        wanted = [p for p in dict.fromkeys(round(p, 3) for p in rungs) if p > 0.0]
+        coarse = refine == LEVELS[0][0]
+        for count, pressure in enumerate(wanted):
+            found.states[pressure] = self._state(body, found, pressure, old.get(pressure))
+            self._levels[refine] = found
+            # A finer level replaces the one before as a whole.
+            if coarse or count + 1 == len(wanted):
+                self._tell(found, error, finished=refine == LEVELS[-1][0])
+
+    def _begun(self, study: Study, before: _Solved | None) -> _Solved:
+        """The study's mesh and model: those of the design before, moved to this one, or new."""
+        mesh, morph = self._mesh(study, before)
+        if before is not None and mesh is before.mesh:
+            model = before.model
+        else:
+            self._look()
+            model = study.model(mesh)
+            model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]
+        return _Solved(study, mesh, model, {0.0: rest(mesh)}, morph)
+
+    def _mesh(self, study: Study, before: _Solved | None) -> tuple[Mesh, PrintedMorph | None]:
+        settings, unit = study.mesh_settings(study.mesh), study.unit
+        if before is not None and before.morph is not None and study.body is None:
+            if before.study.unit.printed == unit.printed:
+                return before.mesh, before.morph
+            if _wall_alone_differs(before.morph.drawn.printed, unit.printed):
+                with suppress(MeshingError, InputError):
+                    return before.morph.to(unit), before.morph
+        mesh = mesh_of(unit, settings, body=study.body)
+        self._look()
+        return mesh, None if study.body is not None else PrintedMorph(mesh, unit, settings)
+
+    def _state(self, body: Equilibrium, found: _Solved, pressure: float, old: State | None) -> State:
+        """The state at a pressure in kPa: from the design before if it is near, else from those below it."""
+        if old is not None and old.u.shape == found.mesh.nodes.shape:
+            with suppress(ConvergenceError):
+                far = _FAR * float(np.abs(old.u).max())
+                return body.newton(found.model.following(old.u.copy()), in_MPa(pressure), far)
+        below = [found.states[p] for p in sorted(found.states) if p < pressure]
+        return body.reach(in_MPa(pressure), below)
+
+    def _tell(self, found: _Solved, error: float, finished: bool) -> None:
+        """Write the states found so far, and what there is to read."""
+        self._shape += 1
+        folder = self.folder / f"shape-{self._shape}"
+        states = tuple(found.states[p] for p in sorted(found.states))
+        kPa = np.array([state.pressure_kPa for state in states])
+        tip = TipSection.of(found.mesh)
+        motion = Trajectory(kPa, kPa, states, np.arange(len(states)), found.mesh)
+        write_model_a(folder, found.mesh, found.study.materials(found.mesh), motion, fields=False)
+        angles = [[state.pressure_kPa, tip.angle_deg(state.u)] for state in states]
+        answer = {"number": self._number, "folder": folder.name, "states": angles}
+        write_json(self.folder / BENT, answer | {"error": error, "finished": finished, "trouble": ""})
+        self._remove(f"shape-{k}" for k in (self._shape - 2,))
+        self._remove(f"{ASKED}/{self._number - k}" for k in range(1, 4))
+
+    def _remove(self, names: Iterable[str]) -> None:
+        for name in names:
+            shutil.rmtree(self.folder / name, ignore_errors=True)
+
+
+def _wall_alone_differs(a: Dimensions, b: Dimensions) -> bool:
+    """Return True if two units differ in the wall's inner face alone: others have other nodes tied to it."""
+    names = ("wall", "wall_factors", "base_cap", "tip_cap")
+    return attrs.evolve(b, **{name: getattr(a, name) for name in names}) == a
+
+
+def run(job: Job, folder: Path, context: RunContext) -> None:
+    """Answer requests until this process is ended; raises MuError."""
+    bending = LiveBending(folder)
+    while True:
+        if not bending.step():
+            time.sleep(LOOK_S)
+
+
+USE_CASE = UseCase("live", LAYOUT, read_job, run, lambda summary: [])

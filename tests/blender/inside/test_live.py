@@ -1,0 +1,120 @@
+"""A unit that bends while it is designed: its process, its shape in the unit's own place, and its end.
+
+Timers never fire in background: the tests call what they call.
+"""
+
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from mu_addon.blender.jobs import start_child
+from mu_addon.blender.live import state as live
+from mu_addon.blender.live import words
+from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.shared import displays
+from mu_addon.blender.unit import object as unit_object
+
+from .acting import add
+from .jobs import PATIENCE_S
+
+
+def bent(root, states):
+    """Wait as a window does, until the unit is bent and so many states are there."""
+    end = time.monotonic() + PATIENCE_S
+    while live.of(root).shape is None or len(live.of(root).shape.pressure_kPa) < states:
+        assert time.monotonic() < end, words.words(root)
+        live._tick()
+        assert not live.of(root).trouble, live.of(root).trouble
+        time.sleep(0.05)
+
+
+def lattice(root):
+    """Vertices (v, 3) in mm of the struts as they are shown."""
+    part = next(part for part in live.parts(root) if part[displays.LIVE] == "lattice")
+    return motion_parts.vertices_of(part.data)
+
+
+def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
+    root = add(preset="mu-1.0x")
+    root.mu_unit.chambers.count = 3
+    root.mu_unit.study.folder = str(tmp_path / "unit")
+    root.mu_live.on = True
+    assert words.words(root) == "Bending..."
+    assert not live.is_seen(root)
+    bent(root, 5)
+    assert live.is_seen(root)
+    angle = live.angle_at(live.of(root).shape, 40.0)
+    assert words.words(root).startswith(f"{angle:.1f} ± ")
+    assert words.words(root).endswith("at 40 kPa, refining")
+    at_40 = lattice(root)
+    root.mu_live.pressure_kPa = 20.0
+    at_20 = lattice(root)
+    assert 0.0 < live.angle_at(live.of(root).shape, 20.0) < angle
+    root.mu_live.pressure_kPa = 0.0
+    rest = lattice(root)
+    assert abs(live.angle_at(live.of(root).shape, 0.0)) < 1e-6
+    assert np.abs(at_40 - rest).max() > np.abs(at_20 - rest).max() > 0.5
+    assert np.ptp(rest[:, 1]) == pytest.approx(50.0), "as drawn, in millimetres"
+    # At rest at once, then bent anew, by the same process.
+    root.mu_live.pressure_kPa = 40.0
+    pid = live.of(root).child.pid
+    root.mu_unit.chambers.wall_mm = 1.2
+    assert not live.is_seen(root)
+    bent(root, 5)
+    assert live.of(root).child.pid == pid
+    assert live.angle_at(live.of(root).shape, 40.0) < angle
+    # Another view of it is no other design.
+    root.mu_unit.show = "solid"
+    root.mu_unit.show = "preview"
+    assert live.is_seen(root)
+    root.mu_unit.candidates = True
+    root.mu_unit.candidates = False
+    assert live.is_seen(root)
+    folder, child = live.of(root).folder, live.of(root).child
+    root.mu_live.on = False
+    assert live.of(root) is None
+    assert not live.parts(root)
+    assert not folder.exists()
+    assert child.state == "failed" or child.state == "cancelled"
+
+
+def test_a_real_job_comes_first(monkeypatch, tmp_path):
+    root = add(preset="mu-1.0x")
+    root.mu_unit.study.folder = str(tmp_path / "unit")
+    root.mu_live.on = True
+    live.of(root).due_s = 0.0
+    live._tick()
+    child = live.of(root).child
+    assert child.state == "running"
+    with monkeypatch.context() as given:
+        given.setattr(start_child, "is_busy", lambda: True)
+        live._tick()
+        assert child.state != "running"
+        assert live.of(root).child is None
+        assert words.words(root) == "After the running job"
+    live._tick()
+    assert live.of(root).child.state == "running", "after it, the unit is bent"
+    # A deleted unit leaves no process.
+    child = live.of(root).child
+    bpy.ops.mu.delete()
+    live._tick()
+    assert child.state != "running"
+
+
+def test_what_cannot_be_bent_live_is_told(tmp_path):
+    root = add(preset="mu-1.0x")
+    root.mu_unit.study.folder = str(tmp_path / "unit")
+    root.mu_unit.wall.law = "prony"
+    root.mu_live.on = True
+    live.of(root).due_s = 0.0
+    live._tick()
+    assert words.words(root) == "A wall with memory is bent by Simulate only"
+    root.mu_unit.wall.law = "neo-hooke"
+    assert words.words(root) == "Bending..."
+    root.mu_unit.chambers.wall_mm = 6.0
+    assert words.words(root) == "A design rule is broken"
+    assert live.of(root).due_s is None
+    root.mu_live.on = False
+    assert unit_object.roots() == [root]

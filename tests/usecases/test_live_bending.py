@@ -1,0 +1,104 @@
+"""Shapes of a unit while it is designed: those of a new mesh, from the design before."""
+
+import json
+
+import pytest
+
+from mu_addon.design.parameters import Unit
+from mu_addon.design.rigid_body import RigidBody
+from mu_addon.errors import InputError
+from mu_addon.fem.protocol import Protocol
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.resolved.unit import mesh_of
+from mu_addon.usecases.live_bending import requests, run
+from mu_addon.usecases.live_bending.run import LiveBending
+from mu_addon.usecases.simulate_and_place.job import Job as Study
+from mu_addon.usecases.simulate_and_place.motion_files import read_motion
+
+from .test_obstacles import WALL
+
+UNIT = Unit().evolve(count=3)
+PROTOCOL = Protocol([0.0, 1.0], [0.0, 20.0])
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    monkeypatch.setattr(run, "LEVELS", requests.LEVELS[:1])
+    monkeypatch.setattr(run, "RUNGS", 2)
+
+
+def answered(bending, number, unit, kPa=20.0):
+    """Pairs of kPa and degrees that answer a request, and its motion."""
+    requests.ask(bending.folder, number, Study(unit, PROTOCOL), kPa)
+    assert bending.step()
+    found = json.loads((bending.folder / requests.BENT).read_text())
+    assert found["number"] == number
+    assert not found["trouble"]
+    return dict(found["states"]), read_motion(bending.folder / found["folder"])
+
+
+def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
+    warm, anew = LiveBending(tmp_path / "warm"), LiveBending(tmp_path / "anew")
+    first, motion = answered(warm, 1, UNIT)
+    assert set(first) == {0.0, 10.0, 20.0}
+    assert 0.0 == first[0.0] < first[10.0] < first[20.0]
+    assert motion.state_kPa.tolist() == [0.0, 10.0, 20.0]
+    thicker = UNIT.evolve(wall_mm=1.1)
+    second, moved = answered(warm, 2, thicker)
+    assert (moved.mesh.nodes != motion.mesh.nodes).any(), "the mesh was moved"
+    wanted, _ = answered(anew, 1, thicker)
+    assert second[20.0] < first[20.0]
+    for kPa in (10.0, 20.0):
+        assert second[kPa] == pytest.approx(wanted[kPa], rel=5e-3)
+    # Other struts have other ties: their mesh is new.
+    thin = thicker.evolve(junction_diameter_mm=1.3)
+    third, own = answered(warm, 3, thin)
+    settings = MeshSettings(refine=requests.LEVELS[0][0], fidelity=RESOLVED)
+    assert (own.mesh.tied_weights == mesh_of(thin, settings).tied_weights).all()
+    assert 0.0 < third[10.0] < third[20.0]
+    assert not warm.step(), "nothing more was asked for"
+
+
+def test_a_pressure_above_the_protocol_is_the_largest(tmp_path):
+    found, _ = answered(LiveBending(tmp_path), 1, UNIT, 30.0)
+    assert max(found) == 30.0
+
+
+def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
+    bending, told = LiveBending(tmp_path), []
+    write = LiveBending._tell
+
+    def tell(self, found, error, finished):
+        write(self, found, error, finished)
+        told.append(self._number)
+        if len(told) == 1:
+            requests.ask(tmp_path, 2, Study(UNIT, PROTOCOL), 10.0)
+
+    monkeypatch.setattr(LiveBending, "_tell", tell)
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0)
+    assert bending.step()
+    assert told == [1], "one state, and no more"
+    assert bending.step()
+    assert set(told[1:]) == {2}
+
+
+@pytest.mark.parametrize(
+    ("study", "words"),
+    [
+        (Study(UNIT, PROTOCOL, obstacles=[RigidBody(WALL)]), "obstacles"),
+        (Study(UNIT.evolve(law="prony"), PROTOCOL), "memory"),
+    ],
+)
+def test_what_is_not_bent_live_is_refused(tmp_path, study, words):
+    with pytest.raises(InputError, match=words):
+        requests.ask(tmp_path, 1, study, 20.0)
+    assert not LiveBending(tmp_path).step()
+
+
+def test_a_unit_without_a_shape_is_told(tmp_path):
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0)
+    (tmp_path / requests.ASKED / "1" / "unit.toml").write_text("format = 1\nscale = -1.0\n")
+    assert LiveBending(tmp_path).step()
+    found = json.loads((tmp_path / requests.BENT).read_text())
+    assert found["number"] == 1
+    assert found["trouble"]
