@@ -17,8 +17,8 @@ HEAD = """# Tests that run at night
 Run them with `.venv/bin/python -m pytest -m nightly`; it writes the date of each that passed into this table.
 The test named beside each runs by default and guards against the same fault.
 
-| test | guarded by default by | last passed |
-| --- | --- | --- |
+test | guarded by default by | last passed
+--- | --- | ---
 """
 NEVER = "never"
 
@@ -92,7 +92,7 @@ def write(passed=()):
     for (file, name), (where, quick) in every().items():
         test = f"{file}::{name}"
         guard = quick if where == file else f"{where}::{quick}"
-        rows.append(f"| `{test}` | `{guard}` | {today if test in passed else known.get(test, NEVER)} |\n")
+        rows.append(f"`{test}` | `{guard}` | {today if test in passed else known.get(test, NEVER)}\n")
     PAGE.write_text(HEAD + "".join(rows), encoding="utf-8")
 
 

@@ -7,16 +7,16 @@ import sys
 
 import pytest
 
-from mu_addon.design.parameters import load_preset, to_toml
+from mu_addon.design.parameters import load_preset, read_unit, to_toml
 
 from .processes import assert_clear_failure, command, here, run
 
 
 def test_help_names_every_command():
-    done = run("--help")
+    done = here("--help")
     for name in ("design", "simulate", "place", "presets"):
         assert name in done.stdout
-        assert run(name, "--help").returncode == 0
+        assert here(name, "--help").returncode == 0
 
 
 def test_help_loads_nothing_heavy():
@@ -27,7 +27,7 @@ def test_help_loads_nothing_heavy():
 
 
 def test_presets_are_listed():
-    assert [line.split()[0] for line in run("presets").stdout.splitlines()] == [
+    assert [line.split()[0] for line in here("presets").stdout.splitlines()] == [
         "mu-0.75x",
         "mu-1.0x",
         "mu-1.5x",
@@ -199,7 +199,7 @@ def test_json_messages_end_with_one_terminal_message(tmp_path):
     messages = [json.loads(line) for line in good.stdout.splitlines()]
     assert {m["type"] for m in messages[:-1]} == {"plan", "progress"}
     assert messages[-1]["type"] == "result"
-    bad = run("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
+    bad = here("design", "--preset", "nothing", "--out", tmp_path / "out", "--json")
     assert json.loads(bad.stdout.splitlines()[-1])["type"] == "error"
 
 
@@ -227,4 +227,4 @@ def test_samples_without_any_pressure_are_refused(tmp_path):
 def test_files_from_a_windows_editor_are_read(tmp_path):
     file = tmp_path / "unit.toml"
     file.write_bytes(b"\xef\xbb\xbf" + to_toml(load_preset("mu-1.0x")).replace("\n", "\r\n").encode())
-    assert here("design", "--unit", file, "--out", tmp_path / "out", "--no-report").returncode == 0
+    assert read_unit(file) == load_preset("mu-1.0x")

@@ -2,9 +2,9 @@
 
 import json
 import shutil
-import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 import trimesh
@@ -13,7 +13,7 @@ from mu_addon.graph import Node, NodeTree, Source, tree_text
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.templates import template
 
-from .processes import ROOT, assert_clear_failure, command, here, run
+from .processes import ROOT, assert_clear_failure, command, here, worker_of
 
 COARSE = {"order": 1, "refine": 0.4, "times": 4, "fidelity": "homogenised"}
 
@@ -37,7 +37,7 @@ def file(tmp_path_factory):
 
 
 def evaluated(file, out, *more):
-    done = run("graph", file, "--out", out, "--json", *more)
+    done = here("graph", file, "--out", out, "--json", *more)
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads(done.stdout.splitlines()[-1])["summary"]
 
@@ -77,7 +77,7 @@ def test_again_nothing_is_computed_and_a_changed_wall_only_its_own(whole, file, 
     }
     assert evaluated(file, out, "--node", "Wall 0.8")["nodes"].keys() == {"Unit", "Wall 0.8"}
     assert (out / before["nodes"]["Motion 0.8"]["folder"] / "summary.json").is_file(), "runs are kept"
-    resumed = run("resume", out, "--json")
+    resumed = here("resume", out, "--json")
     assert resumed.returncode == 0, resumed.stdout
 
 
@@ -91,8 +91,12 @@ def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, t
     while len(list(out.glob("nodes/*/cache/mesh-*"))) < 2:
         assert process.poll() is None
         time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
+    worker = worker_of(out)
+    process.kill()
     process.wait()
+    # It ends once its input does, and has the folder until then.
+    while Path(f"/proc/{worker}/exe").exists():
+        time.sleep(0.005)
     first = out / expected["nodes"]["Motion 0.8"]["folder"]
     written = {p.name: p.stat().st_mtime_ns for p in first.iterdir() if p.is_file()}
     assert json.loads((out / "nodes.json").read_text())["nodes"]["Motion 0.8"]["state"] == "computed"

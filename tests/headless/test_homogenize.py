@@ -9,7 +9,7 @@ import pytest
 
 from mu_addon.homogenize.effective import read_effective
 
-from .processes import here, run
+from .processes import here
 
 COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
 TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
@@ -18,7 +18,7 @@ TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
 @pytest.fixture(scope="module")
 def lattice(tmp_path_factory):
     out = tmp_path_factory.mktemp("lattice")
-    done = run("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
+    done = here("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
     assert done.returncode == 0, done.stderr
     return out, done
 
@@ -61,7 +61,7 @@ def test_it_resumes_from_what_was_finished(lattice):
     out, _ = lattice
     before = (out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()
     (out / "report.html").unlink()
-    done = run("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
+    done = here("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert ((out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()) == before
     assert (out / "report.html").exists()
@@ -70,7 +70,7 @@ def test_it_resumes_from_what_was_finished(lattice):
 @pytest.mark.nightly("tests/homogenize/test_cell_mesh.py::test_scales_share_one_mesh_and_one_tensor")
 def test_other_inputs_set_the_old_results_aside(lattice):
     out, _ = lattice
-    done = run(
+    done = here(
         "homogenize",
         "--preset",
         "mu-1.5x",
@@ -118,7 +118,7 @@ def test_an_offset_that_fills_the_cell_is_named(tmp_path):
 def test_fit_material_shows_what_a_law_misses(tmp_path):
     out = tmp_path / "rubber"
     words = ("--laws", "neo-hooke", "yeoh", "--hold-out", "equibiaxial")
-    done = run("fit-material", str(TRELOAR), *words, "--out", str(out))
+    done = here("fit-material", str(TRELOAR), *words, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert "law: " in done.stdout
     assert (out / "material.toml").exists()

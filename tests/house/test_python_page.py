@@ -1,8 +1,9 @@
 """The examples of the pages on Python and on extending run as they stand, and print what is shown."""
 
+import contextlib
+import io
 import re
-import subprocess
-import sys
+import runpy
 from pathlib import Path
 
 import pytest
@@ -23,14 +24,19 @@ EXAMPLES = [
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 
 
-def printed(code, folder):
+@pytest.fixture
+def printed(tmp_path, monkeypatch):
     """What a script prints, run from the repository with the package that is tested here."""
-    script = folder / "example.py"
-    script.write_text(code, encoding="utf-8")
-    run = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import runpy; runpy.run_path({str(script)!r})"
-    found = subprocess.run([sys.executable, "-c", run], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert found.returncode == 0, found.stderr
-    return found.stdout
+    monkeypatch.chdir(ROOT)
+
+    def output(code):
+        script, text = tmp_path / "example.py", io.StringIO()
+        script.write_text(code, encoding="utf-8")
+        with contextlib.redirect_stdout(text):
+            runpy.run_path(str(script))
+        return text.getvalue()
+
+    return output
 
 
 def require_alike(found, shown):
@@ -40,15 +46,15 @@ def require_alike(found, shown):
     assert figures[0] == pytest.approx(figures[1], rel=0.05)
 
 
-def test_ten_lines_lead_from_a_preset_to_an_angle(tmp_path):
+def test_ten_lines_lead_from_a_preset_to_an_angle(printed):
     code, shown = EXAMPLES[0]
     statements = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
     assert len(statements) <= 10
-    require_alike(printed(code, tmp_path), shown)
+    require_alike(printed(code), shown)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(1, len(EXAMPLES)))
-def test_the_other_examples_print_what_the_page_shows(number, tmp_path):
+def test_the_other_examples_print_what_the_page_shows(number, printed):
     code, shown = EXAMPLES[number]
-    require_alike(printed(code, tmp_path), shown)
+    require_alike(printed(code), shown)

@@ -120,7 +120,7 @@ def test_a_mirrored_mesh_answers_symmetrically_and_as_its_half(half):
     np.testing.assert_allclose(state.u[n:], state.u[:n][off] * [-1, 1, 1], atol=1e-6)
 
 
-@pytest.mark.nightly("tests/headless/test_place.py::test_one_worker_finds_the_same")
+@pytest.mark.nightly("tests/headless/test_resume.py::test_killed_at_any_stage_it_goes_on_to_the_same_digits")
 def test_two_processes_find_the_same_to_the_last_digit(tmp_path):
     script = """
 import sys

@@ -230,12 +230,16 @@ def computed_once(function: Callable[..., Any]) -> Callable[..., Any]:
 class Remembered:
     """A cache whose entries are computed once in a session: later folders are given them from memory.
 
-    They are written as if they had just been computed, so that a run's calls are the same.
+    They are written as if they had just been computed, so that a run's calls are the same. known: a cache
+    whose entries need not be computed at all.
     """
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, known: Cache | None = None) -> None:
         kept: dict[tuple[str, str], dict[str, Any]] = {}
         get, put = Cache.get, Cache.put
+        for path in known.folder.glob("*.npz") if known else ():
+            kind, _, name = path.stem.partition("-")
+            kept[kind, name] = get(known, kind, name) or {}
 
         def keep(cache: Cache, kind: str, name: str, arrays: dict[str, Any]) -> None:
             kept[kind, name] = {part: np.array(values) for part, values in arrays.items()}
@@ -271,11 +275,11 @@ def answered(task: Task) -> dict[str, Any]:
     return {"status": "done", "seconds": 0.1, "memory_MB": 1, "summary": summary}
 
 
-def placement(monkeypatch: pytest.MonkeyPatch) -> Run:
-    """A whole `place` that computes its solid, mesh, states and rays once in a session."""
+def placement(monkeypatch: pytest.MonkeyPatch, known: Cache | None = None) -> Run:
+    """A whole `place` that computes its solid, mesh, states and rays once in a session; known: see above."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
     monkeypatch.setattr(light, "traced_signal", computed_once(light.traced_signal))
-    Remembered(monkeypatch)
+    Remembered(monkeypatch, known)
     return lambda folder, context: placing.USE_CASE.start(PLACEMENT, folder, context)
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mu_addon.errors import MuError
 from mu_addon.materials.library import load_material
+from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export.job import Job as ExportJob
@@ -61,13 +63,15 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [61, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
-def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    """Each 61st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
-    assert inject_each(placement(monkeypatch), tmp_path, failing, 5, PARTIAL, step=step) == []
+@pytest.mark.parametrize("step", [122, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
+    """Each 122nd call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
+    assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_export"))])
+def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     monkeypatch.setattr(exporting, "build_solid", functools.cache(exporting.build_solid))
     job = ExportJob(
         STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
@@ -76,17 +80,18 @@ def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(folder: Path, context: RunContext) -> None:
         exporting.USE_CASE.start(job, folder, context)
 
-    assert inject_each(run, tmp_path, failing, 5) == []
+    assert inject_each(run, tmp_path, failing, 5, step=step) == []
 
 
-def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])
+def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     monkeypatch.setattr(sweeping, "cluster_at", OneProcess)
     job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
 
     def run(folder: Path, context: RunContext) -> None:
         sweeping.USE_CASE.start(job, folder, context)
 
-    assert inject_each(run, tmp_path, failing, 5, partial=["points.csv"]) == []
+    assert inject_each(run, tmp_path, failing, 5, partial=["points.csv"], step=step) == []
 
 
 FAKE = str(Path(__file__).resolve().parents[1] / "run" / "fake_worker.py")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,6 +15,7 @@ from mu_addon.design.solid import printable
 from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import MuError
 from mu_addon.materials.library import load_material
+from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.usecases.check_print import run as checking
 from mu_addon.usecases.check_print.job import Job as CheckJob
@@ -66,9 +68,10 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("step", [151, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
-def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
     """What follows from the states of the unit and of its candidates; all of it by benchmarks/faults.py."""
-    assert inject_each(placement(monkeypatch), tmp_path, layer, MuError.status, PARTIAL, step=step) == []
+    run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
+    assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
 @pytest.mark.parametrize("step", [101, pytest.param(31, marks=pytest.mark.nightly("test_export"))])

@@ -177,20 +177,22 @@ DAMAGES = ("truncated", "flipped", "emptied", "other names", "other shapes")
 
 
 @pytest.mark.parametrize(
-    "first",
+    ("first", "spared"),
     [
-        0,
+        # The law of light takes most of the time.
+        (0, "light-"),
         pytest.param(
-            2, marks=pytest.mark.nightly("test_a_damaged_cache_is_computed_again_to_the_same_digits")
+            2, "none", marks=pytest.mark.nightly("test_a_damaged_cache_is_computed_again_to_the_same_digits")
         ),
     ],
 )
-def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, first):
-    """Every entry is damaged, and entries of a kind each in another way."""
+def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, first, spared):
+    """Every entry that is not spared is damaged, and entries of a kind each in another way."""
     folder, full = copied
     rng = np.random.default_rng(first)
     for number, path in enumerate(sorted((folder / "cache").glob("*.npz"))):
-        damaged(path, DAMAGES[(first + number) % len(DAMAGES)], rng)
+        if not path.name.startswith(spared):
+            damaged(path, DAMAGES[(first + number) % len(DAMAGES)], rng)
     summary = ran(JOB, folder)
     assert summary["J_hat_mm"] == full["J_hat_mm"]
     assert same_digits(folder, placed[0])

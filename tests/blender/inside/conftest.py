@@ -81,8 +81,8 @@ def blender(each_bpy, tmp_path_factory):
 
 
 # What a quick look takes, with one path of the whole lattice beside the ten of the anchors.
-PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.5", "--rule", "volume_fraction"]
-PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2.5", "--checks", "2"]
+PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.4", "--rule", "volume_fraction"]
+PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2", "--checks", "2"]
 PLACE += ["--no-report"]
 
 

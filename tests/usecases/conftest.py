@@ -1,0 +1,1 @@
+from tests.coarse_pictures import coarse_pictures  # noqa: F401 - for every test here
