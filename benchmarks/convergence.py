@@ -59,9 +59,9 @@ def deviations(preset, refines):
             study.make_mesh()
             study.simulate()
             study.place()
-        tables[refine] = study.evaluations
+        tables[refine] = study.ranking.evaluations
         for rule in study.job.rules:
-            found = [study.evaluations[w.name, rule] for w in study.windows]
+            found = [study.ranking.evaluations[w.name, rule] for w in study.windows]
             J = " | ".join(f"{e.deviation.J_hat:.4f}" for e in found)
             ratio = np.mean([e.stiffened_mm3 / e.cylinder_mm3 for e in found])
             print(f"| {rule} | {refine:g} | {J} | {ratio:.2f} |", flush=True)

@@ -23,8 +23,8 @@ from mu_addon.usecases.parameter_study import run as sweeping
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point, version
 from mu_addon.usecases.sensor.stream import stream
+from mu_addon.usecases.simulate_and_place import analysis_mesh, study
 from mu_addon.usecases.simulate_and_place import run as placing
-from mu_addon.usecases.simulate_and_place import study
 
 from ..run.failing_files import failing
 from .fault_injection import (
@@ -55,7 +55,7 @@ def for_good(request: pytest.FixtureRequest) -> bool:
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """Each 31st call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
+    monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)

@@ -24,8 +24,8 @@ from mu_addon.usecases.export.job import Job as ExportJob
 from mu_addon.usecases.parameter_study import run as sweeping
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.sensor.stream import stream
+from mu_addon.usecases.simulate_and_place import analysis_mesh, study
 from mu_addon.usecases.simulate_and_place import run as placing
-from mu_addon.usecases.simulate_and_place import study
 
 from ..run.failing_memory import FailingMemory, short_of_memory
 from .fault_injection import (
@@ -59,7 +59,7 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the solid on; all is solved anew, each time."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(study, "mesh_of", computed_once(study.mesh_of))
+    monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)

@@ -16,7 +16,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.simulate_and_place import study as module
+from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
@@ -213,10 +213,10 @@ def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):
 def test_room_is_asked_for_as_the_study_grows():
     job = attrs.evolve(JOB, unit=UNIT)
     coarse, fine = (attrs.evolve(job, mesh=MeshSettings(refine=r)) for r in (0.4, 1.8))
-    assert module._expected_nodes(coarse) < module._expected_nodes(fine)
+    assert expected_nodes(coarse) < expected_nodes(fine)
     # Known meshes of mu-1.0x, see the numbers in its docstring.
     for refine, nodes in ((0.4, 5_014), (1.0, 18_477), (1.8, 71_082)):
-        expected = module._expected_nodes(attrs.evolve(job, mesh=MeshSettings(refine=refine)))
+        expected = expected_nodes(attrs.evolve(job, mesh=MeshSettings(refine=refine)))
         assert 0.8 * nodes < expected < 1.8 * nodes
 
 
@@ -224,7 +224,7 @@ def test_what_a_study_writes_is_less_than_the_room_it_asks_for(placed):
     folder, summary = placed
     written = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     nodes, pressures = summary["mesh"]["nodes"], 3
-    asked = module._BYTES["interactive"] + nodes * module._BYTES_A_NODE["place"] * pressures
+    asked = BYTES["interactive"] + nodes * BYTES_A_NODE["place"] * pressures
     assert written < asked
 
 

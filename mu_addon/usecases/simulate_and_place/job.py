@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -36,7 +36,7 @@ from ...run.lock import FolderLock
 from ...sensing.optics import Optics
 from .named_effects import NamedEffects
 from .settings import CHECKS, MESH_CHECK, MESHER, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
-from .study_file import FILES, LAYOUT, NAME, Tables, compose, holds, read_run
+from .study_file import FILES, FILES_OF, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
 if TYPE_CHECKING:
@@ -104,84 +104,65 @@ class Job:
         if self.mesh.resolved:
             # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
             object.__setattr__(self, "rules", (PRINTED,))
-            self._require_resolvable()
         require_self_contact_resolvable(self.mesh, self.self_contact)
-        if self.obstacles and "place" in self.stages and self.paths == "graph":
-            raise InputError(
-                "the search of the whole lattice does not support obstacles",
-                "obstacles, paths",
-                "leave one of them out",
-            )
-        self._require_self_friction()
-        if self.unit.wall.has_memory and "place" in self.stages and self.paths == "graph":
-            raise InputError(
-                "the search of the whole lattice knows a unit whose wall remembers nothing",
-                "[wall], paths",
-                "rank the windows of anchors, or use an elastic law",
-            )
-        for name in ("anisotropy", "strain_stiffening"):
-            if self.unit.wall.names and name in self.effects.values:
-                raise InputError(
-                    f"{name} changes a neo-Hookean wall, and this unit's has a law of its own",
-                    f"[wall], {name}",
-                    "leave [wall] out, or the effect and give the wall layers_excess or c2_over_c1",
-                )
-        if self.effects.clogged and "place" in self.stages and self.paths == "graph":
-            raise InputError(
-                "the search of the whole lattice does not support a clogged chamber",
-                "clogged_chamber, paths",
-                "leave one of them out",
-            )
-        if (
-            self.solver.method == "iterative"
-            and "place" in self.stages
-            and self.solver.device in ("auto", "cpu")
+        for refused, what, where, remedy in self._refusals():
+            if refused:
+                raise InputError(what, where, remedy)
+
+    def _refusals(self) -> Iterator[tuple[bool, str, str, str]]:
+        """Pairs of settings that exclude each other: whether they are given, what, where and what to do."""
+        places, simulates = "place" in self.stages, "simulate" in self.stages
+        without, one = "the search of the whole lattice does not support", "leave one of them out"
+        graph, two_levels = places and self.paths == "graph", self.solver.method == "iterative"
+        resolved = simulates and self.mesh.resolved
+        for what, where, asked in (
+            ("a law for the lattice", "--lattice", self.lattice is not None),
+            ("linear elements", "--order", self.mesh.order == 1),
         ):
-            raise InputError(
-                "on the CPU all paths are solved with one factor, which two levels do not make",
-                "--solver",
-                "give --solver direct or auto, or a CUDA device with --device",
+            words = f"the resolved model does not support {what}"
+            yield resolved and asked, words, where, "choose fidelity homogenised"
+        yield graph and bool(self.obstacles), f"{without} obstacles", "obstacles, paths", one
+        yield (
+            bool(self.self_friction) and not self.self_contact,
+            "walls and struts that may pass through each other have no friction",
+            "--self-friction",
+            "give --self-contact, too, or leave it out",
+        )
+        friction = graph and bool(self.self_friction)
+        yield friction, f"{without} friction", "--self-friction, --paths graph", one
+        yield (
+            graph and self.unit.wall.has_memory,
+            "the search of the whole lattice knows a unit whose wall remembers nothing",
+            "[wall], paths",
+            "rank the windows of anchors, or use an elastic law",
+        )
+        for name in ("anisotropy", "strain_stiffening"):
+            yield (
+                bool(self.unit.wall.names) and name in self.effects.values,
+                f"{name} changes a neo-Hookean wall, and this unit's has a law of its own",
+                f"[wall], {name}",
+                "leave [wall] out, or the effect and give the wall layers_excess or c2_over_c1",
             )
-        if self.solver.method == "iterative" and self.mesh.order == 1 and "simulate" in self.stages:
-            raise InputError(
-                "two levels need quadratic elements", "--solver, --order", "give --order 2 or --solver direct"
-            )
-        _, pressure = self.samples
-        if not pressure.any():
-            raise InputError(
-                f"none of the {self.times} samples of the protocol has a pressure other than 0",
-                "times",
-                "give more samples, or a protocol that leaves 0 kPa",
-            )
-
-    def _require_self_friction(self) -> None:
-        """Raise InputError for a friction without effect, or one that the lattice's search cannot have."""
-        if not self.self_friction:
-            return
-        if not self.self_contact:
-            raise InputError(
-                "walls and struts that may pass through each other have no friction",
-                "--self-friction",
-                "give --self-contact, too, or leave it out",
-            )
-        if "place" in self.stages and self.paths == "graph":
-            raise InputError(
-                "the search of the whole lattice does not support friction",
-                "--self-friction, --paths graph",
-                "leave one of them out",
-            )
-
-    def _require_resolvable(self) -> None:
-        """Raise InputError for inputs that the resolved model of a unit does not cover."""
-        refused = {
-            "a law for the lattice": ("--lattice", self.lattice is not None),
-            "linear elements": ("--order", self.mesh.order == 1),
-        }
-        for what, (where, asked) in refused.items():
-            if asked and "simulate" in self.stages:
-                raise InputError(
-                    f"the resolved model does not support {what}", where, "choose fidelity homogenised"
-                )
+        clogged = graph and bool(self.effects.clogged)
+        yield clogged, f"{without} a clogged chamber", "clogged_chamber, paths", one
+        yield (
+            two_levels and places and self.solver.device in ("auto", "cpu"),
+            "on the CPU all paths are solved with one factor, which two levels do not make",
+            "--solver",
+            "give --solver direct or auto, or a CUDA device with --device",
+        )
+        yield (
+            two_levels and simulates and self.mesh.order == 1,
+            "two levels need quadratic elements",
+            "--solver, --order",
+            "give --order 2 or --solver direct",
+        )
+        yield (
+            not self.samples[1].any(),
+            f"none of the {self.times} samples of the protocol has a pressure other than 0",
+            "times",
+            "give more samples, or a protocol that leaves 0 kPa",
+        )
 
     @cached_property
     def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
@@ -210,20 +191,16 @@ class Job:
 
         Not `workers` and `solver`, which do not.
         """
-        mesh = self.mesh.table()
+        simulate: dict[str, Any] = {"times": self.times, "mesher": self.mesher}
+        if self.self_contact:
+            simulate["self_contact"] = True
+        if self.self_friction:
+            simulate["self_friction"] = self.self_friction
+        if self.obstacles:
+            simulate["friction"] = [o.friction for o in self.obstacles]
         tables: Tables = {
-            "design": _named("unit", self.unit_text())
-            | _named("body", self.body_text())
-            | {"quality": self.quality},
-            "simulate": _named("protocol", self.protocol_text())
-            | {"times": self.times, "mesher": self.mesher}
-            | ({"self_contact": True} if self.self_contact else {})
-            | ({"self_friction": self.self_friction} if self.self_friction else {})
-            | _named("lattice", self.lattice_text())
-            | _named("obstacles", self.obstacles_text())
-            | ({"friction": [o.friction for o in self.obstacles]} if self.obstacles else {})
-            | {"mesh": mesh}
-            | self.effects.tables,
+            "design": {"quality": self.quality},
+            "simulate": simulate | {"mesh": self.mesh.table()} | self.effects.tables,
             "place": {
                 "stations": self.stations,
                 "rules": list(self.rules),
@@ -235,6 +212,11 @@ class Job:
             tables["place"]["optics"] = attrs.asdict(self.optics)
         if self.paths == "graph":
             tables["place"]["search"] = attrs.asdict(self.limits) | {"most_checks": self.most_checks}
+        texts = self._file_texts()
+        for stage, keys in FILES_OF.items():
+            named = {key: texts[key] for key in keys if key in texts}
+            files = [((key, FILES[key]), (f"{key}_sha256", digest(text))) for key, text in named.items()]
+            tables[stage] = dict(pair for pairs in files for pair in pairs) | tables[stage]
         return {stage: tables[stage] for stage in self.stages}
 
     def text(self) -> str:
@@ -289,18 +271,19 @@ class Job:
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; study.toml is the first."""
-        found = {NAME: self.text(), "unit.toml": self.unit_text()}
-        body = self.body_text()
-        if body is not None:
-            found[FILES["body"]] = body
-        if "simulate" in self.stages:
-            found["protocol.csv"] = self.protocol_text()
-            lattice = self.lattice_text()
-            if lattice is not None:
-                found[LATTICE_LAW] = lattice
-            obstacles = self.obstacles_text()
-            if obstacles is not None:
-                found[FILES["obstacles"]] = obstacles
+        texts = self._file_texts()
+        keys = [key for stage in self.stages for key in FILES_OF[stage] if key in texts]
+        return {NAME: self.text()} | {FILES[key]: texts[key] for key in keys}
+
+    def _file_texts(self) -> dict[str, str]:
+        """Text of each file of inputs by its key in study.toml."""
+        found = {"unit": to_toml(self.unit), "protocol": protocol_text(self.protocol)}
+        if self.body is not None:
+            found["body"] = self.body.text()
+        if self.lattice is not None:
+            found["lattice"] = self.lattice.text()
+        if self.obstacles:
+            found["obstacles"] = self.obstacles_text()
         return found
 
     def texts_in(
@@ -323,31 +306,15 @@ class Job:
         tables = {stage: merged[stage] for stage in STAGES if stage in merged}
         return {**self.texts(), **files, NAME: compose(tables, {**self._run, **run})}, True
 
-    def lattice_text(self) -> str | None:
-        """effective.toml: the lattice's law and its origin, or None for the unit's modulus."""
-        return None if self.lattice is None else self.lattice.text()
-
-    def body_text(self) -> str | None:
-        """body.obj: the body in place of the lattice's box, or None where there is none."""
-        return None if self.body is None else self.body.text()
-
-    def obstacles_text(self) -> str | None:
-        """obstacles.obj: the rigid bodies that the unit may touch, or None where there are none."""
-        return to_obj(self.obstacles) if self.obstacles else None
+    def obstacles_text(self) -> str:
+        """obstacles.obj: the rigid bodies that the unit may touch; empty where there are none."""
+        return to_obj(self.obstacles) if self.obstacles else ""
 
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
         """Settings of a mesh: of the whole unit where an obstacle is not its own mirror image."""
         if not self.obstacles or mirrored(self.obstacles):
             return settings
         return attrs.evolve(settings, fraction="full")
-
-    def unit_text(self) -> str:
-        """unit.toml: the unit's parameters with units, meaning and source."""
-        return to_toml(self.unit)
-
-    def protocol_text(self) -> str:
-        """protocol.csv: corner points of the pressure protocol."""
-        return protocol_text(self.protocol)
 
 
 def in_time_newton(resolved: bool, self_contact: bool) -> NewtonSettings:
@@ -361,11 +328,6 @@ def protocol_text(protocol: Protocol) -> str:
     """The corner points of a protocol as CSV, to their last digit."""
     rows = zip(protocol.time_s, protocol.pressure_kPa, strict=True)
     return "time_s,pressure_kPa\n" + "".join(f"{float(t)!r},{float(p)!r}\n" for t, p in rows)
-
-
-def _named(key: str, text: str | None) -> dict[str, str]:
-    """Entries of study.toml that name a file of inputs."""
-    return {} if text is None else {key: FILES[key], f"{key}_sha256": digest(text)}
 
 
 def read_job(folder: Path) -> Job:

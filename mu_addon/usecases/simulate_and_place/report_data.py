@@ -86,7 +86,7 @@ def _panel_pictures(study: Study) -> None:
         return
     write_angle(study.folder, *study.motion_in_order())
     rule = study.job.headline_rule
-    found = [e for e in study.evaluations.values() if e.rule == rule]
+    found = [e for e in study.ranking.evaluations.values() if e.rule == rule]
     top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
     for e in found:
         write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
@@ -103,7 +103,7 @@ def report_data(
     """Data of the report of a study, complete or stopped early for a reason."""
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
-    complete = all((w.name, rule) in study.evaluations for w in windows for rule in job.rules)
+    complete = all((w.name, rule) in study.ranking.evaluations for w in windows for rule in job.rules)
     moved_kPa, angle_deg = study.motion_in_order()
     rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
     return ReportData(
@@ -145,7 +145,7 @@ def report_data(
 def _rule_result(study: Study, rule: str) -> RuleResult:
     from ...placement.deviation import rank
 
-    found = [study.evaluations[w.name, rule] for w in study.windows]
+    found = [study.ranking.evaluations[w.name, rule] for w in study.windows]
     j_hat = np.array([e.deviation.J_hat for e in found])
     chosen = found[int(np.argmin(j_hat))].name
     return RuleResult(
@@ -156,8 +156,8 @@ def _rule_result(study: Study, rule: str) -> RuleResult:
         stiffened_mm3=np.array([e.stiffened_mm3 for e in found]),
         cylinder_mm3=np.array([e.cylinder_mm3 for e in found]),
         chosen=chosen,
-        tied=study.tied(rule, chosen),
-        uncertainty_mm=study.uncertainty_mm.get(rule),
+        tied=study.ranking.tied(rule, chosen),
+        uncertainty_mm=study.ranking.uncertainty_mm.get(rule),
     )
 
 

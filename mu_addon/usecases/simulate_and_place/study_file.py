@@ -26,7 +26,7 @@ FILES = {
     "lattice": "effective.toml",
     "obstacles": "obstacles.obj",
 }
-_FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
+FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
 LAYOUT = FolderLayout(
     NAME,
     HEADER,
@@ -124,7 +124,7 @@ def parse(text: str, folder: Path) -> Tables:
     for stage in stages:
         if not isinstance(document[stage], dict):
             raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
-        for key in _FILES_OF[stage]:
+        for key in FILES_OF[stage]:
             # A name that leads elsewhere is not followed: each file has its one place.
             if document[stage].get(key, FILES[key]) != FILES[key]:
                 raise InputError(
@@ -137,7 +137,7 @@ def holds(folder: Path, tables: Mapping[str, Mapping[str, Any]]) -> dict[str, st
     """Texts of the files that some stages' tables name, by name, or None where one has changed."""
     texts = {}
     for stage, values in tables.items():
-        for key in _FILES_OF[stage]:
+        for key in FILES_OF[stage]:
             if key in values:
                 try:
                     texts[FILES[key]] = file_bytes(folder / FILES[key]).decode("utf-8")

@@ -1,0 +1,146 @@
+"""What makes a study's results doubtful: each check gives a summary's figures and warnings in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ...design.quantity import in_kPa
+from ...design.strut_cell import strut_cell
+from ...fem.lattice_law import deformation_gradients, stretches
+from ...fem.self_intersection import first_self_intersection
+from ...fem.state import State, rest
+from ...homogenize.foam_response import ellipticity
+from ...meshing.mesh import LATTICE
+
+if TYPE_CHECKING:
+    from ...homogenize.effective import Effective
+    from ...meshing.mesh import Mesh
+    from .job import Job
+
+# With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
+HOMOGENISED = (
+    "The lattice is simulated as a homogenised continuum. With its struts as printed, which buckle, mu-1.0x "
+    "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
+    "motion matters, choose the fidelity resolved."
+)
+
+
+def doubts_of_job(job: Job) -> Iterator[str]:
+    """Warnings on what the settings of a simulation leave out."""
+    if job.lattice is not None:
+        yield from _another_cell(job, job.lattice)
+    # Uniform samples miss the protocol's extremes.
+    corners, samples = job.protocol.pressure_kPa, job.supplied_kPa
+    for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
+        if abs(extreme - met) > 1e-6:
+            yield (
+                f"The protocol goes to {extreme:g} kPa, but its {job.times} samples reach only "
+                f"{met:g} kPa: choose a number of samples that includes its extremes."
+            )
+    if job.mesh.order == 1:
+        yield "Linear elements lock in thin walls: these results are for a quick look only."
+    if not job.mesh.resolved:
+        yield HOMOGENISED
+
+
+def _another_cell(job: Job, lattice: Effective) -> Iterator[str]:
+    """Warn where the lattice's law was found for another cell than the unit's."""
+    own = strut_cell(job.unit)
+    values = {f.name: getattr(own, f.name) for f in attrs.fields(type(own))} | {"kind": own.kind.name}
+    other = []
+    for name, value in lattice.cell.items():
+        mine = values.get(name, value)
+        words = isinstance(value, str) or isinstance(mine, str)
+        if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
+            other.append(f"{name} {value} (unit: {mine})")
+    if other:
+        yield f"The lattice law was computed for another cell than the unit's: {', '.join(other)}."
+
+
+def doubts_of_motion(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
+    """Warnings on a motion's states; their figures go into the summary."""
+    yield from _walls_cross(job, mesh, states, summary)
+    yield from _snaps(job, states)
+    if job.lattice is not None:
+        yield from _beyond_the_fit(job.lattice, mesh, states, summary)
+
+
+def _walls_cross(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
+    """The first pressure, on either side, at which walls pass through each other, and which."""
+    found = summary["walls_cross_at_kPa"] = {}
+    # With self-contact no step passes a touch.
+    for sign in () if job.self_contact else (-1, 1):
+        outward = sorted((s for s in states if s.pressure_MPa * sign > 0), key=lambda s: abs(s.pressure_MPa))
+        still = [s for s in states if s.loaded and not s.pressure_MPa]
+        first = first_self_intersection(mesh, [rest(mesh), *still, *outward])
+        if first is None:
+            continue
+        pressure = f"{in_kPa(first.pressure_MPa):.4g}"
+        instead = ", --self-contact" if job.mesh.resolved else ""
+        found[pressure] = [str(c) for c in first.crossings]
+        yield (
+            f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
+            f"modelled, so states beyond this pressure are invalid. Use a thicker wall{instead} or a "
+            "smaller pressure."
+        )
+
+
+def _snaps(job: Job, states: Sequence[State]) -> Iterator[str]:
+    """The first pressure on either side beyond a limit point, and how far a node moved.
+
+    For a motion solved instant by instant, the first instant.
+    """
+    snapped = [s for s in states if s.snapped_mm]
+    if job.in_time:
+        ways = [snapped]
+    else:
+        outward = sorted(snapped, key=lambda s: abs(s.pressure_MPa))
+        ways = [[s for s in outward if s.pressure_MPa * sign > 0] for sign in (-1, 1)]
+    for way in ways:
+        for first in way[:1]:
+            yield (
+                f"Before {first.pressure_kPa:.4g} kPa parts of the unit snap, by {first.snapped_mm:.2g} "
+                "mm at most: states from there on are those that damped motion leads to, and the way "
+                "back differs."
+            )
+
+
+def _beyond_the_fit(
+    lattice: Effective, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]
+) -> Iterator[str]:
+    """Warn where the lattice is strained beyond the range of its law's fit or stability."""
+    law = lattice.law
+    low, high = law.stretch
+    inside = np.flatnonzero(mesh.region == LATTICE)
+    found = summary["lattice_stretch"] = {}
+    for state in states:
+        F, volume = deformation_gradients(mesh, state.u, inside)
+        a = stretches(F)
+        beyond = (a[:, :, 0] < low) | (a[:, :, 2] > high)
+        # One point an element: it takes a while.
+        lost = ellipticity(law, F[:, 0]) <= 0
+        found[f"{state.pressure_kPa:.6g}"] = {
+            "least": float(a.min()),
+            "largest": float(a.max()),
+            "share_beyond_fit": float((volume * beyond).sum() / volume.sum()),
+            "share_not_elliptic": float((volume.sum(axis=1) * lost).sum() / volume.sum()),
+        }
+    least, largest = (pick(s[n] for s in found.values()) for pick, n in ((min, "least"), (max, "largest")))
+    pressure, worst = max(found.items(), key=lambda item: item[1]["share_beyond_fit"])
+    if worst["share_beyond_fit"]:
+        yield (
+            f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
+            f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
+            "lattice volume is outside that range, where the law is extrapolated."
+        )
+    pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
+    if worst["share_not_elliptic"]:
+        yield (
+            f"At {pressure} kPa the law is no longer elliptic in {worst['share_not_elliptic']:.1%} of "
+            "the lattice volume: struts buckle there, and the result depends on the mesh. Compare two "
+            "meshes (--refine)."
+        )

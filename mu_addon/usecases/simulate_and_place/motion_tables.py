@@ -1,0 +1,105 @@
+"""Tables of a study's motion: angle, stretch and self-contact of every state, and its states for ParaView."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...fem.kinematics import TipSection
+from ...fem.state import State
+from ...fem.stress import peak_stretch
+from ...files import write_csv
+from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
+from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
+from ...report.vtk import write_trajectory
+
+if TYPE_CHECKING:
+    from ...fem.model import Model
+    from .job import Job
+
+Array = np.ndarray[Any, Any]
+Row = tuple[str, ...]
+
+
+def in_order(job: Job, states: Sequence[State]) -> list[tuple[float, State]]:
+    """Pressure in kPa and state of a motion as far as it was computed.
+
+    One state a pressure, ascending; one an instant where contact, the wall or an effect has history.
+    """
+    if _has_history(job):
+        return [(p, s) for _, p, s in instants(job, states)]
+    return [(s.pressure_kPa, s) for s in sorted(states, key=lambda s: s.pressure_MPa)]
+
+
+def instants(job: Job, states: Sequence[State]) -> list[tuple[float, float, State]]:
+    """Time in s, supplied pressure in kPa and state of every instant of the protocol that was reached."""
+    time, effective = job.samples
+    by_pressure = {round(s.pressure_kPa, 9): s for s in states}
+    at = states if job.in_time else [by_pressure.get(p) for p in effective.tolist()]
+    found = zip(time.tolist(), job.supplied_kPa.tolist(), at, strict=False)
+    return [(t, p, state) for t, p, state in found if state is not None]
+
+
+def _has_history(job: Job) -> bool:
+    """Return True if the way back differs, so that tables have an instant a row."""
+    return job.in_time or job.effects.in_time
+
+
+def write_motion(folder: Path, job: Job, mesh: Mesh, states: Sequence[State]) -> dict[str, float]:
+    """Write angle.csv and model_a.pvd; return the angle in degrees by pressure. Raises OutputError."""
+    tip = TipSection.of(mesh)
+    reached = instants(job, states)
+    if _has_history(job):
+        rows: list[Row] = [
+            (f"{t:.9g}", f"{p:.6g}", f"{tip.angle_deg(s.u):.6g}", f"{s.pressure_kPa:.6g}")
+            for t, p, s in reached
+        ]
+        head = ["time_s", "pressure_kPa", "angle_deg"]
+        if job.effects.in_time:
+            # The effective pressure of the unit without the effects in time.
+            head.append("effective_kPa")
+        # Of a pressure met twice, what it was the first time.
+        first = {p: float(a) for _, p, a, _ in reversed(rows)}
+        angles = dict(sorted(first.items(), key=lambda item: float(item[0])))
+    else:
+        head = ["pressure_kPa", "angle_deg"]
+        found = [(f"{p:.6g}", tip.angle_deg(s.u)) for p, s in in_order(job, states)]
+        angles = dict(found)
+        rows = [(p, f"{a:.6g}") for p, a in found]
+    write_csv(folder / "angle.csv", head, [row[: len(head)] for row in rows])
+    write_trajectory(folder / "model_a.pvd", mesh, [(t, s) for t, _, s in reached])
+    return angles
+
+
+def write_stretch(folder: Path, mesh: Mesh, states: Sequence[State]) -> list[Row]:
+    """Write the largest stretches of wall and lattice in every state, and where; return the rows."""
+    rows: list[Row] = []
+    struts = "struts" if mesh.resolved else "homogenised lattice"
+    for state in states:
+        for part, region in (("wall", MEMBRANE), (struts, LATTICE)):
+            peak = peak_stretch(mesh, state.u, region)
+            place = (f"{x:.2f}" for x in peak.place_mm)
+            values = (f"{peak.largest:.4f}", *place, f"{peak.exceeded:.4f}")
+            rows.append((f"{state.pressure_kPa:.6g}", part, *values))
+    write_csv(folder / "stretch.csv", list(STRETCH_COLUMNS), rows)
+    return rows
+
+
+def write_self_contact(folder: Path, model: Model, states: Sequence[State]) -> tuple[list[Row], list[Array]]:
+    """Write the self-contact of every state; return the rows and the pressures (n,) in kPa at all nodes."""
+    if model.self_contact is None:
+        return [], []
+    found = [model.self_contact.touch(state.u) for state in states]
+    rows: list[Row] = []
+    for state, touch in zip(states, found, strict=True):
+        row = [f"{state.pressure_kPa:.6g}", f"{touch.force_N:.4g}", "", "", "", "", ""]
+        if touch.force_N:
+            node = int(touch.pressure_kPa.argmax())
+            place = (f"{x:.2f}" for x in model.mesh.nodes[node])
+            row[2:] = [f"{touch.gap_mm:.4f}", f"{touch.pressure_kPa[node]:.4g}", *place]
+        rows.append(tuple(row))
+    write_csv(folder / "self_contact.csv", list(SELF_CONTACT_COLUMNS), rows)
+    return rows, [touch.pressure_kPa for touch in found]

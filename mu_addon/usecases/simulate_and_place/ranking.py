@@ -1,0 +1,131 @@
+"""The candidates of a study against Model A, and their ranking by deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from ...files import write_csv, write_npz
+from ...placement.candidates import Candidate, Evaluation
+from ...placement.deviation import rank
+from .candidate_states import CandidateSolver
+from .candidates_in_time import evaluations
+from .path_motion import keep_motion
+
+if TYPE_CHECKING:
+    from ...fem.trajectory import Trajectory
+    from ...meshing.mesh import Mesh
+    from ...run.cache import Cache
+    from .job import Job
+
+Array = np.ndarray[Any, Any]
+
+COLUMNS = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
+
+
+@attrs.define
+class Ranking:
+    """Evaluations of candidates by path and rule, and the mesh uncertainty of each rule's J_hat in mm."""
+
+    evaluations: dict[tuple[str, str], Evaluation] = attrs.field(factory=dict)
+    uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
+
+    def tied(self, rule: str, chosen: str) -> list[str]:
+        """Paths whose J_hat differs from the chosen one's by less than the mesh uncertainty."""
+        J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
+        limit = self.uncertainty_mm.get(rule, 0.0)
+        return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
+
+    def write(self, folder: Path, job: Job, paths: Sequence[Candidate]) -> dict[str, Any]:
+        """Write deviation.csv and delta.npz; return the figures of the summary. Raises OutputError."""
+        chosen, rows, arrays = {}, [], {}
+        J_hat: dict[str, dict[str, float]] = {}
+        J_cont: dict[str, dict[str, float]] = {}
+        for rule in job.rules:
+            found = [self.evaluations[c.name, rule] for c in paths]
+            ranks = rank(np.array([e.deviation.J_hat for e in found]))
+            chosen[rule] = found[int(np.argmin(ranks))].name
+            for c, e, r in zip(paths, found, ranks, strict=True):
+                d = e.deviation
+                rows.append((c.name, c.start, c.length, rule, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r)))
+            arrays[f"delta_{rule}_mm"] = np.array([e.deviation.delta for e in found])
+            J_hat[rule] = {e.name: e.deviation.J_hat for e in found}
+            J_cont[rule] = {e.name: e.deviation.J_cont for e in found}
+        write_csv(folder / "deviation.csv", COLUMNS, rows)
+        arrays |= {
+            "path": np.array([c.name for c in paths]),
+            "time_s": job.samples[0],
+            "pressure_kPa": job.supplied_kPa,
+            "station": np.linspace(0, 1, job.stations),
+        }
+        write_npz(folder / "delta.npz", arrays)
+        return {
+            "J_hat_mm": J_hat,
+            "J_cont_mm": J_cont,
+            "chosen": chosen,
+            "mesh_uncertainty_mm": self.uncertainty_mm,
+            "tied_with_chosen": {rule: self.tied(rule, chosen[rule]) for rule in job.rules},
+        }
+
+
+def solve_candidates(
+    job: Job,
+    cache: Cache,
+    mesh: Mesh,
+    trajectory: Trajectory,
+    jobs: list[tuple[Candidate, str]],
+    on_progress: Callable[[float], None],
+    under_way: CandidateSolver | None = None,
+    verify: bool = False,
+    shown: tuple[Path, Mesh] | None = None,
+) -> tuple[list[Evaluation], dict[str, Any]]:
+    """Evaluation of every (candidate, rule) on a mesh against its Model A, and the summary's figures on it.
+
+    under_way: a solver that was given Model A's states as they were found; verify: see
+    `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
+    study, which is the same or the half of it. Raises ConvergenceError.
+    """
+    if job.in_time:
+        found = evaluations(job, cache, mesh, trajectory, jobs, on_progress)
+        return found, {"along_paths": True}
+    whole = job.headline_rule if shown else ""
+    solver = under_way or CandidateSolver(job, cache, mesh, jobs, trajectory.pressure_kPa, whole)
+    with closing(solver):
+        found = solver.evaluations(trajectory, on_progress, verify)
+        if shown:
+            keep_motion(job, *shown, mesh, trajectory, solver, jobs)
+    return found, {
+        "pressures_solved_kPa": solver.solved_kPa,
+        "relative_error_between": solver.error,
+        "path_difference_mm": solver.path_difference_mm,
+        "independent_of_path": solver.independent_of_path,
+    }
+
+
+def mesh_change_mm(
+    job: Job, fine: dict[tuple[str, str], Evaluation], coarse: Sequence[Evaluation], instants: Sequence[int]
+) -> dict[str, float]:
+    """Largest change of any path's J_hat in mm on a coarser mesh, by rule.
+
+    instants: those of the fine mesh that the coarse one was solved at; the relative change of the deviation
+    there stands for that of J_hat.
+    """
+    change = dict.fromkeys(job.rules, 0.0)
+    for found in coarse:
+        deviation = fine[found.name, found.rule].deviation
+        same = deviation.delta[list(instants)].mean()
+        # A sensor as soft as the lattice disturbs nothing, on any mesh.
+        scale = deviation.J_hat / same if same else 0.0
+        change[found.rule] = max(change[found.rule], abs(found.deviation.J_hat - same) * scale)
+    return change
+
+
+def extremes(pressure_kPa: Array) -> Array:
+    """Extreme pressures of a protocol, ascending, without 0."""
+    found = np.unique([pressure_kPa.min(), pressure_kPa.max()])
+    return found[found != 0]
