@@ -120,20 +120,10 @@ def add_resin(command: argparse.ArgumentParser) -> None:
 
 def add_solver(command: argparse.ArgumentParser) -> None:
     """--solver and --device."""
-    command.add_argument(
-        "--solver",
-        choices=("auto", "direct", "iterative"),
-        default="auto",
-        help="Solver of linear systems: a factorisation, or conjugate gradients on two levels of elements. "
-        "auto: direct, unless the factor does not fit into memory (default: auto).",
-    )
-    command.add_argument(
-        "--device",
-        default="auto",
-        metavar="auto|cpu|cuda:0",
-        help="Device for the finite elements. auto: a CUDA device if there is one and the mesh has 200 000 "
-        "unknowns or more, otherwise the CPU (default: auto).",
-    )
+    from ..fem.solver import DEVICE, SOLVER
+
+    add_setting(command, SOLVER)
+    add_setting(command, DEVICE, "auto|cpu|cuda:0")
 
 
 def solver_of(options: argparse.Namespace) -> SolverChoice:

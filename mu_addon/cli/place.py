@@ -15,6 +15,7 @@ from .options import (
     add_simulation,
     add_solid,
     add_unit,
+    help_of,
 )
 from .study_job import run
 
@@ -26,6 +27,7 @@ __all__ = ["add", "run"]
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
+    from ..placement.settings import BEND, LONGEST, RULE, SHORTEST
     from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 
     command = commands.add_parser(
@@ -44,12 +46,8 @@ def add(commands: Commands[Any]) -> None:
     add_obstacles(command)
     add_simulation(command)
     add_setting(command, STATIONS, "J")
-    command.add_argument(
-        "--rule",
-        choices=("both", "intersect", "volume_fraction"),
-        help="Inclusion rule of a homogenised unit: how the sensor stiffens the elements it intersects "
-        "(default: both).",
-    )
+    # None without the option: it asks for a homogenised unit.
+    command.add_argument("--rule", choices=RULE.choices, help=help_of(RULE))
     add_setting(command, WORKERS, "N")
     add_setting(command, MESH_CHECK)
     add_setting(command, PATHS)
@@ -62,26 +60,8 @@ def add(commands: Commands[Any]) -> None:
         "0.02, assumed).",
     )
     search = command.add_argument_group("limits of --paths graph")
-    search.add_argument(
-        "--shortest-cells",
-        type=float,
-        default=2.0,
-        metavar="C",
-        help="Length of the shortest path, in cells (default: 2).",
-    )
-    search.add_argument(
-        "--longest-cells",
-        type=float,
-        default=float("inf"),
-        metavar="C",
-        help="Length of the longest path, in cells (default: no limit).",
-    )
-    search.add_argument(
-        "--bend-deg",
-        type=float,
-        default=75.0,
-        metavar="A",
-        help="Largest bend at a node, in degrees (default: 75).",
-    )
+    add_setting(search, SHORTEST, "C")
+    add_setting(search, LONGEST, "C")
+    add_setting(search, BEND, "A")
     add_setting(search, CHECKS, "N")
     command.set_defaults(stages=("design", "simulate", "place"))

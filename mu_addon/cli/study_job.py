@@ -25,7 +25,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     from ..homogenize.effective import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
-    from ..placement.inclusion import RULES
+    from ..placement.settings import rules_of
     from ..usecases.simulate_and_place.extended_unit import require_same_print
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
@@ -46,10 +46,9 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:
-        rules = RULES if options.rule in (None, "both") else (options.rule,)
         extra |= {
             "stations": options.stations,
-            "rules": rules,
+            "rules": rules_of(options.rule),
             "workers": options.workers,
             "mesh_check": options.mesh_check,
             "paths": options.paths,

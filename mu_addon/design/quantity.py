@@ -90,7 +90,8 @@ class Description(NamedTuple):
     def _is_out_of_bounds(self, value: Any) -> bool:
         if self.type not in (int, float):
             return False
-        return not (math.isfinite(value) and self.low <= value <= self.high)
+        bounded = math.isfinite(value) or value == self.high
+        return not (bounded and self.low <= value <= self.high)
 
     def field(self) -> Any:
         """The attrs field of a job that has this setting."""

@@ -29,6 +29,7 @@ from .lattice import Graph, Lattice, graph_of, with_struts
 from .parameters import Chambers, Envelope, Unit, Waveguide
 from .profile import cavity_polygon, outer_polygon, outer_radius
 from .quantity import describe
+from .settings import QUALITY
 from .solid import Solid, build_solid
 from .waveguide import Bar, waveguide
 
@@ -55,7 +56,7 @@ class StepInputs:
     unit: Unit
     path: str = ""
     muted: frozenset[str] = attrs.field(default=frozenset(), converter=frozenset)
-    quality: str = "interactive"
+    quality: str = QUALITY.default
     body: Body | None = None
 
     def __attrs_post_init__(self) -> None:

@@ -8,15 +8,28 @@ from typing import TYPE_CHECKING
 
 import attrs
 
+from ..design.quantity import described
 from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
 
-METHODS = ("auto", "direct", "iterative")
 # At so many unknowns a factorisation on the CPU takes 8 s, a load step 12 (docs/engineering/performance.md);
 # below it an iterative solution on a device has little to win, above it that much. Reckoned, not measured.
 CUDA_PAYS = 200_000
+SOLVER = described(
+    "solver",
+    "auto",
+    "solver of linear systems: a factorisation, or conjugate gradients on two levels of elements. auto: "
+    "direct, unless the factor does not fit into memory",
+    choices=("auto", "direct", "iterative"),
+)
+DEVICE = described(
+    "device",
+    "auto",
+    f"device for the finite elements. auto: a CUDA device if there is one and the mesh has {CUDA_PAYS:_} "
+    "unknowns or more, otherwise the CPU".replace("_", " "),
+)
 # Measured peak of a quadratic body's factorisation: 6.26 GB at 435 819 unknowns, to the power 0.93 of them.
 _PEAK_BYTES, _PEAK_UNKNOWNS, _PEAK_POWER = 6.26e9, 435_819, 0.93
 
@@ -33,14 +46,10 @@ class SolverChoice:
     that is not known.
     """
 
-    method: str = "auto"
-    device: str = "auto"
+    method: str = SOLVER.field()
+    device: str = DEVICE.field()
 
     def __attrs_post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise InputError(
-                f"there is no solver {self.method!r}", "--solver", f"choose from {', '.join(METHODS)}"
-            )
         if not re.fullmatch(r"auto|cpu|cuda:\d+", self.device):
             raise InputError(f"there is no device {self.device!r}", "--device", "give auto, cpu or cuda:0")
 

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from .graph import Graph as Graph
     from .graph import Limits as Limits
     from .graph import lattice_graph as lattice_graph
-    from .inclusion import RULES as RULES
     from .inclusion import Inclusion as Inclusion
     from .inclusion import sensor_share as sensor_share
     from .inclusion import straight_inclusion as straight_inclusion
@@ -41,5 +40,6 @@ if TYPE_CHECKING:
     from .search import Search as Search
     from .search import SearchSettings as SearchSettings
     from .search import search_paths as search_paths
+    from .settings import RULES as RULES
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -16,8 +16,9 @@ from ..fem.model import Model
 from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
 from .deviation import Deviation, centreline, centreline_deviation
-from .inclusion import PRINTED, Inclusion, sensor_share, stiffened_volume_mm3
+from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
 from .polyline import polyline_inclusion
+from .settings import PRINTED
 
 Array = np.ndarray[Any, Any]
 

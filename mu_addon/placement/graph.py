@@ -14,6 +14,7 @@ from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
 from ..design.profile import outer_radius
 from ..errors import InputError
+from .settings import BEND, LONGEST, SHORTEST
 
 Array = np.ndarray[Any, Any]
 
@@ -23,26 +24,16 @@ _ALONG_STEP = 25
 _PROFILE = 0.1
 
 
-def _positive(_: object, field: attrs.Attribute[float], value: float) -> None:
-    if not value > 0:
-        raise InputError(
-            f"{field.name} = {value!r} is not positive", "limits of the paths", "give more than 0"
-        )
-
-
 @attrs.frozen
 class Limits:
-    """Limits of a path: its least and largest length, and its sharpest bend.
+    """Limits of a path: its least and largest length in cells, and its sharpest bend.
 
-    Lengths are in cells; a window of h anchors is h - 1 cells long, so the source paper's h >= 3 is 2 cells.
-    The bend is assumed, since the paper's paths are straight: 75 degrees allows the zigzag from one
-    half-diagonal to a neighbouring one (70.5) and refuses a step across from one along the axis (90). Raises
-    InputError for a limit that is not positive.
+    Raises InputError for a limit that is out of bounds.
     """
 
-    shortest_cells: float = attrs.field(default=2.0, validator=_positive)
-    longest_cells: float = attrs.field(default=np.inf, validator=_positive)
-    sharpest_bend_deg: float = attrs.field(default=75.0, validator=_positive)
+    shortest_cells: float = SHORTEST.field()
+    longest_cells: float = LONGEST.field()
+    sharpest_bend_deg: float = BEND._replace(name="sharpest_bend_deg").field()
 
 
 @attrs.frozen(eq=False)

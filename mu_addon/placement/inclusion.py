@@ -8,11 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from .settings import RULES
 
-RULES = ("intersect", "volume_fraction")
-PRINTED = "printed"
-"""Used in place of a rule: the waveguide itself, with wells and seats, in a mesh of the printed unit."""
+Array = np.ndarray[Any, Any]
 
 # Between two vertex heights the slice area is smooth but where an edge meets the circle: many short
 # Gauss rules lose less at such a kink than one long one.

@@ -46,7 +46,7 @@ def test_a_cuda_device_is_taken_where_it_is_there_and_pays(monkeypatch):
 
 
 def test_names_that_are_not_known_are_refused():
-    with pytest.raises(InputError, match="no solver 'multigrid'"):
+    with pytest.raises(InputError, match="solver = 'multigrid' is not known"):
         SolverChoice("multigrid")
     with pytest.raises(InputError, match="no device 'gpu'"):
         SolverChoice(device="gpu")

@@ -18,7 +18,8 @@ from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, evaluate, evaluation, moved_points, roi
-from mu_addon.placement.inclusion import RULES, sensor_share
+from mu_addon.placement.inclusion import sensor_share
+from mu_addon.placement.settings import RULES
 
 UNIT = load_preset("mu-1.0x")
 COARSE = MeshSettings(refine=0.5)

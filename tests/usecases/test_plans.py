@@ -6,7 +6,7 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import Unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.inclusion import PRINTED, RULES
+from mu_addon.placement.settings import PRINTED, RULES
 from mu_addon.run import progress
 from mu_addon.usecases.simulate_and_place import job as study
 from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work

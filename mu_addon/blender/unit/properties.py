@@ -21,6 +21,7 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
+from ...fem.solver import DEVICE, SOLVER
 from ...meshing.settings import STUDY_SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
 from ..shared.registration import property_group_factory
@@ -114,7 +115,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
             ("direct", "Factorisation", "The fastest as long as it fits into memory"),
             ("iterative", "Iterative", "Little memory, slow: for the motion of very fine meshes"),
         ],
-        default="auto",
+        default=SOLVER.default,
     )
     device: EnumProperty(
         name="Device",
@@ -124,7 +125,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
             ("cpu", "CPU", "The processor"),
             ("cuda:0", "CUDA", "The first CUDA device"),
         ],
-        default="auto",
+        default=DEVICE.default,
     )
     protocol: blender_property(PROTOCOL, options=BESIDE_BLEND_FILE, subtype="FILE_PATH")
     orientation_deg: blender_property(ORIENTATION, name="Gravity (deg)", precision=1, step=100)

@@ -18,7 +18,7 @@ from ...graph.evaluation import Finished, Order
 from ...homogenize.effective import Effective, read_effective
 from ...measured import Measured
 from ...meshing.settings import MeshSettings
-from ...placement.inclusion import PRINTED, RULES
+from ...placement.settings import PRINTED, rules_of
 from ..check_print.job import Job as CheckJob
 from ..check_print.run import USE_CASE as CHECK
 from ..diagnose.job import Job as DiagnoseJob
@@ -39,7 +39,6 @@ from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
 from ..simulate_and_place.run import USE_CASE as STUDY
 from .parts import Design, refuse_body, solid_of
-from .study_nodes import BOTH
 
 
 @attrs.frozen(eq=False)
@@ -92,11 +91,10 @@ def _simulated(call: Call) -> Job:
 def _placed(call: Call) -> Job:
     """Study of a node Rank Paths: the simulated one with its paths. Raises InputError."""
     s, study = call.settings, call.inputs["study"]
-    rules = RULES if s["rule"] == BOTH else (s["rule"],)
     return attrs.evolve(
         study.job,
         stages=("design", "simulate", "place"),
-        rules=(PRINTED,) if study.job.mesh.resolved else rules,
+        rules=(PRINTED,) if study.job.mesh.resolved else rules_of(s["rule"]),
         stations=s["stations"],
         mesh_check=s["mesh_check"],
         paths=s["paths"],

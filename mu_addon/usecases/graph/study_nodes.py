@@ -9,7 +9,7 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ...placement.inclusion import RULES
+from ...placement.settings import RULE
 from ..export import settings as export
 from ..grip.settings import COARSE, CUBES, DENSITY
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
@@ -31,7 +31,6 @@ from .loading import of_orders
 from .parts import refuse_body
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
-BOTH = "both"
 
 
 def _gripper(call: Call) -> Outputs:
@@ -125,12 +124,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "sensor paths, ranked by how much each disturbs the motion",
             (_TAKES_STUDY,),
             (Output("study", "study", "motion and ranking"),),
-            (
-                setting(
-                    "rule", BOTH, "how the sensor stiffens the elements it meets", choices=(BOTH, *RULES)
-                ),
-                *(Setting(d) for d in (STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),
-            ),
+            (*(Setting(d) for d in (RULE, STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),),
             order=of_orders("place_order"),
             read=of_orders("study_of"),
             muting="the study passes on without a ranking",

@@ -12,7 +12,7 @@ from ...design.parameters import to_toml as unit_toml
 from ...design.settings import QUALITY
 from ...errors import InputError
 from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
-from ...placement.inclusion import PRINTED, RULES
+from ...placement.settings import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...sensing.optics import Optics

@@ -29,7 +29,8 @@ from ...fem.unit_materials import materials_of, self_contact_of
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor
-from ...placement.inclusion import PRINTED, sensor_share
+from ...placement.inclusion import sensor_share
+from ...placement.settings import PRINTED
 from ...resolved.candidates import PrintedWaveguides
 from ..simulate_and_place.job import grasp as grasp_protocol
 from ..simulate_and_place.job import in_time_newton

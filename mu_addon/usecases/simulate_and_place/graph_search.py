@@ -16,7 +16,6 @@ from ...fem.trajectory import Trajectory
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
-from ...placement.inclusion import PRINTED
 from ...placement.influence import (
     Parity,
     deviation_map,
@@ -31,6 +30,7 @@ from ...placement.influence import (
 )
 from ...placement.response import Response, reduced_response
 from ...placement.search import SearchSettings, front, search_paths
+from ...placement.settings import PRINTED
 from ...placement.whole_body import whole_body
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields

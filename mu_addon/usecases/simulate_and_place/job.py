@@ -29,7 +29,7 @@ from ...fem.protocol import Protocol, read_protocol
 from ...fem.solver import SolverChoice
 from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
 from ...placement.graph import Limits
-from ...placement.inclusion import PRINTED, RULES
+from ...placement.settings import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock

@@ -17,6 +17,7 @@ from ...evidence.prediction.effective_pressure import in_the_chambers, remembere
 from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED, TWO_VOLUMES
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
+from .settings import ORIENTATION
 
 if TYPE_CHECKING:
     from ...design.parameters import Unit
@@ -69,7 +70,7 @@ class NamedEffects:
     """
 
     values: Values = attrs.field(default=_NONE)
-    orientation_deg: float = 0.0
+    orientation_deg: float = ORIENTATION.default
     where: str = attrs.field(default="effects", eq=False, repr=False)
 
     def __attrs_post_init__(self) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, roi, with_sensor
-from ...placement.inclusion import PRINTED, sensor_share
+from ...placement.inclusion import sensor_share
+from ...placement.settings import PRINTED
 from .motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
