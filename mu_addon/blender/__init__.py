@@ -61,6 +61,7 @@ _MODULES = (
     "node_tree.operators",
     "scene.dropping",
     "scene.handles",
+    "scene.tool",
     "simulate.timings",
     # Drawing; panels appear in the sidebar in this order, that of the work.
     "unit.panel",

@@ -78,6 +78,12 @@ ITEMS = [
 ]
 
 
+def parameter_of(root: Any, handle: Handle) -> tuple[Any, str]:
+    """Group and name of the property that a handle drags."""
+    group = getattr(root.mu_unit, handle.section)
+    return group, field(group, stack.description(handle.section, handle.name))
+
+
 def pressure_of(root: Any, scene: Any) -> float:
     """Pressure in kPa of a unit bent live, or at the scene's frame of the motion that it shows."""
     if live.is_seen(root):
@@ -187,8 +193,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
         return stack.description(handle.section, handle.name)
 
     def _field(self):
-        group = getattr(self._root.mu_unit, HANDLES[self.what].section)
-        return group, field(group, self._described())
+        return parameter_of(self._root, HANDLES[self.what])
 
     def _step(self) -> float:
         return 0.5 if self.what == PRESSURE else step_of(self._described().high) / 100.0

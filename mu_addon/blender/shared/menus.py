@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene import handles
 from ..unit import presets
 from . import displays
 
@@ -55,8 +56,8 @@ class MU_MT_object(bpy.types.Menu):
         layout = self.layout
         # In the layout's own context: chosen from the search, too, a drag needs the 3D view.
         layout.operator_context = "INVOKE_REGION_WIN"
-        for name in ("wall", "bladder", "cell", "pressure"):
-            layout.operator("mu.drag", text=f"Drag {name.capitalize()}", icon="ARROW_LEFTRIGHT").what = name
+        for key, name, _ in handles.ITEMS:
+            layout.operator("mu.drag", text=f"Drag {name}", icon="ARROW_LEFTRIGHT").what = key
         layout.separator()
         layout.operator("mu.simulate", icon="PLAY")
         layout.operator_menu_enum("mu.field_show", "field", text="Show on the Unit", icon="SHADING_RENDERED")

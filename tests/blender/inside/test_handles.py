@@ -9,7 +9,7 @@ import pytest
 from mathutils import Matrix
 
 from mu_addon.blender.results import runs
-from mu_addon.blender.scene import handles
+from mu_addon.blender.scene import handles, tool
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 
@@ -138,3 +138,17 @@ def test_a_broken_rule_leaves_the_arrows_where_they_were():
     root.mu_unit.chambers.wall_mm = 3.0
     assert hand.invoke(context, event("LEFTMOUSE")) == {"CANCELLED"}
     assert "wall" in hand.report.call_args.args[1]
+
+
+def test_the_tools_header_shows_the_value_that_it_drags():
+    root = add(preset="mu-1.0x")
+    chosen = SimpleNamespace(what="")
+    for name in (*SIZES, handles.PRESSURE):
+        chosen.what = name
+        layout = MagicMock()
+        tool.MU_WT_size.draw_settings(
+            seen(root), layout, SimpleNamespace(operator_properties=lambda operator: chosen)
+        )
+        values = [getattr(*call.args) for call in layout.prop.call_args_list]
+        expected = {"wall": 0.9, "bladder": 25.0, "cell": 12.5}
+        assert values == pytest.approx([expected[name]] if name in expected else [])

@@ -13,6 +13,7 @@ from mu_addon.blender.jobs import start_child
 from mu_addon.blender.live import state as live
 from mu_addon.blender.live import words
 from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.scene import handles
 from mu_addon.blender.shared import displays
 from mu_addon.blender.unit import object as unit_object
 
@@ -57,6 +58,10 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     assert abs(live.angle_at(live.of(root).shape, 0.0)) < 1e-6
     assert np.abs(at_40 - rest).max() > np.abs(at_20 - rest).max() > 0.5
     assert np.ptp(rest[:, 1]) == pytest.approx(50.0), "as drawn, in millimetres"
+    # Its arrow drags the slider, and no frame.
+    assert handles.usable(root, handles.PRESSURE)
+    handles.to_pressure(root, bpy.context.scene, 25.0)
+    assert handles.pressure_of(root, bpy.context.scene) == root.mu_live.pressure_kPa == 25.0
     # At rest at once, then bent anew, by the same process.
     root.mu_live.pressure_kPa = 40.0
     pid = live.of(root).child.pid
