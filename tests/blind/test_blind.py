@@ -46,6 +46,9 @@ def test_where_the_mesh_s_error_would_do_in_an_effect_s_place_nothing_more_is_li
     assert not {"line_lag", "rate_independent_hysteresis", "fatigue_drift"} & set(row["ambiguity"])
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_laws.py::test_two_effects_that_pass_for_slow_noise_one_by_one_are_found_together"
+)
 def test_two_causes_are_found_though_neither_looks_best_alone():
     row = judged({"seed": 4100000, "dt": 0.3, "count": 5, "times": 8.0} | TWO)
     assert row["outcome"] in IN_SET

@@ -142,12 +142,17 @@ def test_wells_and_pockets_are_clear_of_struts(number):
 
 
 NIGHTLY = pytest.mark.nightly("test_every_gate_holds_with_a_waveguide")
+BY_DAY = {("mu-0.75x", 1517), ("mu-1.0x", "alpha4"), ("mu-1.5x", 1517)}
 
 
 @pytest.mark.parametrize(
-    "path", ["alpha4", 1517, pytest.param("alpha10", marks=NIGHTLY), pytest.param(2424, marks=NIGHTLY)]
+    ("name", "path"),
+    [
+        pytest.param(name, path, marks=() if (name, path) in BY_DAY else NIGHTLY)
+        for name in PRESETS
+        for path in ("alpha4", 1517, "alpha10", 2424)
+    ],
 )
-@pytest.mark.parametrize("name", PRESETS)
 def test_every_gate_holds_with_a_waveguide(name, path):
     g = built(name, path).gates
     bar = built(name, path).bar

@@ -71,13 +71,16 @@ def test_nothing_is_named_of_clean_steps():
     assert not verdict.names
 
 
+STEPS_BY_NIGHT = pytest.mark.nightly("test_inertia_line_and_resin_are_told_apart_by_steps")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "name"),
     [
         ({"hertz": 3.0, "damping": 0.12}, "inertia"),
-        ({"lag_s": 0.25}, "line_lag"),
-        ({"relaxing": 0.3}, "viscoelasticity"),
+        pytest.param({"lag_s": 0.25}, "line_lag", marks=STEPS_BY_NIGHT),
+        pytest.param({"relaxing": 0.3}, "viscoelasticity", marks=STEPS_BY_NIGHT),
     ],
 )
 def test_inertia_line_and_resin_are_told_apart_by_steps(hidden, name):

@@ -160,9 +160,17 @@ def test_a_nuisance_far_from_what_was_known_of_it_is_no_clean_bill(gain, kind, c
     assert found.ambiguity - {"viscoelasticity"} == causes
 
 
+BY_NIGHT = pytest.mark.nightly("test_what_does_not_matter_does_not_change_the_verdict")
+
+
 @pytest.mark.parametrize(
     "change",
-    ["later", "shuffled", "doubled marker", "every second sample"],
+    [
+        pytest.param("later", marks=BY_NIGHT),
+        "shuffled",
+        "doubled marker",
+        pytest.param("every second sample", marks=BY_NIGHT),
+    ],
 )
 def test_what_does_not_matter_does_not_change_the_verdict(lagging, change):
     made, before = lagging

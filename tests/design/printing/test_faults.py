@@ -206,12 +206,8 @@ def test_a_part_a_little_too_tall_is_not_taken_for_inches():
     assert "inches" not in found.what
 
 
-NIGHTLY = pytest.mark.nightly("test_the_presets_have_no_errors")
-
-
-@pytest.mark.parametrize(
-    "name", ["mu-0.75x", pytest.param("mu-1.0x", marks=NIGHTLY), pytest.param("mu-1.5x", marks=NIGHTLY)]
-)
+@pytest.mark.nightly("test_a_sound_unit_has_none_of_them")
+@pytest.mark.parametrize("name", ["mu-0.75x", "mu-1.0x", "mu-1.5x"])
 def test_the_presets_have_no_errors(name):
     from mu_addon.design.anchors import window
     from mu_addon.design.parameters import load_preset
