@@ -256,11 +256,18 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + 'fidelty = "resolved"\n' + ANGLE + WALL, "did you mean 'fidelity'", "line 3"),
         (HEAD + ANGLE + KIND, "no value of", "line 9"),
         (
-            HEAD + HOMOGENISED + ANGLE + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
+            HEAD
+            + HOMOGENISED
+            + ANGLE
+            + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
             "does not see",
             "line 8",
         ),
-        (HEAD + HOMOGENISED + ANGLE.replace("angle", "stretch") + 'region = "struts"\n' + WALL, "has no struts", "line"),
+        (
+            HEAD + HOMOGENISED + ANGLE.replace("angle", "stretch") + 'region = "struts"\n' + WALL,
+            "has no struts",
+            "line",
+        ),
         (HEAD + '[[target]]\nkind = "stiffness"\nlow = 1\n' + WALL, "not an axis", "direction"),
         (HEAD + SENSOR + WALL, "path", "path"),
         (ANGLE + WALL, "format", "format"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ...errors import InputError
 from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, setting
-from .loading import of_orders
+from .common import of_orders
 
 BENCH = "Bench"
 _ORDERS = "bench_orders"

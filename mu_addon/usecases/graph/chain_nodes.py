@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ...chain import settings as chain
 from ...graph.definition import FILE, Definition, Input, Output, Outputs, Setting, setting
-from .common_settings import ORDER
-from .loading import of_orders
+from .common import ORDER, of_orders
 
 CHAIN = "Chain"
 _ORDERS = "chain_orders"

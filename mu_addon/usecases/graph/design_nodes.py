@@ -15,7 +15,7 @@ from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .loading import of_orders
+from .common import of_orders
 from .parts import (
     SCALE,
     Design,

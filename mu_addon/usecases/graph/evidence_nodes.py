@@ -8,8 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
-from .common_settings import QUICK_FIDELITY, QUICK_SELF_CONTACT
-from .loading import of_orders
+from .common import QUICK_FIDELITY, QUICK_SELF_CONTACT, of_orders
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")

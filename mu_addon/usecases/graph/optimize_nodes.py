@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...graph.definition import FILE, Definition, Input, Output, Outputs, Setting, setting
 from ...optimization.settings import WORKERS
-from .loading import of_orders
+from .common import of_orders
 
 OPTIMIZE = "Optimize"
 _ORDERS = "optimize_orders"

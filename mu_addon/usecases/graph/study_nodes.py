@@ -15,7 +15,7 @@ from ..grip.settings import COARSE, CUBES, DENSITY
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
 from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
-from .common_settings import (
+from .common import (
     FIDELITY,
     ORDER,
     ORIENTATION,
@@ -26,8 +26,8 @@ from .common_settings import (
     SELF_CONTACT,
     SELF_FRICTION,
     TIMES,
+    of_orders,
 )
-from .loading import of_orders
 from .parts import refuse_body
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"

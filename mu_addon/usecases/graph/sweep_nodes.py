@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...errors import InputError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
 from ..parameter_study import settings as study
-from .common_settings import (
+from .common import (
     ORDER,
     PROTOCOL,
     QUICK_FIDELITY,
@@ -13,8 +13,8 @@ from .common_settings import (
     QUICK_SELF_CONTACT,
     QUICK_TIMES,
     SELF_FRICTION,
+    of_orders,
 )
-from .loading import of_orders
 from .parts import described
 
 STUDY = "Parameter Study"

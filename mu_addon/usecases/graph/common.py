@@ -1,6 +1,10 @@
-"""Settings that several nodes have."""
+"""What several kinds of nodes share: settings, and functions of modules that load the solver."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
 
 from ...graph.definition import FILE, Setting
 from ...meshing.settings import FIDELITY as FIDELITY_OF_MANY
@@ -19,3 +23,8 @@ PROTOCOL = Setting(study.PROTOCOL, FILE)
 ORDER, REFINE = Setting(ORDER_OF_ELEMENTS), Setting(REFINEMENT)
 QUICK_TIMES = Setting(study.TIMES._replace(default=7))
 QUICK_REFINE = Setting(REFINEMENT._replace(default=0.5))
+
+
+def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:
+    """A function of `orders`, or of another module beside it, which is imported on the first call."""
+    return lambda *given: getattr(import_module(f".{module}", __package__), name)(*given)
