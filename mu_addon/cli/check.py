@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_solid, add_unit, unit_if_named
+from .options import add_report, add_setting, add_solid, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `check`."""
+    from ..design.settings import PRINTER
+
     command = commands.add_parser(
         "check",
         help="Check the printability of a unit or an STL file and find the best build direction. Exit "
@@ -36,13 +38,7 @@ def add(commands: Commands[Any]) -> None:
         "A fault with more than one remedy is refused.",
     )
     command.add_argument("--path", metavar="NAME", help="Path of the unit's waveguide: alpha1, alpha2, ...")
-    command.add_argument(
-        "--printer",
-        default="form-4-elastic-50a",
-        metavar="NAME|FILE",
-        help="Limits of the printer and its resin: a shipped name or a TOML file (default: "
-        "form-4-elastic-50a).",
-    )
+    add_setting(command, PRINTER, "NAME|FILE")
     command.add_argument(
         "--limits",
         metavar="FILE",

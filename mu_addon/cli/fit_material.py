@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_measured_folder, add_report, add_results, require_out
+from .options import add_measured_folder, add_report, add_results, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `fit-material`."""
+    from ..materials.settings import WEIGHTS
+
     command = commands.add_parser(
         "fit-material",
         help="Fit hyperelastic laws to coupon tests and write the best one as a material for simulations.",
@@ -38,13 +40,7 @@ def add(commands: Commands[Any]) -> None:
         help="Test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear (default: "
         "none).",
     )
-    command.add_argument(
-        "--weights",
-        choices=("absolute", "relative"),
-        default="absolute",
-        help="Weights of the residuals: absolute divides them by the test's largest stress, relative by the "
-        "stress itself (default: absolute).",
-    )
+    add_setting(command, WEIGHTS)
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `specimens`."""
+    from ..design.settings import PRINTER
     from ..usecases.export.settings import RESIN
 
     command = commands.add_parser(
@@ -25,13 +26,8 @@ def add(commands: Commands[Any]) -> None:
     )
     add_unit(command, required=False)
     add_setting(command, RESIN, "NAME|FILE")
-    command.add_argument(
-        "--printer",
-        default="form-4-elastic-50a",
-        metavar="NAME|FILE",
-        help="Printer whose limits the parts named limit-... show: a shipped name or a TOML file (default: "
-        "form-4-elastic-50a).",
-    )
+    # The parts named limit-... show its limits.
+    add_setting(command, PRINTER, "NAME|FILE")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

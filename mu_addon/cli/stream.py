@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_results, require_out
+from .options import add_results, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -29,6 +29,8 @@ def add(commands: Commands[Any]) -> None:
 
 def add_source(command: argparse.ArgumentParser) -> None:
     """Add the options for source, duration and folder of a recording."""
+    from ..sensing.settings import BAUD
+
     add_results(command)
     command.add_argument(
         "--port",
@@ -36,13 +38,7 @@ def add_source(command: argparse.ArgumentParser) -> None:
         help="Serial port: a device name, or usb:VID:PID[:SERIAL], which identifies the board at any USB "
         "socket (default: the only USB serial port).",
     )
-    command.add_argument(
-        "--baud",
-        type=int,
-        default=115200,
-        metavar="B",
-        help="Baud rate in bits per second (default: 115200).",
-    )
+    add_setting(command, BAUD, "B")
     command.add_argument(
         "--simulate",
         action="store_true",
@@ -72,6 +68,7 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Stream until Ctrl-C."""
     from ..errors import InputError
+    from ..sensing.settings import BAUD
     from ..usecases.sensor.stream import serial_source, simulated_source, stream
 
     require_out(options)
@@ -79,8 +76,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         raise InputError(
             f"{options.seconds:g} s is no time to record", "--seconds", "give a number above zero"
         )
-    if options.baud <= 0:
-        raise InputError(f"{options.baud} is no rate", "--baud", "give bits a second, such as 115200")
+    BAUD.checked(options.baud)
     source = simulated_source() if options.simulate else serial_source(options.port, options.baud)
     about = {"source": "simulated" if options.simulate else options.port, "baud": options.baud}
     stream(

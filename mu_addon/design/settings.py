@@ -1,4 +1,4 @@
-"""Settings shared by many jobs: facets of a solid, friction, the default resin."""
+"""Settings shared by many jobs: facets of a solid, friction, printer, the default resin."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from .quantity import described
 USUAL_RESIN = "elastic-50a-v1"
 QUALITY = described(
     "quality", "interactive", "facet resolution of the printable surface", choices=("interactive", "export")
+)
+PRINTER = described(
+    "printer", "form-4-elastic-50a", "limits of the printer and its resin: a shipped name or a TOML file"
 )
 # Published coefficients of dry elastomers on hard plastics; the cautious end is taken.
 FRICTION = described(

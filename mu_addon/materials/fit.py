@@ -13,6 +13,7 @@ from .coupon import Array, Coupon, binned, incompressible
 from .forms import Form
 from .intervals import Parameter, intervals
 from .regression import Problem, best_exponents
+from .settings import WEIGHTS
 from .stability import Stability, check_stability, whole_ranges
 
 # Coupons do not determine the bulk modulus; this ratio is used for a nearly incompressible law.
@@ -21,7 +22,6 @@ POISSON = 0.499
 TOLERANCE = 0.10
 # Relative weights never ask for more than this share of a coupon's largest stress.
 FLOOR = 0.05
-WEIGHTS = ("absolute", "relative")
 
 
 @attrs.frozen
@@ -128,7 +128,7 @@ def fit_coupons(
     form: Form,
     coupons: Sequence[Coupon],
     held_out: Sequence[Coupon] = (),
-    weights: str = "absolute",
+    weights: str = WEIGHTS.default,
     poisson: float = POISSON,
     profile: bool = False,
 ) -> Fit:
@@ -142,8 +142,7 @@ def fit_coupons(
     are correlated. They hold for noise only, not where the law itself is wrong, which a large `memory`
     indicates. Raises InputError for unknown weights, too few values, or a coupon without stress.
     """
-    if weights not in WEIGHTS:
-        raise InputError(f"unknown weights {weights!r}", "fit", f"choose from {', '.join(WEIGHTS)}")
+    WEIGHTS.checked(weights)
     n = sum(len(c.stretch) for c in coupons)
     if n <= form.count:
         raise InputError(
@@ -175,7 +174,9 @@ def fit_coupons(
     )
 
 
-def leave_one_mode_out(form: Form, coupons: Sequence[Coupon], weights: str = "absolute") -> dict[str, float]:
+def leave_one_mode_out(
+    form: Form, coupons: Sequence[Coupon], weights: str = WEIGHTS.default
+) -> dict[str, float]:
     """Leave-one-out error of each mode, as a share of its stresses, with the law fitted to the others.
 
     {} where the coupons are of a single mode. Raises InputError and ConvergenceError as the fits do.

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import InputError
 from .framing import info_frame, sample_frame
 from .recording import Recording, read_recording
+from .settings import BAUD
 
 Array = np.ndarray[Any, Any]
 
@@ -93,7 +94,9 @@ class SerialLine:
     name: of the device file, or usb:VID:PID[:SERIAL]; baud: bits a second.
     """
 
-    def __init__(self, name: str, baud: int = 115200, list_ports: Callable[[], list[Port]] = ports) -> None:
+    def __init__(
+        self, name: str, baud: int = BAUD.default, list_ports: Callable[[], list[Port]] = ports
+    ) -> None:
         self.name, self.baud = name, baud
         self._list_ports = list_ports
         self._line: Any = None

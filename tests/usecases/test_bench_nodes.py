@@ -144,7 +144,7 @@ def test_a_recording_that_is_stopped_is_none_and_the_next_is_beside_it(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("given", "words"), [({"seconds": -1.0}, "no time to record"), ({"baud": 0}, "is no rate")]
+    ("given", "words"), [({"seconds": -1.0}, "no time to record"), ({"baud": 0}, "baud = 0 is out of bounds")]
 )
 def test_settings_that_cannot_be_are_refused(given, words):
     with pytest.raises(InputError, match=words):

@@ -133,7 +133,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
         ("treloar", (("yeoh",), ("planar",)), "there is no coupon of mode 'planar' to hold out"),
         ("treloar", (("yeoh",), ("uniaxial", "equibiaxial", "pure_shear")), "every coupon is held out"),
         ("nowhere", (), "cannot read experiments.toml"),
-        ("treloar", (("yeoh",), (), "equal"), "unknown weights 'equal'"),
+        ("treloar", (("yeoh",), (), "equal"), "weights = 'equal' is not known"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):

@@ -5,7 +5,9 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ...sensing.settings import BAUD
 from ..shared.registration import property_group_factory
+from ..unit.fields import blender_property
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import state as sensor
 
@@ -44,7 +46,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         search=_ports,
         search_options={"SUGGESTION"},
     )
-    baud: IntProperty(name="Baud", description="Bits a second", default=115200, min=300)
+    baud: blender_property(BAUD, name="Baud")
     replay: StringProperty(
         name="Recording",
         description="Folder of the recording to play",

@@ -12,9 +12,10 @@ from ...errors import InputError
 from ...reading import file_text, unreadable
 from ...toml_writer import Commented, toml_text
 from ..assets import asset_file, asset_names
+from ..settings import PRINTER
 from ..toml_text import parse, place
 
-DEFAULT = "form-4-elastic-50a"
+DEFAULT = PRINTER.default
 MEANING = {
     "build_x_mm": "size of the build volume along x",
     "build_y_mm": "size of the build volume along y",

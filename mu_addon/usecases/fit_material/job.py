@@ -9,8 +9,8 @@ import attrs
 
 from ...errors import InputError
 from ...materials.coupon import Coupon
-from ...materials.fit import WEIGHTS
 from ...materials.forms import FORMS, Form, form
+from ...materials.settings import WEIGHTS
 from ...measured import Measured, read_folder
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs, structured
@@ -34,13 +34,9 @@ class Job:
     measured: Measured
     laws: tuple[str, ...] = ()
     held_out_modes: tuple[str, ...] = ()
-    weights: str = "absolute"
+    weights: str = WEIGHTS.field()
 
     def __attrs_post_init__(self) -> None:
-        if self.weights not in WEIGHTS:
-            raise InputError(
-                f"unknown weights {self.weights!r}", "--weights", f"choose from {', '.join(WEIGHTS)}"
-            )
         for name in self.laws:
             form(name)
         _coupons(self.measured, self.held_out_modes)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...errors import InputError
-from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, setting
+from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, Setting, setting
+from ...sensing.settings import BAUD
 from .common import of_orders
 
 BENCH = "Bench"
@@ -48,7 +49,7 @@ def bench_nodes() -> tuple[Definition, ...]:
             outputs=(Output("recording", "recording", "its samples"),),
             settings=(
                 setting("port", "", "serial port, or usb:VID:PID; empty: the only USB one"),
-                setting("baud", 115200, "bits a second", low=300, high=10_000_000),
+                Setting(BAUD),
                 setting("simulated", False, "a simulated sensor that bends to and fro, in place of a port"),
                 setting("seconds", 10.0, "duration", unit="s", low=0.1, high=86_400),
                 setting(

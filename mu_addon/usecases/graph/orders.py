@@ -12,6 +12,7 @@ from ...design.anchors import window
 from ...design.gates import GateError
 from ...design.printing.printer import load_printer
 from ...design.rigid_body import require_beside
+from ...design.settings import PRINTER
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
@@ -172,7 +173,7 @@ def check_order(call: Call) -> Order:
         raise InputError(f"{direction} is not a direction", "up_x, up_y, up_z", "give one, such as 0, 0, 1")
     refuse_body(design, "the print check")
     job = CheckJob(
-        printer=load_printer(s["printer"] or "form-4-elastic-50a"),
+        printer=load_printer(s["printer"] or PRINTER.default),
         unit=design.unit,
         window=_window(design),
         quality=s["quality"],

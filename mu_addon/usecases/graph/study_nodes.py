@@ -6,7 +6,7 @@ from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
 from ...design.rigid_body import RigidBody
-from ...design.settings import FRICTION, QUALITY
+from ...design.settings import FRICTION, PRINTER, QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...placement.settings import RULE
@@ -183,7 +183,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (_TAKES_UNIT,),
             (Output("check", "print check", "findings"),),
             (
-                setting("printer", "", "shipped printer or its TOML file; empty: Form 4 with Elastic 50A"),
+                Setting(PRINTER),
                 setting("up_x", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
                 setting("up_y", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
                 setting("up_z", 1.0, "build direction, away from the platform", low=-1e3, high=1e3),

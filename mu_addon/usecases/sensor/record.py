@@ -13,6 +13,7 @@ from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.usecase import UseCase
 from ...sensing.session import Control, run_session
+from ...sensing.settings import BAUD
 from ...toml_writer import toml_text
 from .stream import console_summary, ctrl_c_stops, require_samples, serial_source, simulated_source
 
@@ -34,7 +35,7 @@ class Job:
     """
 
     port: str = ""
-    baud: int = 115200
+    baud: int = BAUD.field()
     simulated: bool = False
     seconds: float = 10.0
     take: int = 1
@@ -44,8 +45,6 @@ class Job:
             raise InputError(
                 f"{self.seconds:g} s is no time to record", "seconds", "give a number above zero"
             )
-        if self.baud <= 0:
-            raise InputError(f"{self.baud} is no rate", "baud", "give bits a second, such as 115200")
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name."""
