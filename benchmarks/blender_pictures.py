@@ -72,7 +72,7 @@ def prepare():
 
 
 def _two_runs():
-    """A unit that was ranked with two walls, as a quick look."""
+    """A unit that was ranked with two walls, homogenised."""
     import mu_addon
     from mu_addon.blender.simulate.job import SIMULATION
 
@@ -82,7 +82,7 @@ def _two_runs():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "runs.blend"))
     assert bpy.ops.mu.add(preset="mu-1.0x") == {"FINISHED"}
     unit = bpy.context.view_layer.objects.active
-    unit.mu_unit.study.command, unit.mu_unit.study.detail = "place", "quick"
+    unit.mu_unit.study.command, unit.mu_unit.study.detail = "place", "full"
     for wall in (1.0, 0.9):
         unit.mu_unit.chambers.wall_mm = wall
         assert bpy.ops.mu.simulate() == {"FINISHED"}
@@ -301,7 +301,7 @@ def simulate():
     yield from added(preset="mu-0.75x")
     seen_from(20)
     study = root().mu_unit.study
-    study.command, study.detail = "place", "quick"
+    study.command, study.detail = "place", "full"
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     child = SIMULATION.child(root())
     while child.state == "running" and child.progress.get("stage") != "Model A":

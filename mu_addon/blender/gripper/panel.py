@@ -32,7 +32,14 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
 
     def show(self, layout, context, root):
         props = root.mu_gripper
-        layout.prop(root, "name")
+        row = layout.row(align=True)
+        row.prop(root, "name", text="")
+        row.operator("mu.gripper_delete", text="", icon="TRASH")
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
+        if props.trouble:
+            alert(layout, props.trouble)
         layout.prop(props, "path")
         for section in SECTIONS:
             column = layout.column(align=True)
@@ -40,11 +47,6 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
             for d in describe(section):
                 group = getattr(props, section.section)
                 column.prop(group, field(group, d))
-        row = layout.row()
-        row.use_property_split = False
-        row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
-        if props.trouble:
-            alert(layout, props.trouble)
 
 
 class MU_PT_grasp(GripperPanel, bpy.types.Panel):
@@ -90,7 +92,7 @@ def _found(layout, scene, root, found):
     column.active = not found.stale
     f = found.figures
     if f:
-        column.label(text=f"{f['angle_at_hold_deg']:.1f} deg, {f['normal_at_hold_N']:.2f} N a finger at hold")
+        column.label(text=f"{f['angle_at_hold_deg']:.1f}°, {f['normal_at_hold_N']:.2f} N a finger at hold")
         held, icon = ("Held", "CHECKMARK") if f["held"] else ("Slips", "ERROR")
         wrapped(column, f"{held}: friction carries {f['margin']:.2g} times the weight", icon)
         column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")

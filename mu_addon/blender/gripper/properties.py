@@ -86,7 +86,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         ),
         "cube_height": millimetres(
             10,
-            name="Its Height",
+            name="Cube Height",
             description="Of the middle of the cube above the plate",
             get=_cube_height,
             set=_put_cube,

@@ -14,6 +14,7 @@ from ...design.parameters import to_toml
 from ...errors import MuError
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
+from ...run.progress_estimate import Plan
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
@@ -31,7 +32,13 @@ def folder_of(root: Any) -> Path:
     return studies.default_folder(props.folder, props.title, props.uuid)
 
 
-GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True)
+def _plan_of(root: Any) -> Plan:
+    from ...usecases.grip.job import plan_of
+
+    return plan_of(job_of(root))
+
+
+GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True, plan_of=_plan_of)
 
 
 def job_of(root: Any) -> Job:

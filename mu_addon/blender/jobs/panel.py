@@ -65,7 +65,8 @@ def shortened(text: str, width: int) -> str:
 def _running(layout, child, prefix: str) -> None:
     """Draw Cancel, stage and time left of a child: Cancel first, since the rows below it change."""
     row = layout.row()
-    row.label(text=f"running for {spell(child.seconds)}" if child.state == RUNNING else "not started yet")
+    words = spell(child.seconds) if child.state == RUNNING else "Not started"
+    row.label(text=words, icon="TIME")
     row.operator(f"mu.{prefix}cancel", icon="CANCEL")
     fraction, text = whole(child, STAGE_LETTERS)
     layout.progress(factor=fraction, text=text)

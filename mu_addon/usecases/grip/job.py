@@ -15,12 +15,16 @@ from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact
 from ...placement.settings import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
+from ...run.progress_estimate import Plan
 from ...sensing.optics import Optics
 from ...toml_writer import toml_text
+from ..simulate_and_place.expected import BY_REFINEMENT
 from .grasp import OF_FIDELITY, Cube, Grip
 from .phases import Phases, read_phases, shipped_phases
 from .settings import COARSE_REFINE, REFINE, SIDES
 
+PRINTED_PACE = 10.0
+"""Factor on the seconds of a grasp by printed struts."""
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
     "grip.toml",
@@ -126,3 +130,12 @@ def read_job(folder: Path) -> Job:
     values, _ = read_inputs(path)
     given = {"gripper": read_gripper(folder / GRIPPER), "phases": read_phases(folder / PROTOCOL)}
     return structured(Job, values, str(path), **given)
+
+
+def plan_of(job: Job) -> Plan:
+    """Stages of a grasp with the expected seconds of each on two cores."""
+    seconds = 280.0 * (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
+    if job.mesh.resolved:
+        seconds *= PRINTED_PACE
+    grasps = [(f"grasp of {cube.side_mm:g} mm", seconds) for cube in job.cubes]
+    return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]

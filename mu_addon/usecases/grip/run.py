@@ -10,12 +10,10 @@ from ...fem.unit_materials import materials_of
 from ...meshing.homogenised_unit import mesh_unit
 from ...meshing.settings import MeshSettings
 from ...run.context import RunContext
-from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from ..simulate_and_place.expected import BY_REFINEMENT
 from .grasp import Cube
 from .gripping import Gripping
-from .job import LAYOUT, Job, read_job
+from .job import LAYOUT, Job, plan_of, read_job
 from .path_deviation import path_deviations
 from .report import write_report
 from .settings import REFINE, SIDES
@@ -61,13 +59,6 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
                 f"the paper's column {one['rank_correlation_with_paper']:.2f}"
             )
     return lines
-
-
-def plan_of(job: Job) -> Plan:
-    """Stages of a grasp with the expected seconds of each on two cores."""
-    seconds = 280.0 * (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
-    grasps = [(f"grasp of {cube.side_mm:g} mm", seconds) for cube in job.cubes]
-    return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]
 
 
 USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of)

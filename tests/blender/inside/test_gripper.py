@@ -213,7 +213,7 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
     props.cube_mm = 20.0
     found = grasps.of(root)
     assert not found.stale
-    assert "12.3 deg, 0.45 N" in drawn()
+    assert "12.3°, 0.45 N" in drawn()
     assert "Held: friction carries 4 times the weight" in drawn()
     scene = bpy.context.scene
     scene.render.fps = 10
