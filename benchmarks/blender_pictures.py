@@ -225,6 +225,19 @@ def steps():
     shot("muted")
 
 
+def live():
+    yield from new()
+    yield from added(cut=False, path="")
+    seen_from(20)
+    root().mu_live.on = True
+    while bending.of(root()).shape is None or len(bending.of(root()).shape.pressure_kPa) < 5:
+        yield 0.5
+    seen_from(20)
+    yield 1.0
+    shot("live")
+    root().mu_live.on = False
+
+
 def rule():
     yield from new()
     yield from added(preset="mu-1.5x")
@@ -316,6 +329,7 @@ def simulate():
 def obstacle():
     yield from new("MU_PT_simulate", "MU_PT_obstacles", file="obstacle.blend")
     assert called(bpy.ops.mu.field_show, field="displacement_mm") == {"FINISHED"}
+    handles.to_pressure(root(), bpy.context.scene, 40.0)
     yield 3.0
     seen_from(0, [root(), *root().children], 1.4)
     yield 2.0
@@ -327,6 +341,7 @@ def gripper():
     seen_from(14, [gripper_object.active(bpy.context), *gripper_object.active(bpy.context).children], 1.2)
     yield 2.0
     shot("gripper")
+    gripper_object.active(bpy.context).mu_gripper.cut = True
     assert called(bpy.ops.mu.grasp_show) == {"FINISHED"}
     scene = bpy.context.scene
     scene.frame_set(round(0.55 * scene.frame_end))
@@ -455,7 +470,7 @@ def track():
 
 
 PICTURES = {
-    "add": add, "steps": steps, "rule": rule, "paths": paths, "results-panel": results_panel,
+    "add": add, "steps": steps, "live": live, "rule": rule, "paths": paths, "results-panel": results_panel,
     "paint": paint, "print": print_part, "print-check": print_check, "simulate": simulate,
     "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
     "sensor-live": sensor_live, "track": track,
@@ -484,9 +499,10 @@ else:
     from simulated import called, event, key, module, move, package, parts, run
 
     unit_object, printing = module("blender.unit.object"), module("blender.printing.state")
+    handles = module("blender.scene.handles")
     gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
-    studies = module("blender.simulate.study_folder")
+    studies, bending = module("blender.simulate.study_folder"), module("blender.live.state")
     OPTIMIZATION = module("blender.optimize.state").OPTIMIZATION
     sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
     tracking, MarkerSettings = (
