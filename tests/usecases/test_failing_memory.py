@@ -56,7 +56,8 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
 
 
 @pytest.mark.slow
-def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [21, pytest.param(7, marks=pytest.mark.nightly("test_simulate"))])
+def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """From the solid on; all is solved anew, each time."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
     monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
@@ -64,7 +65,7 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)
 
-    assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=7) == []
+    assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
 @pytest.mark.parametrize("step", [151, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
@@ -98,14 +99,15 @@ def test_check(tmp_path: Path) -> None:
     assert inject_each(run, tmp_path, layer, MuError.status, step=61) == []
 
 
-def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])
+def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     monkeypatch.setattr(sweeping, "cluster_at", OneProcess)
     job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
 
     def run(folder: Path, context: RunContext) -> None:
         sweeping.USE_CASE.start(job, folder, context)
 
-    assert inject_each(run, tmp_path, any_array, MuError.status, ["points.csv"]) == []
+    assert inject_each(run, tmp_path, any_array, MuError.status, ["points.csv"], step=step) == []
 
 
 def test_record(tmp_path: Path) -> None:

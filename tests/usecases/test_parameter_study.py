@@ -80,7 +80,9 @@ def swept(text, folder, work=formula, status=0, **options):
 
 def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
     text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 1.0, 1.15, 2.5] }")
-    rows, _ = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path)
+    rows, messages = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path)
+    (plan,) = (m for m in messages if m["type"] == "plan")
+    assert {m["stage"] for m in messages if m["type"] == "progress"} <= {name for name, _ in plan["stages"]}
     assert [row["status"] for row in rows] == ["done", "done", "failed", "failed"]
     assert [float(row["mass_g"]) for row in rows[:2]] == pytest.approx([0.9 * 1.01, 1.0 * 1.01])
     assert [float(row["angle_range_deg"]) for row in rows[:2]] == pytest.approx([5 + 10 / 0.9, 15.0])

@@ -42,7 +42,12 @@ def messages_of(monkeypatch, tmp_path, words):
         ["fit-material", "tests/data/treloar", "--laws", "yeoh"],
         ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
         ["simulate", "--preset", "mu-0.75x", *STUDY],
-        ["sweep", "sweep.toml"],
+        pytest.param(
+            ["sweep", "sweep.toml"],
+            marks=pytest.mark.nightly(
+                "tests/usecases/test_parameter_study.py::test_every_point_is_a_row_whatever_became_of_it"
+            ),
+        ),
     ],
     ids=lambda words: words[0],
 )
