@@ -21,6 +21,8 @@ Array = np.ndarray[Any, Any]
 ITERATIONS = 25
 # Gain of chi squared below which a fit ends, at least; or share of its excess over the noise.
 GAIN, RELATIVE = 1e-2, 1e-4
+# A fit that is expected to gain less than this share of its excess over one from another start is ended.
+ALIKE = 1e-3
 # Group of prior knowledge.
 PRIOR = "known before"
 
@@ -110,6 +112,7 @@ class Fitter:
         # A zero whose channel is left out altogether stays as it is.
         self._of_zeros = np.linalg.pinv(r, rcond=1e-11)
         self._own: dict[Fit, tuple[Fitter, Fit]] = {}
+        self._left_out: dict[tuple[bytes, Fit], float] = {}
 
     def without(self, left_out: Array) -> Fitter:
         """A fitter to the same record and noise that ignores the values where left_out (N,) is True."""
@@ -118,12 +121,13 @@ class Fitter:
 
     def left_out(self, rows: Array, model: Fit) -> float:
         """Chi squared of the values rows (N,) under a model fitted to the others; inf without prediction."""
-        found = self.without(rows).fit(model.effects, model.values)
-        predicted = self.possible(found.values)
-        if predicted is None:
-            return math.inf
-        r = self.whitening(self.record.values - predicted)[rows]
-        return float(r @ r)
+        key = rows.tobytes(), model
+        if key not in self._left_out:
+            found = self.without(rows).fit(model.effects, model.values)
+            predicted = self.possible(found.values)
+            r = None if predicted is None else self.whitening(self.record.values - predicted)[rows]
+            self._left_out[key] = math.inf if r is None else float(r @ r)
+        return self._left_out[key]
 
     def whitened(self, columns: Array) -> Array:
         """Columns (N,) or (N, k) in the record's units, whitened; 0 where values do not count."""
@@ -201,12 +205,14 @@ class Fitter:
         effects: Sequence[Effect] = (),
         start: Mapping[str, float] | None = None,
         fixed: Mapping[str, float] | None = None,
+        reached: float = math.inf,
     ) -> Fit:
         """Minimise chi squared over the nuisances and the parameters of `effects`, from one start.
 
         start: values by key; where one is missing, the first start of its parameter, else its null. fixed:
         values by key that are held; holding one costs its deviation from prior knowledge. Values are in the
-        parameters' units. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
+        parameters' units. reached: chi squared of a fit from another start; one that is not expected to fall
+        below it is ended. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
         finite-difference derivatives and at most `ITERATIONS` steps. Values without a prediction
         (`possible`) count as infinitely bad; raises what the prediction does where the start is one.
         """
@@ -259,6 +265,11 @@ class Fitter:
             for row, (i, p) in enumerate(known):
                 jacobian[len(f) + row, i] = 1.0 / p.spread
             gram, gradient = jacobian.T @ jacobian, jacobian.T @ r
+            end = max(GAIN, RELATIVE * (chi2 - len(f)))
+            if math.isfinite(reached):
+                expected = chi2 + held - float(gradient @ _step(gram, gradient, 1e-9, x, low, high))
+                if expected > reached - max(GAIN, ALIKE * (reached - len(f))):
+                    break
             gained, accepted = 0.0, False
             for _ in range(8):
                 new = np.clip(x + _step(gram, gradient, damping, x, low, high), low, high)
@@ -272,7 +283,7 @@ class Fitter:
                     damping = max(damping / 10.0, 1e-9)
                     break
                 damping = max(damping * 10.0, 1e-6)
-            if not accepted or gained < max(GAIN, RELATIVE * (chi2 - len(f))):
+            if not accepted or gained < end:
                 break
         return self._finished(tuple(effects), at(x), chi2 + held, r[: len(f)], f, keys, jacobian, measured)
 
@@ -303,14 +314,17 @@ class Fitter:
 
         Of infinite chi squared where no start has a prediction; `Composite.refused` then says why.
         """
-        found, why = [], ""
+        best, why = None, ""
         for start in starts:
             try:
-                found.append(self.fit(effects, start))
+                fit = self.fit(effects, start, reached=best.chi2 if best else math.inf)
             except MuError as error:
                 why = error.what
-        if found:
-            return min(found, key=lambda fit: fit.chi2)
+                continue
+            if best is None or fit.chi2 < best.chi2:
+                best = fit
+        if best is not None:
+            return best
         self.simulator.refused[" with ".join(e.title for e in effects)] = why
         return _impossible(effects, starts[0], len(self.record))
 

@@ -137,11 +137,7 @@ def select(
         p_best = p if level == 0 else p_best
         # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
-            # Cameras' faults lead where each of two physical effects does little alone.
-            physical = [f for f in levels[-1] if not CAMERA.intersection(f.names)]
-            seeds = {id(f): f for f in (*levels[-1][1:SEEDS], *physical[:SEEDS])}
-            more = _extended(fitter, effects, list(seeds.values()), progress)
-            pool = ranked([*pool, *more])
+            pool = ranked([*pool, *_extended(fitter, effects, _other_seeds(levels[-1]), progress)])
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if level == 0 and p >= FALSE_ALARM_RATE:
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
@@ -612,6 +608,19 @@ def _extended(
             progress(" and ".join((*seed.names, e.name)))
             found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
     return ranked(found.values())
+
+
+def _other_seeds(pool: Sequence[Fit]) -> list[Fit]:
+    """Seeds besides the first of a pool: the best of each other set of mechanisms, `SEEDS` with the first.
+
+    Also as many without a camera's fault: these lead where each of two physical effects does little alone.
+    """
+    best: dict[frozenset[str], Fit] = {}
+    for f in pool:
+        best.setdefault(frozenset(f.names), f)
+    others = list(best.values())[1:]
+    physical = [f for f in best.values() if not CAMERA.intersection(f.names)]
+    return [f for f in others if f in others[: SEEDS - 1] or f in physical[:SEEDS]]
 
 
 def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:

@@ -126,8 +126,8 @@ class Composite:
         kind without a simulator.
         """
         simulator = self._of(experiment)
-        own = self._own(experiment, {**self._known, **values})
-        key = (experiment.name, id(experiment), tuple(sorted(own.items())))
+        own = self._own(experiment, {**self._known, **values} if self._known else values)
+        key = (experiment.name, id(experiment), frozenset(own.items()))
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key][1]
@@ -142,29 +142,23 @@ class Composite:
 
     def _own(self, experiment: Experiment, values: Mapping[str, float]) -> dict[str, float]:
         """The values that the experiment's simulator knows, and those of its specimen by their plain keys."""
-        knows = self._knows[experiment.kind]
-        own = {k: v for k, v in values.items() if k in knows and self._heeds(experiment, k)}
-        owners = (
-            f"specimen {experiment.specimen}",
-            f"session {experiment.session}",
-            f"experiment {experiment.name}",
-        )
-        for key, value in values.items():
-            if OF not in key or key in own:
-                continue
+        knows, only, name = self._knows[experiment.kind], self._only, experiment.name
+        own = {k: v for k, v in values.items() if k in knows and only.get(k, name) == name}
+        others = [(k, v) for k, v in values.items() if OF in k and k not in knows]
+        if not others:
+            return own
+        owners = (f"specimen {experiment.specimen}", f"session {experiment.session}", f"experiment {name}")
+        for key, value in others:
             plain, _, whose = key.partition(OF)
-            if not (whose in owners or experiment.name in self.groups.get(whose, ())):
+            if not (whose in owners or name in self.groups.get(whose, ())):
                 continue
-            name = plain.partition(".")[0]
-            if plain in knows or name in (GEOMETRY, THICKNESS):
+            effect = plain.partition(".")[0]
+            if plain in knows or effect in (GEOMETRY, THICKNESS):
                 own[plain] = value
-            elif name in SCALES:
+            elif effect in SCALES:
                 moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)
                 own |= {p.name: own.get(p.name, p.null) * (1.0 + value) for p in moduli}
         return own
-
-    def _heeds(self, experiment: Experiment, key: str) -> bool:
-        return self._only.get(key, experiment.name) == experiment.name
 
     def _of(self, experiment: Experiment) -> Simulator:
         if experiment.kind not in self._simulators:

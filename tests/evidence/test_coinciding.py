@@ -117,7 +117,7 @@ def test_gas_warms_with_its_room_as_logged_or_as_fitted():
 
 def test_one_element_that_yields_unloads_elastically_and_ends():
     x = np.array([0.0, 1.0, 1.0, 0.5, -0.2, -4.0, -3.9])
-    z = _borne_by_one(x, 1.0)
+    z = _borne_by_one(x.tobytes(), 1.0)
     # First loading of power 1 is 1 - exp(-x).
     first = 1.0 - np.exp(-1.0)
     back = first - 0.5

@@ -128,7 +128,8 @@ def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:
     """
     if not (stretch > 0).all():
         raise InputError("a stretch is not positive", mode, "stretch is length over initial length")
-    return np.asarray(2 * (c1 + 2 * c2 * (_first(mode, stretch) - 3)) * (stretch - stretch ** -_ACROSS[mode]))
+    stiffness = 2 * (c1 + 2 * c2 * (_first(mode, stretch) - 3)) if c2 else 2 * c1
+    return np.asarray(stiffness * (stretch - stretch ** -_ACROSS[mode]))
 
 
 def ogden(modulus: float, power: float, mode: str, stretch: Array) -> Array:

@@ -7,6 +7,7 @@ the hereditary integral. Each record begins in equilibrium.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -73,9 +74,9 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
 
     if time_s <= 0.0:
         return p
-    h = np.diff(t)
-    if np.ptp(h) <= 1e-9 * h.mean():
-        a, b0, b1 = lag_weights(h.mean(), time_s)
+    h = _steps(t.tobytes())
+    if isinstance(h, float):
+        a, b0, b1 = lag_weights(h, time_s)
         found, _ = lfilter([b1, b0], [1.0, -a], p, zi=[(1.0 - b1) * p[0]])
         return np.asarray(found)
     from scipy.linalg.lapack import dtbtrs
@@ -87,6 +88,16 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
     band[1, :-1] = -a
     found, _ = dtbtrs(band, driven[:, None], uplo="L", diag="U")
     return np.asarray(found[:, 0])
+
+
+@lru_cache(maxsize=64)
+def _steps(t: bytes) -> float | Array:
+    """Steps (n - 1,) in s, read-only, between times (n,) in bytes; one number where they are equal."""
+    h = np.diff(np.frombuffer(t))
+    if np.ptp(h) <= 1e-9 * h.mean():
+        return float(h.mean())
+    h.flags.writeable = False
+    return h
 
 
 def decades_lag(t: Array, p: Array, onset_s: float) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import attrs
@@ -197,8 +197,8 @@ class ChamberPressure:
         initial = get(_initial(experiment), None)
         initial = beginning_kPa(experiment) if initial is None else initial
         time = experiment["time_s"] - experiment["time_s"][0] - get(_shut(experiment), 0.0)
-        p = chamber_pressure(
-            time,
+        p = _in_the_chamber(
+            time.tobytes(),
             initial,
             loss_per_s=get("leak.loss_per_s", 0.0),
             inertia=get("leak.inertia", 0.0),
@@ -219,7 +219,7 @@ class ChamberPressure:
             cools_s=get("temperature_drift.cools_s", 30.0),
             compliance_per_kPa=self._compliance,
             cooling_per_kPa=0.01 * get("temperature_drift.cooling_K_per_100_kPa", 0.0),
-            rates=[get(f"temperature_drift.{k}", v) for k, v in _TWO_RATES.items()],
+            rates=tuple(get(f"temperature_drift.{k}", v) for k, v in _TWO_RATES.items()),
         )
         per_hour = get("temperature_drift.room_K_per_hour", 0.0)
         warm = per_hour * (experiment["time_s"] - experiment["time_s"][0]) / 3600.0
@@ -345,11 +345,11 @@ def chamber_pressure(
         elif findley_per_kPa:
             grown = findley_per_kPa * p * (t / 100.0) ** findley_power
         gas = np.ones_like(t)
-        flow = partial(_seeping, loss_per_s or loss_until_tight_per_s, inertia)
+        flow = _seeping(loss_per_s or loss_until_tight_per_s, inertia)
         if hole_per_s:
-            flow = partial(_through_a_hole, hole_per_s)
+            flow = _through_a_hole(hole_per_s)
         elif loss_above_per_s:
-            flow = partial(_above, loss_above_per_s, 1.0 + opens_kPa / ATMOSPHERE_kPa)
+            flow = _above(loss_above_per_s, 1.0 + opens_kPa / ATMOSPHERE_kPa)
         if leaks:
             gas = _lost(t, warm, grown, start, flow, compliance_per_kPa)
         if loss_until_tight_per_s and tight_s < end:
@@ -368,23 +368,47 @@ def chamber_pressure(
     return found
 
 
-def _seeping(loss: float, inertia: float, P: float) -> float:
-    """Laminar flow in 1/s at a pressure in atmospheres, with inertia after Forchheimer."""
-    drive = P * P - 1
-    return loss * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+# Derivatives by what the gauge adds need the same chamber again.
+@lru_cache(maxsize=256)
+def _in_the_chamber(time_s: bytes, initial_kPa: float, **values: Any) -> Array:
+    """`chamber_pressure` (n,), read-only, at times (n,) in bytes."""
+    found = chamber_pressure(np.frombuffer(time_s), initial_kPa, **values)
+    found.flags.writeable = False
+    return found
 
 
-def _above(loss: float, opens: float, P: float) -> float:
+def _seeping(loss: float, inertia: float) -> Callable[[float], float]:
+    """Laminar flow in 1/s of a pressure in atmospheres, with inertia after Forchheimer."""
+    if not inertia:
+        return lambda P: 0.5 * loss * (P * P - 1)
+
+    def flow(P: float) -> float:
+        drive = P * P - 1
+        return loss * drive / (1 + math.sqrt(1 + 2 * inertia * abs(drive)))
+
+    return flow
+
+
+def _above(loss: float, opens: float) -> Callable[[float], float]:
     """Flow in 1/s in proportion to the excess of a pressure over another, both in atmospheres."""
-    return loss * max(P - opens, 0.0)
+    return lambda P: loss * max(P - opens, 0.0)
 
 
-def _through_a_hole(hole: float, P: float) -> float:
-    """Isentropic flow in 1/s through a hole at a pressure in atmospheres (Saint-Venant and Wantzel)."""
-    high, low = max(P, 1.0), min(P, 1.0)
-    ratio = max(low / high, CHOKED)
-    inner = ratio ** (2 / AIR_GAMMA) - ratio ** ((AIR_GAMMA + 1) / AIR_GAMMA)
-    return math.copysign(hole * high * math.sqrt(max(2 / (AIR_GAMMA - 1) * inner, 0.0)), P - 1)
+def _through_a_hole(hole: float) -> Callable[[float], float]:
+    """Isentropic flow in 1/s through a hole, of a pressure in atmospheres (Saint-Venant and Wantzel)."""
+    one, other, scale = 2 / AIR_GAMMA, (AIR_GAMMA + 1) / AIR_GAMMA, hole * math.sqrt(2 / (AIR_GAMMA - 1))
+    choked = scale * math.sqrt(CHOKED**one - CHOKED**other)
+
+    def flow(P: float) -> float:
+        high, low = (P, 1.0) if P > 1.0 else (1.0, P)
+        if low < CHOKED * high:
+            most = choked * high
+        else:
+            ratio = low / high
+            most = scale * high * math.sqrt(max(ratio**one - ratio**other, 0.0))
+        return most if P > 1.0 else -most
+
+    return flow
 
 
 def _pressure(start: float, gas: Any, grown: Any, compliance: float) -> Any:
@@ -415,18 +439,24 @@ def _lost(
     W, G = warm.tolist(), grown.tolist()
 
     def slope(gas: float, i: int) -> float:
-        P = gas * per_gas[i]
-        if compliance:
-            P = float(_pressure(start, gas * W[i], G[i], compliance)) / ATMOSPHERE_kPa
+        P = float(_pressure(start, gas * W[i], G[i], compliance)) / ATMOSPHERE_kPa
         return -rate * flow(P)
 
     h = float(t[2] - t[0])
     gas, found = 1.0, [1.0]
     for i in range(0, len(t) - 2, 2):
-        k1 = slope(gas, i)
-        k2 = slope(gas + h / 2 * k1, i + 1)
-        k3 = slope(gas + h / 2 * k2, i + 1)
-        k4 = slope(gas + h * k3, i + 2)
+        if compliance:
+            k1 = slope(gas, i)
+            k2 = slope(gas + h / 2 * k1, i + 1)
+            k3 = slope(gas + h / 2 * k2, i + 1)
+            k4 = slope(gas + h * k3, i + 2)
+        else:
+            # The same, with a call less for each slope: a fit asks for thousands of holds.
+            half = per_gas[i + 1]
+            k1 = -rate * flow(gas * per_gas[i])
+            k2 = -rate * flow((gas + h / 2 * k1) * half)
+            k3 = -rate * flow((gas + h / 2 * k2) * half)
+            k4 = -rate * flow((gas + h * k3) * per_gas[i + 2])
         middle = gas + h / 24 * (5 * k1 + 4 * k2 + 4 * k3 - k4)
         gas += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         found += [middle, gas]

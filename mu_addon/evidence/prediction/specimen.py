@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import attrs
@@ -341,11 +342,21 @@ def _remembering(
 def _below(experiment: Experiment, strain: Array, past: StrainHistory) -> tuple[Array, Array]:
     """Amount (n,) by which strains (n,) are below the largest so far in size, and that largest (n,)."""
     size = np.abs(strain)
-    so_far = size
-    if "time_s" in experiment.columns and len(strain) > 5:
-        so_far = np.maximum(size, turns(experiment["time_s"], size))
-    most = np.maximum(np.maximum.accumulate(so_far), past.strain)
+    timed = "time_s" in experiment.columns and len(strain) > 5
+    most = _largest(experiment["time_s"].tobytes() if timed else b"", size.tobytes(), past.strain)
     return most - size, most
+
+
+# Unless the material yields, of each experiment alone.
+@lru_cache(maxsize=256)
+def _largest(t: bytes, size: bytes, before: float) -> Array:
+    """The largest (n,) so far, read-only, of sizes (n,) at times (n,), if any, in bytes, and of that before."""
+    so_far = found = np.frombuffer(size)
+    if t:
+        so_far = np.maximum(found, turns(np.frombuffer(t), found))
+    found = np.maximum(np.maximum.accumulate(so_far), before)
+    found.flags.writeable = False
+    return found
 
 
 def turns(t: Array, x: Array) -> Array:

@@ -88,7 +88,7 @@ def elastic_strain(strain: Array, values: Mapping[str, float]) -> Array:
 
 
 # A derivative by any other parameter needs the same history again, of each experiment.
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
     """Elastic strain (n,), read-only, of the bytes of strains (n,), see `elastic_strain`."""
 
@@ -131,19 +131,23 @@ def yielded(strain: Array, law: Callable[[Array], Array], values: Mapping[str, f
     if not share:
         return stress
     per_strain = values.get(f"{NAME}.bouc_wen_per_strain", 30.0)
-    borne = _borne_by_one(per_strain * strain, values.get(f"{NAME}.bouc_wen_power", 1.0)) / per_strain
+    x = per_strain * np.ascontiguousarray(strain, np.float64)
+    borne = _borne_by_one(x.tobytes(), values.get(f"{NAME}.bouc_wen_power", 1.0)) / per_strain
     return np.asarray((1.0 - share) * stress + share * law(_SMALL) / _SMALL * borne)
 
 
-def _borne_by_one(x: Array, power: float) -> Array:
-    """z (n,) of Bouc and Wen's element at strains x (n,) in yield strains, in the order of loading.
+# As of `_by_masing`: of each experiment, and once more for each parameter that changes it.
+@lru_cache(maxsize=256)
+def _borne_by_one(strain: bytes, power: float) -> Array:
+    """z (n,), read-only, of Bouc and Wen's element by the bytes of strains (n,) in yield strains, in order.
 
     Any stretch in one direction is exact, however long: elastic until z is 0, then along the curve of first
     loading, whose strain x = int_0^z du/(1 - u^n) is tabulated.
     """
     way, height = _first_loading(power)
+    x = np.frombuffer(strain)
     found = np.zeros(len(x))
-    at = np.flatnonzero(signs := np.sign(np.diff(x, prepend=0.0)))
+    at = np.flatnonzero(signs := np.sign(x - np.concatenate([[0.0], x[:-1]])))
     turns = at[np.flatnonzero(np.diff(signs[at])) + 1]
     z = start = 0.0
     for first, end in pairwise((0, *turns.tolist(), len(x))):
@@ -154,6 +158,7 @@ def _borne_by_one(x: Array, power: float) -> Array:
         along = np.where(begun + gone < 0.0, begun + gone, np.interp(loaded, way, height))
         found[first:end] = side * along
         z, start = float(found[end - 1]), float(x[end - 1])
+    found.flags.writeable = False
     return found
 
 
