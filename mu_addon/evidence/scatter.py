@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -11,7 +11,7 @@ import numpy as np
 
 from .drive import FEWEST, reading_noise
 from .noise import Source
-from .record import KNOWN, Record, Series, repeats
+from .record import DRIVES, KNOWN, Record, Series, repeats
 from .resolution import divided
 
 Array = np.ndarray[Any, Any]
@@ -24,6 +24,11 @@ FEW = 4.0
 # Assumed accuracy of gauges and load cells, as a share of the largest reading: slow noise up to this needs no
 # fast part.
 ACCURACY = 0.002
+# Bounds of the noise, in words.
+STATED, SCATTERED, ASSUMED = "stated accuracy", "scatter of the readings", "usual accuracy"
+# White noise exceeds the scatter that readings show by more than this factor in 1 series of 60 where it has
+# 12 to 30 readings, and in none of 600 where it has 150.
+SURELY = 1.5
 # With fewer than `FEWEST` readings no scatter is seen: a model off by this share of them is wrong.
 UNSEEN = 0.1
 # Noise may be at most this many times the differences of repeats, as slow noise of two records may agree by
@@ -54,15 +59,42 @@ def scatter(record: Record, series: Series) -> float:
     return max(few * reading_noise(clock[seen], values[seen]), series.step / math.sqrt(12.0))
 
 
-def shown_noise(record: Record, series: Series) -> float:
-    """The largest standard deviation of noise that a series' readings allow, in its channel's unit.
+def stated_noise(record: Record, series: Series) -> float:
+    """The error that the stated accuracy of a series' instruments allows, in its unit; inf without any.
 
-    `TIMES` the scatter from reading to reading (`reading_noise`, or the display's steps), or `ACCURACY` of
+    That of its own instrument and, by the mean slope, of those that read its drives.
+    """
+    e = record.experiments[series.experiment]
+    found = e.stated_accuracy(series.channel)
+    drives = [c for c in DRIVES if record.driven(series.experiment, c) and np.ptp(e[c]) > 0.0]
+    for c in drives:
+        stated = e.stated_accuracy(c)
+        if math.isfinite(stated) and not (c == "displacement_mm" and "strain" in drives):
+            slope = float(np.nanmax(e[series.channel]) - np.nanmin(e[series.channel])) / float(np.ptp(e[c]))
+            found = math.hypot(found, stated * slope)
+    return found
+
+
+def noise_limit(record: Record, series: Series) -> tuple[float, str]:
+    """The largest standard deviation of noise of a series, in its channel's unit, and what sets it.
+
+    The accuracy stated for its instruments, or `SURELY` the scatter from reading to reading (`reading_noise`,
+    or the display's steps) where this is larger. Without a statement `TIMES` that scatter, or `ACCURACY` of
     the largest reading; `UNSEEN` of it where there are too few readings to tell.
     """
     largest = float(np.nanmax(np.abs(record.experiments[series.experiment][series.channel])))
-    seen = scatter(record, series)
-    return UNSEEN * largest if math.isnan(seen) else max(TIMES * seen, ACCURACY * largest)
+    seen, stated = scatter(record, series), stated_noise(record, series)
+    if math.isfinite(stated):
+        least = series.step / math.sqrt(12.0) if math.isnan(seen) else SURELY * seen
+        return max(stated, least), STATED if stated > least else SCATTERED
+    if math.isnan(seen):
+        return UNSEEN * largest, ASSUMED
+    return max(TIMES * seen, ACCURACY * largest), SCATTERED if TIMES * seen > ACCURACY * largest else ASSUMED
+
+
+def shown_noise(record: Record, series: Series) -> float:
+    """The standard deviation of `noise_limit`."""
+    return noise_limit(record, series)[0]
 
 
 def by_repeats(record: Record, series: Series, left: Array) -> float:
@@ -84,31 +116,51 @@ def by_repeats(record: Record, series: Series, left: Array) -> float:
     return max(REPEATED * few * max(apart), REPEATABLE * largest, series.step)
 
 
+def within_accuracy(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
+    """Sources of noise by group, none larger than a stated accuracy allows (`noise_limit`).
+
+    The slow part is made smaller first: readings show the white one.
+    """
+    found = dict(sources)
+    for group, source in sources.items():
+        members = [s for s in record.series if s.group == group]
+        if all(math.isfinite(stated_noise(record, s)) for s in members):
+            most = _root_mean_square([shown_noise(record, s) for s in members])
+            slow = math.sqrt(max(most**2 - source.white**2, 0.0))
+            found[group] = attrs.evolve(source, white=min(source.white, most), slow=min(source.slow, slow))
+    return found
+
+
 def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
     """Sources of noise by group, none larger than its readings show (`shown_noise`, in the root mean square).
 
     A larger one is scaled down as a whole, so that its correlation time stays.
     """
     found = {}
-    for group, source in sources.items():
-        most = [shown_noise(record, s) ** 2 for s in record.series if s.group == group]
-        share = math.sqrt(sum(most) / max(len(most), 1)) / math.hypot(source.white, source.slow)
+    for group, source in within_accuracy(record, sources).items():
+        most = _root_mean_square([shown_noise(record, s) for s in record.series if s.group == group])
+        share = most / math.hypot(source.white, source.slow)
         smaller = attrs.evolve(source, white=share * source.white, slow=share * source.slow)
         found[group] = smaller if share < 1.0 else source
     return found
+
+
+def _root_mean_square(values: Sequence[float]) -> float:
+    return math.sqrt(sum(v**2 for v in values) / max(len(values), 1))
 
 
 @attrs.frozen
 class Excess:
     """The series whose error exceeds its noise the most.
 
-    error, noise: root mean square of the misfit and largest noise that the readings show, in `unit`. where:
-    its experiment and channel.
+    error, noise: root mean square of the misfit and its largest noise, in the channel's unit. where: its
+    experiment and channel. by: what sets that noise, in words.
     """
 
     error: float
     noise: float
     where: str
+    by: str = SCATTERED
 
     @property
     def times(self) -> float:
@@ -127,7 +179,9 @@ def excess(record: Record, left: Array) -> Excess | None:
             own = left[s.at] if s.louder is None else left[s.at] / s.louder
             error = float(np.sqrt(np.mean(own**2)))
             where = f"{record.experiments[s.experiment].name}, {s.channel}"
-            found.append(Excess(error, min(shown_noise(record, s), by_repeats(record, s, left)), where))
+            most, by = noise_limit(record, s)
+            apart = by_repeats(record, s, left)
+            found.append(Excess(error, min(most, apart), where, by if most < apart else SCATTERED))
     worst = max(found, key=lambda e: e.times, default=None)
     return worst if worst is not None and worst.times > 1.0 else None
 
@@ -188,7 +242,7 @@ def within_scatter(record: Record, left: Array) -> bool:
         stretch = np.convolve(own, np.ones(min(WINDOW, len(own))) / min(WINDOW, len(own)), "valid")
         # Slow noise stays for a while where it goes.
         worst = max(float(np.sqrt(np.mean(own**2))), NEAR / TIMES * float(np.abs(stretch).max(initial=0.0)))
-        most = min(NEAR * scatter(record, s), by_repeats(record, s, left))
+        most = min(NEAR * scatter(record, s), by_repeats(record, s, left), shown_noise(record, s))
         if s.group == KNOWN or not worst < most:
             return False
     return True

@@ -17,7 +17,7 @@ from .fit import PRIOR, Fit, Fitter, logarithmic
 from .outliers import NAME as OUTLIER
 from .record import KNOWN
 from .residuals import Dependence, dependence_table, strict_table, structure, taken_by_scales
-from .scatter import excess
+from .scatter import STATED, excess
 from .sensitivity import ABSORBED, Sensitivity
 
 Array = np.ndarray[Any, Any]
@@ -187,7 +187,7 @@ def too_far(fitter: Fitter, fit: Fit) -> str:
         return ""
     return (
         f"the error of {found.where} is {found.error:.3g}, {found.times:.2g} times the largest noise that "
-        "its readings allow"
+        + (f"its {STATED} allows" if found.by == STATED else "its readings allow")
     )
 
 

@@ -26,7 +26,7 @@ from .pooled import select_pooled
 from .record import Record, record
 from .residuals import strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
-from .scatter import NEAR, with_bursts, within_scatter
+from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
 from .selection import (
     FALSE_ALARM_RATE,
     TOGETHER,
@@ -199,7 +199,7 @@ def noise_of(
 
     values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
     base model's fit where None. Changes by any effect of the library, and by those of `effects`, do not count
-    as noise.
+    as noise; nor does what exceeds a stated accuracy.
     """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
@@ -207,7 +207,8 @@ def noise_of(
     zeros = {p.name for p in simulator.nuisances if p.linear}
     curved = {k: v for k, v in values.items() if k not in zeros}
     columns = span(measured, signatures(measured, simulator, curved, effects))
-    return estimate(measured, measured.values - measured.predict(simulator, values), columns)
+    found = estimate(measured, measured.values - measured.predict(simulator, values), columns)
+    return within_accuracy(measured, found)
 
 
 def _rough(measured: Record, group: str) -> Source:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..cells.notation import number
 from ..errors import InputError
-from ..measured.kinds import AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
+from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
 from .blocks import Block, Unread
 from .quantities import READ_IN, Column, column, plain, unit_of
 
@@ -34,7 +34,15 @@ _AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
 _NAME = re.compile(
     r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
 )
-_KEYS_OF_NUMBERS = ("temperature_C", "scale", "orientation_deg", "mass_g", "chamber_volume_mm3", "gap_mm")
+_KEYS_OF_NUMBERS = (
+    "temperature_C",
+    "scale",
+    "orientation_deg",
+    "mass_g",
+    "chamber_volume_mm3",
+    "gap_mm",
+    *ACCURACIES,
+)
 # Columns that are asked for at most.
 _MOST_ASKED = 12
 # A column that is missing in a larger share of the rows is left out instead of them, where it may be.

@@ -33,7 +33,8 @@ class Experiment:
     mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
     of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see `pose.down`.
     gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness of what bears
-    the load. sha256: of the file's bytes.
+    the load. accuracy: stated for instruments, by the column that they read, in its unit. sha256: of the
+    file's bytes.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Experiment:
     orientation_axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
     gap_mm: float = 0.0
     chamber_volume_mm3: float | None = None
+    accuracy: Mapping[str, float] = MappingProxyType({})
 
     def __getitem__(self, column: str) -> Array:
         """A column (n,) by its name with unit."""
@@ -70,6 +72,14 @@ class Experiment:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def stated_accuracy(self, column: str) -> float:
+        """Accuracy stated for the instrument behind a column, in the column's unit; inf where none was."""
+        if column == "stress_kPa" and self.section_mm:
+            return 1e3 * self.accuracy.get("force_N", math.inf) / math.prod(self.section_mm)
+        if column == "strain" and self.length_mm:
+            return self.accuracy.get("displacement_mm", math.inf) / self.length_mm
+        return self.accuracy.get(column, math.inf)
 
     @property
     def markers(self) -> dict[int, Array]:

@@ -17,7 +17,7 @@ from ..cells.own import own_text
 from ..errors import InputError
 from ..reading import file_bytes, file_text, parse_toml
 from .experiment import Array, Experiment
-from .kinds import AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
+from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
 
 FILE = "experiments.toml"
@@ -186,6 +186,11 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
     for key, most in (("length_mm", 1e4), ("mass_g", 1e6), ("mass_sd_g", 1e6), ("chamber_volume_mm3", 1e9)):
         if key in entry:
             fields[key] = _number(entry[key], key, at, 0.0, most, above=True)
+    fields["accuracy"] = {
+        column: _number(entry[key], key, at, 0.0, 1e6, above=True)
+        for key, column in ACCURACIES.items()
+        if key in entry
+    }
     if "gap_mm" in entry:
         fields["gap_mm"] = _number(entry["gap_mm"], "gap_mm", at, 0.0, 1e3)
     if "orientation_axis" in entry:
@@ -212,6 +217,11 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
                 f"section_mm = {pair!r} is not a pair", at("section_mm"), "give width and thickness, [w, t]"
             )
         fields["section_mm"] = tuple(_number(v, "section_mm", at, 0.0, 1e4, above=True) for v in pair)
+    for key, size in (("force_accuracy_N", "section_mm"), ("displacement_accuracy_mm", "length_mm")):
+        if key in entry and size in kind.keys and size not in entry:
+            raise InputError(
+                f"{key} needs {size}", at(key), f"give {size}, which turns it into one of stress or strain"
+            )
     if "cells" in entry:
         fields["cells"] = _cells(entry["cells"], at)
     return fields

@@ -59,6 +59,14 @@ MAY_BE_MISSING = ("angle_deg", "voltage_V", "marker", "volume_mm3")
 
 _MARKER = re.compile(r"marker([1-9]\d*)_([xyz])_mm")
 
+# Keys for the stated accuracy of an instrument, and what it reads.
+ACCURACIES = {
+    "force_accuracy_N": "force_N",
+    "displacement_accuracy_mm": "displacement_mm",
+    "pressure_accuracy_kPa": "pressure_kPa",
+    "angle_accuracy_deg": "angle_deg",
+}
+
 COMMON = (
     "name",
     "kind",
@@ -101,7 +109,8 @@ class Kind:
     @property
     def keys(self) -> tuple[str, ...]:
         """All keys of experiments.toml that may describe it."""
-        return COMMON + self.needs_keys + self.may_have_keys
+        stated = tuple(key for key, column in ACCURACIES.items() if column in self.columns)
+        return COMMON + self.needs_keys + self.may_have_keys + stated
 
     def knows(self, column: str) -> bool:
         """Return True if it may have a column of this name, with the unit that is read."""

@@ -14,12 +14,19 @@ from mu_addon.evidence.record import record, repeats
 from mu_addon.evidence.scatter import (
     ACCURACY,
     FEW,
+    SCATTERED,
+    STATED,
+    SURELY,
     TIMES,
     bounded,
     by_repeats,
     excess,
+    noise_limit,
+    scatter,
     shown_noise,
+    stated_noise,
     with_bursts,
+    within_accuracy,
     within_scatter,
 )
 from mu_addon.evidence.simulator import Composite
@@ -96,6 +103,87 @@ def test_a_wrong_model_is_never_trusted_whatever_its_size(rows, many, times):
     made = blocks([40.0] * many, rows, lambda x: times * SD * np.sqrt(2.0) * np.sin(4.0 * np.pi * x))
     found = diagnose(made, Composite(bench_simulators(made)))
     assert found.kind != "none"
+
+
+def stating(made, **accuracy):
+    return [attrs.evolve(e, accuracy=accuracy) for e in made]
+
+
+@given(
+    rows=st.integers(9, 400),
+    many=st.integers(1, 4),
+    size=st.floats(-3.0, 4.0),
+    times=st.floats(0.0, 6.0),
+    stated=st.floats(-2.0, 2.0),
+    seed=st.integers(0, 10_000),
+)
+@settings(max_examples=60, deadline=None)
+def test_noise_is_at_most_the_stated_accuracy_or_the_scatter_of_readings(
+    rows, many, size, times, stated, seed
+):
+    factor = 10.0**size
+    # Of the load cell, in N: 900 mm2 bear it.
+    accuracy = 10.0**stated * SD * factor
+    made, _ = records(stating(blocks([40.0] * many, rows, seed=seed, factor=factor), force_N=0.9 * accuracy))
+    last = made.series[-1]
+    seen = SURELY * scatter(made, last)
+    most, by = noise_limit(made, last)
+    assert most == pytest.approx(max(accuracy, seen))
+    assert by == (STATED if accuracy > seen else SCATTERED)
+    left = np.zeros(len(made))
+    n = last.at.stop - last.at.start
+    left[last.at] = 10.0**times * most * np.sqrt(2.0) * np.sin(np.linspace(0.0, 2.0 * np.pi, n, False))
+    assert excess(made, left / 10.0**times / 1.01) is None
+    found = excess(made, 1.01 * left)
+    assert found is not None
+    assert found.by == by
+    rough = {made.groups[0]: Source(SD * factor, float(np.abs(left).max()), 20.0)}
+    source = within_accuracy(made, rough)[made.groups[0]]
+    every = [noise_limit(made, s)[0] for s in made.series]
+    assert np.hypot(source.white, source.slow) <= 1.01 * max(every)
+
+
+@pytest.mark.parametrize("accuracy_kPa", [1e-6, 0.02, 0.3])
+@pytest.mark.parametrize("step_kPa", [0.0, 0.1])
+def test_a_right_model_stays_right_whatever_accuracy_is_stated(accuracy_kPa, step_kPa):
+    """Noise is never below what readings scatter, nor below a display's steps."""
+    made = []
+    for e in stating(blocks([40.0] * 3, 150), force_N=0.9 * accuracy_kPa):
+        stress = e["stress_kPa"]
+        read = np.round(stress / step_kPa) * step_kPa if step_kPa else stress
+        made.append(attrs.evolve(e, columns={**e.columns, "stress_kPa": read}))
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert found.kind == "none"
+    (source,) = found.sources.values()
+    assert source.white >= max(0.8 * SD, 0.999 * step_kPa / np.sqrt(12.0))
+
+
+@pytest.mark.parametrize(("accuracy_kPa", "kind"), [(None, "none"), (0.3, "none"), (0.01, "unexplained")])
+def test_slow_noise_that_readings_alone_would_allow_is_bounded_by_the_accuracy(accuracy_kPa, kind):
+    made = blocks([40.0] * 2, 60, lambda x: 0.05 * np.sin(3.0 * np.pi * x))
+    made = stating(made, force_N=0.9 * accuracy_kPa) if accuracy_kPa else made
+    assert diagnose(made, Composite(bench_simulators(made))).kind == kind
+
+
+@pytest.mark.parametrize("accuracy_kPa", [0.001, 0.1])
+def test_a_misfit_far_above_the_stated_accuracy_is_never_none(accuracy_kPa):
+    """A slow wave, five times what the coarser of both cells is stated to be wrong by at most."""
+    bent = stating(blocks([40.0], 60, lambda x: 0.5 * np.sin(6.0 * x)), force_N=0.9 * accuracy_kPa)
+    found = diagnose(bent, Composite(bench_simulators(bent)))
+    assert found.kind != "none"
+
+
+def test_the_accuracy_of_what_drives_counts_by_the_slope():
+    (plain,) = blocks([40.0], 60)
+    for accuracy, expected in (
+        ({}, np.inf),
+        ({"displacement_mm": 0.03}, np.inf),
+        ({"force_N": 0.9}, 1.0),
+        # 0.03 of 30 mm are a strain of 0.001, and 0.04 kPa.
+        ({"force_N": 0.027, "displacement_mm": 0.03}, 0.05),
+    ):
+        made, _ = records(stating([plain], **accuracy))
+        assert stated_noise(made, made.series[0]) == pytest.approx(expected, rel=0.02)
 
 
 def test_what_repeats_have_in_common_is_no_noise():

@@ -121,6 +121,19 @@ def test_every_field_that_is_given_is_kept(tmp_path):
     assert other.sha256 == e.sha256
 
 
+def test_stated_accuracies_are_kept_by_what_they_are_of(tmp_path):
+    size = {"section_mm": [10, 5], "length_mm": 20}
+    toml = entry(**LATTICE, **size, force_accuracy_N=0.05, displacement_accuracy_mm=0.01)
+    e = read_folder(folder(tmp_path, toml, a=GOOD)).experiments[0]
+    assert e.stated_accuracy("stress_kPa") == pytest.approx(1.0)
+    assert e.stated_accuracy("strain") == pytest.approx(0.0005)
+    assert e.stated_accuracy("pressure_kPa") == np.inf
+    with pytest.raises(InputError, match="force_accuracy_N needs section_mm"):
+        read_folder(folder(tmp_path, entry(**LATTICE, force_accuracy_N=0.05), a=GOOD))
+    with pytest.raises(InputError, match="belongs to"):
+        read_folder(folder(tmp_path, entry(**LATTICE, angle_accuracy_deg=0.05), a=GOOD))
+
+
 def test_markers_may_be_out_of_sight(tmp_path):
     text = "time_s,pressure_kPa,marker2_x_mm,marker2_y_mm,marker2_z_mm\n0,0,1,2,3\n1,5,,2.5,3\n2,9,1,3,3\n"
     measured = read_folder(folder(tmp_path, entry(**UNIT), a=text))

@@ -350,7 +350,7 @@ def _below(experiment: Experiment, strain: Array, past: StrainHistory) -> tuple[
 # Unless the material yields, of each experiment alone.
 @lru_cache(maxsize=256)
 def _largest(t: bytes, size: bytes, before: float) -> Array:
-    """The largest (n,) so far, read-only, of sizes (n,) at times (n,), if any, in bytes, and of that before."""
+    """The largest (n,) so far, read-only, of sizes (n,) at times (n,) if any, in bytes, and `before`."""
     so_far = found = np.frombuffer(size)
     if t:
         so_far = np.maximum(found, turns(np.frombuffer(t), found))

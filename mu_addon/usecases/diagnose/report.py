@@ -14,6 +14,7 @@ from ...evidence.effect import Parameter
 from ...evidence.fit import Fit
 from ...evidence.record import KNOWN, repeats
 from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
+from ...evidence.scatter import noise_limit
 from ...evidence.selection import RIVAL_DELTA_CHI2
 from ...evidence.sensitivity import best_seen
 from ...files import write_text
@@ -498,6 +499,7 @@ def _noise(found: Diagnosis) -> str:
                         "",
                         "",
                         "",
+                        "",
                         f"{len(members)} values, each for a whole record",
                     ],
                     False,
@@ -505,6 +507,7 @@ def _noise(found: Diagnosis) -> str:
             )
             continue
         source = found.verdict.sources[group]
+        most, by = max(noise_limit(record, s) for s in members)
         clocked = any(not math.isnan(s.sample_s) for s in members)
         pairs = sum(repeats(record, a, b) for i, a in enumerate(members) for b in members[i + 1 :])
         origin = f"{len(members)} series, {values} values"
@@ -516,6 +519,7 @@ def _noise(found: Diagnosis) -> str:
                     f"{_figures(source.white)} {unit}",
                     f"{_figures(source.slow)} {unit}" if clocked and source.slow else "–",
                     f"{_figures(source.time_s)} s" if clocked and source.slow else "–",
+                    f"{_figures(most)} {unit} ({by})",
                     origin + ("" if clocked else ", without time stamps"),
                 ],
                 False,
@@ -526,6 +530,7 @@ def _noise(found: Diagnosis) -> str:
         ("white, per value", "n"),
         ("slow", "n"),
         ("correlation time", "n"),
+        ("at most", "text"),
         ("estimated from", "text"),
     ]
     return (

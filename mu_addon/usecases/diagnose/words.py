@@ -10,6 +10,8 @@ import numpy as np
 
 from ...evidence.effect import SLIP, Parameter
 from ...evidence.prediction.marker_slip import Recordings
+from ...evidence.record import KNOWN
+from ...evidence.scatter import STATED, noise_limit
 from ...evidence.selection import Cause
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
@@ -132,7 +134,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     if verdict.kind == "none":
         return (
             "no model error detected",
-            f"The error, {_error(verdict)}, is no larger than the noise that the readings themselves show. "
+            f"The error, {_error(verdict)}, is no larger than the noise that {_shown(verdict)}. "
             f"{_zeros(verdict)}"
             "An effect larger than its limit (“Identifiability of each effect”) would have been detected.",
         )
@@ -159,6 +161,13 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 def _error(verdict: Verdict) -> str:
     """Root mean square error of the base model on fitted data, with its unit."""
     return f"{verdict.gain.fit.before:.3g} {verdict.gain.fit.unit}".rstrip()
+
+
+def _shown(verdict: Verdict) -> str:
+    """What shows the noise, and bounds it, in words."""
+    series = [s for s in verdict.record.series if s.group != KNOWN]
+    stated = any(noise_limit(verdict.record, s)[1] == STATED for s in series)
+    return f"the readings show and the {STATED} allows" if stated else "the readings themselves show"
 
 
 def _zeros(verdict: Verdict) -> str:

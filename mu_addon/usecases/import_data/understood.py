@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...lab_files.blocks import Block, tables
 from ...lab_files.proposal import NoExperiment, Proposal, Question, answers_for, propose
 from ...lab_files.source import Sheet, read_sheets
+from ...measured.kinds import ACCURACIES
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
@@ -37,6 +38,7 @@ KEYS = (
     "gap_mm",
     "mass_g",
     "chamber_volume_mm3",
+    *ACCURACIES,
 )
 
 
