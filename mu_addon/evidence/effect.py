@@ -14,6 +14,8 @@ BATCH = "batch_variation"
 GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
 # Struts printed thicker or thinner than drawn, unlike another specimen's: see `owned`.
 THICKNESS = "strut_thickness"
+# A factor on the force of some tests; of which causes, `scaled_by` tells.
+FORCE_SCALE = "force_scale"
 # Effects that multiply the modulus in their experiments.
 SCALES = frozenset((BATCH, STEP, HEATING))
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
@@ -56,7 +58,7 @@ LIBRARY = {
         "the zero of the pressure gauge drifts while it records",
         "the same hold at another pressure; the gauge read at rest for as long",
     ),
-    "force_scale": (
+    FORCE_SCALE: (
         "the force is scaled: load cell, section as typed, clamping or specimen",
         "a dead weight on the load cell, the section measured, the specimen clamped anew",
     ),
@@ -128,7 +130,7 @@ LIBRARY = {
         "bending to and fro at two paces: play is as large at either",
     ),
     BATCH: (
-        "the modulus of one specimen differs from that of the others",
+        "the modulus of one specimen, or its section as typed, differs from that of the others",
         "another specimen in its place, its height and section measured, clamped anew",
     ),
     THICKNESS: (

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
+from .effect import BATCH, FORCE_SCALE, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
 from .fit import Fit, Fitter
 from .residuals import strict_table, structure
 from .selection import (
@@ -25,6 +25,7 @@ from .selection import (
     gain_of,
     loss,
     promise,
+    promising_rivals,
     ranked,
     size_at_bound,
     sudden,
@@ -38,7 +39,7 @@ OF_THE_BENCH = CAMERA.union(
         "pressure_gain",
         "pressure_nonlinearity",
         "pressure_drift",
-        "force_scale",
+        FORCE_SCALE,
         "force_nonlinearity",
         "force_drift",
         "force_lag",
@@ -82,8 +83,25 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
         own = [e for e in experiments if e.kind in effect.kinds]
         for whose, members in _owners(effect.name, own).items():
             if len(members) < len(own):
-                found.append(attrs.evolve(effect, whose=whose))
+                others = [e.name for e in own if e.name not in members]
+                found.append(scaled_by(attrs.evolve(effect, whose=whose), [members, others], own))
     return tuple(found)
+
+
+def scaled_by(effect: Effect, owners: Sequence[Sequence[str]], experiments: Sequence[Experiment]) -> Effect:
+    """The effect; one of force scale with its possible causes in its mechanism.
+
+    owners: names of the experiments of each. Load cell and clamping differ from test to test; a section as
+    typed and the specimen itself do not between tests of one specimen.
+    """
+    if effect.name != FORCE_SCALE:
+        return effect
+    of = {e.name: e.specimen or e.name for e in experiments}
+    apart = [{of[name] for name in names} for names in owners]
+    causes = "load cell or clamping"
+    if sum(map(len, apart)) == len(set().union(*apart)):
+        causes = "load cell, section as typed, clamping or specimen"
+    return attrs.evolve(effect, mechanism=f"the force is scaled: {causes}")
 
 
 def of_specimens(experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
@@ -215,7 +233,7 @@ def coinciding(
     each cause, and is a rival within `RIVAL_DELTA_CHI2`.
     """
     chosen = found.chosen
-    scales = [e for e in fitter.simulator.effects if e.name == "force_scale"]
+    scales = [e for e in fitter.simulator.effects if e.name == FORCE_SCALE]
     # A stated standard deviation includes the spread of specimens.
     single = [e for e in fitter.record.experiments if "stress_sd_kPa" not in e.columns]
     owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
@@ -223,19 +241,9 @@ def coinciding(
         return found
     causes = []
     for c in found.causes:
-        others = [e for e in chosen.effects if e.keys != c.effect.keys]
-        near: list[Fit] = []
-        less = fitter.best(others, [chosen.values])
         scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
-        for e in scaled:
-            enough = less.chi2 - chosen.chi2 - RIVAL_DELTA_CHI2
-            if e.keys in (o.keys for o in chosen.effects) or promise(fitter, less, e) < 0.5 * enough:
-                continue
-            progress(e.title)
-            fit = fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()])
-            if cost(fit) - cost(chosen) < RIVAL_DELTA_CHI2:
-                near.append(fit)
-        near = ranked(near)
+        fits = promising_rivals(fitter, chosen, c.effect, scaled, progress)
+        near = [f for f in fits if cost(f) - cost(chosen) < RIVAL_DELTA_CHI2]
         if c.effect.among and near and cost(near[0]) < cost(chosen):
             # One size for some replaces a size of each.
             found, near = attrs.evolve(found, chosen=near[0]), near[1:]

@@ -12,7 +12,7 @@ import numpy as np
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
-from .owned import OF_NONE, OF_THE_BENCH, of_specimens
+from .owned import OF_NONE, OF_THE_BENCH, of_specimens, scaled_by
 from .residuals import strict_table, structure
 from .selection import (
     FALSE_ALARM_RATE,
@@ -119,7 +119,10 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
             followed = shape or has_one_sign(size) or effect.name.endswith(DRIFTS)
             if len(owners) >= FEWEST and not (among == "experiment" and followed):
                 each = (_own(size, f"{among} {owner}") for owner in owners)
-                found.append(attrs.evolve(effect, parameters=(*each, *shape), among=among))
+                several = attrs.evolve(effect, parameters=(*each, *shape), among=among)
+                field = "name" if among == "experiment" else among
+                members = [[e.name for e in own if getattr(e, field) == owner] for owner in owners]
+                found.append(scaled_by(several, members, own))
     return tuple(found)
 
 

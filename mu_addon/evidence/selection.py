@@ -818,6 +818,38 @@ def causes_of(
     return tuple(sorted(found, key=lambda c: -c.loss))
 
 
+def promising_rivals(
+    fitter: Fitter, chosen: Fit, cause: Effect, effects: Sequence[Effect], progress: Callable[[str], None]
+) -> list[Fit]:
+    """Fits of those of some effects in the place of a cause that promise half of what it takes, or more.
+
+    Each is tried that is not in the chosen model; the best comes first.
+    """
+    others = [e for e in chosen.effects if e.keys != cause.keys]
+    less, known = fitter.best(others, [chosen.values]), {e.keys for e in chosen.effects}
+    enough = less.chi2 - chosen.chi2 - RIVAL_DELTA_CHI2
+    found = []
+    for e in effects:
+        if e.keys not in known and promise(fitter, less, e) >= 0.5 * enough:
+            progress(e.title)
+            found.append(fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()]))
+    return ranked(found)
+
+
+def with_promising_rivals(
+    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """A selection that is not accepted, its several causes with the rivals that `promising_rivals` finds."""
+    causes = []
+    for c in found.causes:
+        effects = [f.effects[0] for f in found.singles if f.effects[0].name not in found.chosen.names]
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (found.base.chi2 - found.chosen.chi2 - c.loss))
+        fits = promising_rivals(fitter, found.chosen, c.effect, effects, progress)
+        titles = (f.effects[-1].title for f in fits if cost(f) - cost(found.chosen) < near)
+        causes.append(attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *titles)))))
+    return attrs.evolve(found, causes=tuple(causes))
+
+
 def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
     """Rivals of one cause, the nearest of them with laws of more freedom where those fit better.
 

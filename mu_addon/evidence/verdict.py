@@ -41,6 +41,7 @@ from .selection import (
     select,
     share_taken,
     too_far,
+    with_promising_rivals,
 )
 from .sensitivity import (
     ABSORBED,
@@ -352,6 +353,8 @@ def diagnose(
         for name, why in gained.refused.items()
     ]
     proposal = propose_experiment(fitter, chosen, seen)
+    if kind == "unexplained" and len(chosen.causes) > 1:
+        chosen = with_promising_rivals(fitter, chosen, progress)
     known = chosen.chosen if chosen.causes else chosen.base
     # For an effect that is no cause the curvature suffices.
     sure = kind != "unexplained"

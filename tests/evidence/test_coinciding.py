@@ -3,14 +3,19 @@
 import attrs
 import numpy as np
 
-from mu_addon.evidence.owned import coincident_effects, strain_rate
+from mu_addon.evidence.effect import FORCE_SCALE
+from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.noise import Source
+from mu_addon.evidence.owned import coincident_effects, owned_effects, strain_rate
+from mu_addon.evidence.pooled import pooled_effects
 from mu_addon.evidence.prediction.beam import EFFECTS as BEAM
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.drift import zeroed
 from mu_addon.evidence.prediction.hold import ChamberPressure
 from mu_addon.evidence.prediction.unit import TIMED
 from mu_addon.evidence.prediction.yielding import _borne_by_one
-from mu_addon.evidence.selection import _bounded
+from mu_addon.evidence.record import record
+from mu_addon.evidence.selection import Selection, _bounded, causes_of, with_promising_rivals
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence, to_do
@@ -64,6 +69,71 @@ def test_fast_tests_that_are_the_soft_ones_are_told_by_their_rate():
     found = diagnose(made, Composite(bench_simulators(made)))
     assert found.kind in ("named", "ambiguous")
     assert any(t.startswith("self_heating of tests at ") for t in titles(found))
+
+
+def test_a_scale_of_force_is_called_by_what_can_differ_so():
+    cell = "the force is scaled: load cell or clamping"
+    every = "the force is scaled: load cell, section as typed, clamping or specimen"
+    made = [
+        pressed(name="a", specimen="S0"),
+        pressed(name="b", specimen="S0"),
+        pressed(name="c", specimen="S1"),
+    ]
+    scales = [e for e in Composite(bench_simulators(made)).effects if e.name == FORCE_SCALE]
+    assert len(scales) == 1
+    found = {e.whose: e.mechanism for e in owned_effects(scales, made) if e.name == FORCE_SCALE}
+    assert found == {"experiment a": cell, "experiment b": cell, "experiment c": every}
+    (among,) = (e for e in pooled_effects(scales, made) if e.name == FORCE_SCALE)
+    assert (among.among, among.mechanism) == ("experiment", cell)
+    apart = [pressed(name=n, specimen=n, session=n) for n in "abc"]
+    (among,) = (e for e in pooled_effects(scales, apart) if e.name == FORCE_SCALE)
+    assert among.mechanism == every
+
+
+def test_one_scaled_test_of_a_specimen_is_no_matter_of_its_section():
+    made = [pressed(name=f"b{i}", modulus=44.0 if i == 2 else 40.0, specimen="S", seed=i) for i in range(5)]
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert "force scale of experiment b2 (load cell or clamping)" in sentence(found)[0]
+    # And where each test has its own specimen it may be.
+    made = [attrs.evolve(e, specimen=e.name) for e in made]
+    found = diagnose(made, Composite(bench_simulators(made)))
+    assert "batch_variation of specimen b2" in titles(found)
+
+
+def test_causes_that_are_not_accepted_have_their_rivals_too():
+    """A softer block along x, between faces that close: its direction may as well be its batch or height."""
+    plain = [
+        pressed(name="b0", specimen="S0", seed=1),
+        pressed("x", 40.0, "b1", specimen="S1", seed=2),
+        pressed(name="b2", specimen="S2", seed=3),
+    ]
+    model = Composite(bench_simulators(plain))
+    hidden = {"anisotropy.in_plane": -0.08, "seating.gap_mm": 0.3}
+    made = [
+        attrs.evolve(
+            e,
+            columns={
+                **e.columns,
+                "stress_kPa": model.predict(e, hidden)[0] + 0.02 * np.random.default_rng(i).normal(size=100),
+            },
+        )
+        for i, e in enumerate(plain)
+    ]
+    model = Composite(bench_simulators(made))
+    data = record(made, model)
+    fitter = Fitter(data, model, {g: Source(0.02, 1e-6, 1.0) for g in data.groups})
+    base = fitter.fit()
+    offered = [*model.effects, *owned_effects(model.effects, made)]
+    chosen = fitter.best(
+        [e for e in model.effects if e.name in ("anisotropy", "seating")], [{**base.values, **hidden}]
+    )
+    assert chosen.names == ("anisotropy", "seating")
+    singles = tuple(fitter.best([e], [{**base.values, **s} for s in e.starts()]) for e in offered)
+    causes = causes_of(fitter, offered, base, chosen, [0.0, 0.0], [singles], accepted=False)
+    assert all(not c.rivals for c in causes)
+    found = with_promising_rivals(fitter, Selection(base, chosen, causes, singles, (), (), 0.0))
+    rivals = {c.effect.name: c.rivals for c in found.causes}
+    assert {"batch_variation of specimen S1", "geometry_as_typed of specimen S1"} <= set(rivals["anisotropy"])
 
 
 def test_groups_are_heights_changes_and_rates():

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..effect import Effect, Parameter
+from ..effect import FORCE_SCALE, Effect, Parameter
 from ..ringing import swinging
 from .effective_pressure import first_order_lag
 
@@ -88,7 +88,7 @@ FILTERED = ("force_lag.time_s", "force_lag.period_s")
 def amplifier(kind: str) -> tuple[Effect, ...]:
     """Effects, for a kind, of the load cell's amplifier: gain, curve, a filter of one pole, or of two."""
     return (
-        Effect("force_scale", (GAIN,), (kind,)),
+        Effect(FORCE_SCALE, (GAIN,), (kind,)),
         Effect("force_nonlinearity", (CELL_BOW,), (kind,)),
         Effect("force_lag", FILTER, (kind,)),
         Effect(
@@ -106,7 +106,7 @@ def amplified(force: Array, values: Mapping[str, float], largest: float) -> Arra
 
     largest: reading at which its curve is straight again, in the unit of force; 0 where none is known.
     """
-    gain = values.get("force_scale.gain", 0.0)
+    gain = values.get(f"{FORCE_SCALE}.gain", 0.0)
     force = curved(force, values.get("force_nonlinearity.bow", 0.0), largest)
     return force * (1.0 + gain) if gain else force
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...evidence.effect import SLIP, Parameter
+from ...evidence.effect import FORCE_SCALE, SLIP, Effect, Parameter
 from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
@@ -36,6 +36,12 @@ MOST_SHOWN = 3
 def readable(name: str) -> str:
     """An effect's or quantity's name for a reader."""
     return name.replace("_", " ")
+
+
+def called(effect: Effect) -> str:
+    """An effect's title for a reader; a scale of force with its possible causes."""
+    _, _, causes = effect.mechanism.partition(": ")
+    return f"{readable(effect.title)} ({causes})" if effect.name == FORCE_SCALE else readable(effect.title)
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
@@ -117,12 +123,12 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             f"{_upper(c.effect.mechanism)}{_of_one_only(c)}{'' if tabled else f'; {sized(verdict, c)}'}."
             for c in found.causes
         ]
-        names = listed([readable(c.effect.title) for c in found.causes])
+        names = listed([called(c.effect) for c in found.causes])
         if not found.left:
             return names, " ".join(sizes)
         return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
     if verdict.kind == "ambiguous":
-        choices = [listed([readable(n) for n in (c.effect.title, *c.rivals)], "or") for c in found.causes]
+        choices = [listed([called(c.effect), *(readable(n) for n in c.rivals)], "or") for c in found.causes]
         sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
         message = "Each of these effects explains the data, and these data do not distinguish them." + (
             "" if tabled else f" Fitted values: {'; '.join(sizes)}."
