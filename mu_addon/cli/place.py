@@ -27,9 +27,13 @@ __all__ = ["add", "run"]
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
+    import attrs
+
     from ..placement.settings import BEND, LONGEST, RULE, SHORTEST
+    from ..sensing.optics import Optics
     from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 
+    constants = ", ".join(f"{name} {value:g}" for name, value in attrs.asdict(Optics()).items())
     command = commands.add_parser(
         "place",
         help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
@@ -56,8 +60,7 @@ def add(commands: Commands[Any]) -> None:
         nargs="+",
         default=(),
         metavar="NAME=VALUE",
-        help="Optical constants of the resin: index, attenuation_per_mm, roughness (default: 1.5, 0.01, "
-        "0.02, assumed).",
+        help=f"Optical constants of the resin, assumed by default: {constants}.",
     )
     search = command.add_argument_group("limits of --paths graph")
     add_setting(search, SHORTEST, "C")
