@@ -32,6 +32,7 @@ _MODULES = (
     "node_tree.classes",
     "node_tree.state",
     "gripper.object",
+    "gripper.timeline",
     "scene.gestures",
     "results.thumbnails",
     # Operators.

@@ -23,7 +23,7 @@ from mu_addon.report.pc2 import read_pc2
 from mu_addon.resolved.unit import mesh_printed
 from mu_addon.usecases.grip import path_deviation
 from mu_addon.usecases.grip.grasp import OF_FIDELITY, Cube, Grip, grasp
-from mu_addon.usecases.grip.motion_files import even
+from mu_addon.usecases.grip.motion_files import even, write_halves
 from mu_addon.usecases.grip.path_deviation import PathDeviations, path_deviations, published_deviations
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
@@ -209,6 +209,20 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
         np.testing.assert_allclose(positions[0], rest, atol=1e-3)
         assert (start, step) == (0.0, 1.0)
         assert whole["triangles"].max() < positions.shape[1]
+    # Cut open, both show the half away from +x, and end where the whole ones do.
+    for side, rest, half in zip(
+        ("left", "right"), whole["rest_mm"], write_halves(out / "cube-25"), strict=True
+    ):
+        vertices, triangles, membrane = half
+        positions, _, _ = read_pc2(out / "cube-25" / f"{side}-cut.pc2")
+        np.testing.assert_allclose(positions[0], vertices, atol=1e-3)
+        assert vertices[:, 0].max() <= 1e-9
+        np.testing.assert_allclose(vertices[:, 1:].min(axis=0), rest[:, 1:].min(axis=0), atol=1e-3)
+        assert len(triangles) == len(membrane)
+        corners = vertices[triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flat = (corners[:, :, 0] == 0.0).all(axis=1)
+        assert (normals[flat, 0] > 0.0).all(), "the section faces +x"
     names = {p.name for p in out.iterdir()}
     assert {"gripper.stl", "grasp_25.csv", "pull_25.csv", "report.html", "frame_25_iv.png"} <= names
     report = (out / "report.html").read_text()

@@ -101,7 +101,11 @@ def _draw(root: Any, gripper: Gripper) -> None:
     drawn = {drawing.PLATE: skeletons.box((-x, -y, -gripper.plate.thickness_mm), (x, y, 0.0))}
     if part(root, MOVING + "cube") is None:  # else the grasp is played, whose fingers stand in their place
         for side, (rotation, shift) in zip(SIDES, gripper.placements, strict=True):
-            drawn |= {f"{side}:{n}": skeletons.placed(s, rotation, shift) for n, s in finger.items()}
+            own = finger
+            if root.mu_gripper.cut and rotation[0, 0] < 0:
+                # Both fingers show their section on the same side.
+                own = {n: skeletons.mirrored(s) for n, s in finger.items()}
+            drawn |= {f"{side}:{n}": skeletons.placed(s, rotation, shift) for n, s in own.items()}
     mesh = drawing.own_mesh(root, root.data, [o.data for o in roots() if o != root])
     if mesh != root.data:
         root.data = mesh

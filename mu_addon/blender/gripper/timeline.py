@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, MuError
 from ...files import read_npz
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts
@@ -14,6 +17,10 @@ from ..shared import displays
 from ..shared.compat import set_curve
 from . import object as gripper_object
 from . import state as grasps
+from .properties import PARAMETERS_CHANGED
+
+CUT = "mu_cut"
+"""On a finger that plays the grasp: whether it is cut open."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -33,13 +40,17 @@ def show(root: Any, scene: Any) -> None:
     hide(root)
     rate = scene.render.fps / scene.render.fps_base
     time = data["time_s"]
-    for side, rest in zip(gripper_object.SIDES, data["rest_mm"], strict=True):
+    cut = root.mu_gripper.cut
+    whole = [(rest, data["triangles"], data["membrane"]) for rest in data["rest_mm"]]
+    fingers = _halves(found.folder) if cut else whole
+    for side, (rest, triangles, membrane) in zip(gripper_object.SIDES, fingers, strict=True):
         obj = gripper_object.new_part(root, gripper_object.MOVING + side)
-        slots = np.where(data["membrane"], 0, 1)
-        skeleton = skeletons.Skeleton(rest.astype(float), faces=(data["triangles"],), slots=slots)
+        obj[CUT] = cut
+        slots = np.where(membrane, 0, 1)
+        skeleton = skeletons.Skeleton(rest.astype(float), faces=(triangles,), slots=slots)
         skeletons.write(obj.data, skeleton)
         materials.assign(obj.data, "MU Membrane", "MU Lattice")
-        file = found.folder / f"{side}.pc2"
+        file = found.folder / f"{side}{'-cut' if cut else ''}.pc2"
         motion_parts.play(obj, file, motion_parts.step_of(file))
     half = np.full(3, float(data["cube_side_mm"]) / 2.0)
     cube = gripper_object.put_box(root, gripper_object.MOVING + "cube", -half, half, "MU Obstacle")
@@ -48,6 +59,21 @@ def show(root: Any, scene: Any) -> None:
         set_curve(cube, "location", axis, frames, data["cube_mm"][:, axis])
     scene.frame_end = int(np.ceil(frames[-1]))
     _hide_preview(root, True)
+
+
+def _halves(folder: Path) -> Any:
+    # Imported late, with the solver's packages.
+    from ...usecases.grip.motion_files import write_halves
+
+    return write_halves(folder)
+
+
+def _follow(root: Any) -> None:
+    """Cut a grasp that is played open, or close it, as the gripper's setting says."""
+    shown = parts(root)
+    if shown and bool(shown[0].get(CUT)) != root.mu_gripper.cut:
+        with suppress(MuError):
+            show(root, bpy.context.scene)
 
 
 def hide(root: Any) -> None:
@@ -63,3 +89,13 @@ def _hide_preview(root: Any, hidden: bool) -> None:
     if cube is not None:
         cube.hide_viewport = cube.hide_render = hidden
     gripper_object.rebuild(root)
+
+
+def register() -> None:
+    """Let a played grasp follow the gripper's setting."""
+    PARAMETERS_CHANGED.connect(_follow)
+
+
+def unregister() -> None:
+    """Disconnect it."""
+    PARAMETERS_CHANGED.disconnect(_follow)

@@ -239,6 +239,12 @@ def placed(part: Skeleton, rotation: ArrayLike, shift: ArrayLike) -> Skeleton:
     return attrs.evolve(part, vertices=part.vertices @ np.asarray(rotation).T + np.asarray(shift))
 
 
+def mirrored(part: Skeleton) -> Skeleton:
+    """The mirror image of a skeleton in the bending plane, x = 0."""
+    faces = tuple(f[:, ::-1] for f in part.faces)
+    return attrs.evolve(part, vertices=part.vertices * [-1.0, 1.0, 1.0], faces=faces)
+
+
 def free_path(points: Floats, name: str, cell: float) -> Skeleton:
     """A path through any nodes of the lattice, points (h, 3) in mm, at its true position, and its name."""
     at = (float(points[0, 0]) + 0.3 * cell, float(points[0, 1]) + 0.15 * cell, float(points[0, 2]))

@@ -58,7 +58,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         column.active = not found.stale
         for pressure, angle in found.angles:
             if pressure in (found.angles[0][0], found.angles[-1][0]):
-                column.label(text=f"{angle:+.1f} deg at {pressure:g} kPa")
+                column.label(text=f"{angle:+.1f}° at {pressure:g} kPa")
         for contact in studies.contact_forces(root):
             most = int(contact.force_N.argmax())
             words = (

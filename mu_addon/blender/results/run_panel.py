@@ -19,7 +19,7 @@ from . import runs
 
 ROWS = 4
 """Number of runs that the list shows at once."""
-COLUMN = 9
+COLUMN = 8
 """Letters in a line of a column of the comparison."""
 
 
@@ -117,7 +117,7 @@ class MU_PT_comparison(UnitPanel, bpy.types.Panel):
 
 def _name_lines(run) -> list[str]:
     """Lines of a run's name that fit into a column."""
-    return textwrap.wrap(run.title, COLUMN)
+    return textwrap.wrap(run.title.replace("Homogenised", "Homo- genised"), COLUMN)
 
 
 def _row(column, what: str, one: str, other: str) -> None:

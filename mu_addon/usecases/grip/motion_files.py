@@ -6,6 +6,7 @@
   whether a triangle is the membrane's; `time_s` (k,), `cube_mm` (k, 3), the cube's middle, `cube_side_mm`;
   `placement` (2, 4, 4), from a finger's frame to the gripper's
 - left.pc2 and right.pc2: the vertices of `rest_mm` in motion, at even steps of time from 0 on
+- left-cut.pc2 and right-cut.pc2: of the halves of `write_halves`
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ import numpy as np
 
 from ...design.gripper import Gripper
 from ...design.quantity import in_MPa
+from ...errors import InputError
 from ...fem.materials import Materials
 from ...fem.state import State
 from ...fem.trajectory import Trajectory
-from ...files import make_folder, write_npz
+from ...files import make_folder, read_npz, write_npz
 from ...meshing.mesh import Mesh
 from ...report.pc2 import write_pc2
 from ...report.vtk import write_trajectory
@@ -30,6 +32,8 @@ from .grasp import Grasp
 Array = np.ndarray[Any, Any]
 
 SIDES = ("left", "right")
+CUT = "-cut"
+"""Ending of the names of point caches of fingers that are cut open."""
 # Most even steps of time of a point cache.
 MOST_SAMPLES = 1001
 
@@ -67,6 +71,32 @@ def write_grasp(folder: Path, gripper: Gripper, mesh: Mesh, materials: Materials
             "placement": placement,
         },
     )
+
+
+def write_halves(folder: Path) -> list[tuple[Array, Array, Array]]:
+    """Write the motion of both fingers cut open, of their halves at x <= 0. Raises InputError, OutputError.
+
+    Returns of each vertices at rest (v, 3) in mm, triangles (t, 3), and whether each is the membrane's (t,).
+    """
+    motion, data = read_motion(folder), read_npz(folder / "gripper.npz")
+    if data is None or "placement" not in data:
+        raise InputError("this grasp cannot be cut open", str(folder), "grasp again")
+    skins = [motion.skin(region, cut=True) for region in ("membrane", "lattice")]
+    rest = np.concatenate([skin.of_nodes(motion.mesh.nodes) for skin in skins])
+    u = np.concatenate([skin.of_nodes(motion.model_a[motion.state]) for skin in skins], axis=1)
+    triangles = np.vstack([skins[0].triangles, skins[1].triangles + len(skins[0].node)])
+    membrane = np.repeat([True, False], [len(skin.triangles) for skin in skins])
+    time, samples = even(motion.time_s, rest + u)
+    found = []
+    for side, place in zip(SIDES, data["placement"], strict=True):
+        # A finger turned about z shows the other half, which is the mirror image.
+        turned = place[0, 0] < 0
+        matrix = place[:3, :3] @ np.diag([-1.0 if turned else 1.0, 1.0, 1.0])
+        moved = samples @ matrix.T + place[:3, 3]
+        write_pc2(folder / f"{side}{CUT}.pc2", moved, float(time[0]), float(time[1] - time[0]))
+        faces = triangles[:, ::-1] if turned else triangles
+        found.append((rest @ matrix.T + place[:3, 3], faces, membrane))
+    return found
 
 
 def even(time_s: Array, values: Array) -> tuple[Array, Array]:

@@ -132,7 +132,8 @@ class Run:
         what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
-        return self.name or what + {"full": ", homogenised", "resolved": "", "quick": ", quick"}[self.detail]
+        # What was found tells a motion from a ranking; both words would not fit into a list.
+        return self.name or {"full": "Homogenised", "resolved": what, "quick": "Quick look"}[self.detail]
 
     @property
     def seconds(self) -> float:

@@ -301,3 +301,12 @@ def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
     beside = (np.abs(at[:, 0]) < 12.5) & (np.abs(at[:, 2] - cube.matrix_world.translation.z) < 12.5)
     inner = at[beside, 1].max()
     assert abs(inner + 12.5) < 0.3, f"the left finger's face lies on the cube's: {inner}"
+
+
+def test_both_fingers_are_cut_open_toward_the_same_side():
+    root = held()
+    root.mu_gripper.cut = True
+    of = np.array([item.value for item in root.data.attributes["mu_part"].data]) == PARTS.index("actuator")
+    walls = motion_parts.vertices_of(root.data)[of]
+    for side in (walls[walls[:, 1] < 0.0], walls[walls[:, 1] > 0.0]):
+        assert side[:, 0].max() < 1e-6 < 10.0 < -side[:, 0].min(), "the half away from +x"

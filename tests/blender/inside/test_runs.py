@@ -127,7 +127,7 @@ def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
     assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
     texts = drawn(PANELS)
     assert "Wall (mm) 0.9 1.1" in texts, texts
-    assert "Ranking Motion" in texts, "the columns are named by the runs"
+    assert "Ranking Quick" in texts, "the columns are named by the runs"
     assert "At 40 kPa (deg) +50.00 +40.00" in texts, texts
     assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
     scene = bpy.context.scene
