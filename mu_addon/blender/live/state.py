@@ -129,6 +129,8 @@ def _changed(root: Any) -> None:
     """Show the design at rest once its parameters have changed, and bend it as soon as they rest."""
     live = of(root)
     if live is None:
+        if root.mu_live.on and root.mu_unit.uuid:  # a duplicate
+            _switched(root)
         return
     design = studies.design_of(root)
     if design == live.design:

@@ -13,7 +13,7 @@ from mu_addon.blender.jobs import start_child
 from mu_addon.blender.live import state as live
 from mu_addon.blender.live import words
 from mu_addon.blender.results import motion as motion_parts
-from mu_addon.blender.scene import handles
+from mu_addon.blender.scene import gestures, handles
 from mu_addon.blender.shared import displays
 from mu_addon.blender.unit import object as unit_object
 
@@ -101,6 +101,16 @@ def test_a_real_job_comes_first(monkeypatch, tmp_path):
         assert words.words(root) == "After the running job"
     live._tick()
     assert live.of(root).child.state == "running", "after it, the unit is bent"
+    # A duplicate is bent by a process of its own.
+    bpy.ops.object.duplicate()
+    gestures.look()
+    (copy,) = [one for one in unit_object.roots() if one != root]
+    unit_object.rebuild(copy)
+    live.of(copy).due_s = 0.0
+    live._tick()
+    assert live.of(copy).folder != live.of(root).folder
+    copy.mu_live.on = False
+    unit_object.make_active(bpy.context, root)
     # A deleted unit leaves no process.
     child = live.of(root).child
     bpy.ops.mu.delete()
