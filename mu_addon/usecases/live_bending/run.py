@@ -44,7 +44,7 @@ NEWTON: NewtonSettings = attrs.evolve(
 )
 LOOK_S = 0.05
 """Interval in s at which a new request is looked for."""
-RESTS_S = 2.0
+RESTS_S = 4.0
 """Time in s without a new request before a finer level, whose mesh and model no request interrupts."""
 _FAR = 0.5
 """Share of the largest displacement by which a state may differ from that of the design before."""
