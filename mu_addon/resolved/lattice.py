@@ -7,6 +7,8 @@ from pathlib import Path
 
 import attrs
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..design import shapes
 from ..design.body import Body, covering
@@ -19,7 +21,7 @@ from ..design.strut_cell import StrutCell
 from ..errors import InputError
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
-from ..meshing.mesh import FLIPPED_TET, Array, Mesh, mirror
+from ..meshing.mesh import FLIPPED_TET, TET_FACES, Array, Mesh, mirror
 from ..meshing.surface import Surface, winding_number
 from ..meshing.tiling import tiled
 from .octants import graded_nodes
@@ -149,7 +151,11 @@ def filled_outside(mesh: Mesh, kept: list[Depth], drop: bool = True) -> Mesh:
     filled[some] = np.maximum(filled[some], _FLOOR)
     if not drop:
         return attrs.evolve(mesh, filled=filled)
-    keep = filled.mean(axis=1) > max(_LEAST, 1.01 * _FLOOR)
+    return _with_elements(attrs.evolve(mesh, filled=filled), filled.mean(axis=1) > max(_LEAST, 1.01 * _FLOOR))
+
+
+def _with_elements(mesh: Mesh, keep: Array) -> Mesh:
+    """Some elements (m,) bool of a mesh of struts alone, and their nodes."""
     used, tets = np.unique(mesh.tets[keep], return_inverse=True)
     return Mesh(
         mesh.nodes[used],
@@ -159,8 +165,24 @@ def filled_outside(mesh: Mesh, kept: list[Depth], drop: bool = True) -> Mesh:
         mesh.base[:0],
         mesh.tip[:0],
         mesh.symmetry,
-        filled[keep],
+        mesh.filled[keep],
     )
+
+
+def without_loose_parts(mesh: Mesh, held: Array) -> Mesh:
+    """The mesh without parts that touch the rest by a node or an edge only, and so turn about it freely.
+
+    held (n,): mask of nodes that something else holds; three of them hold a part.
+    """
+    faces = np.sort(mesh.tets[:, :4][:, TET_FACES], axis=2).reshape(-1, 3)
+    _, face = np.unique(faces, axis=0, return_inverse=True)
+    count = len(mesh.tets)
+    of = np.repeat(np.arange(count), 4)
+    link = sparse.coo_matrix((np.ones(len(of)), (of, np.ravel(face))))
+    _, part = connected_components(link @ link.T, directed=False)
+    pairs = np.unique(np.column_stack([np.repeat(part, mesh.tets.shape[1]), mesh.tets.ravel()]), axis=0)
+    firm = np.bincount(pairs[:, 0], held[pairs[:, 1]]) >= 3
+    return mesh if firm.all() else _with_elements(mesh, firm[part])
 
 
 def support(mesh: Mesh) -> Array:

@@ -21,7 +21,7 @@ from ..meshing.morph import WallGrid
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, SOLID, MeshSettings
 from .beams import REACH, with_beams
-from .lattice import LEAST_SUPPORT, clearance, struts, support
+from .lattice import LEAST_SUPPORT, clearance, struts, support, without_loose_parts
 from .strut import is_half_diagonal
 
 Progress = Callable[[str, float], None]
@@ -127,6 +127,9 @@ def mesh_printed(
     report("ties", 0.5)
     near = TIE_MM * d.cell / CELL_MM / max(s.refine, 1.0)
     clear = clearance(d, lattice.nodes)
+    loose_free = without_loose_parts(lattice, (clear <= near) | (lattice.nodes[:, 2] == 0.0))
+    if loose_free is not lattice:
+        lattice, clear = loose_free, clearance(d, loose_free.nodes)
     mesh = tied(wall, lattice, clear - near)
     check_positive(mesh)
     if beams:

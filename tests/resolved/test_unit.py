@@ -1,10 +1,13 @@
 """The printed unit's mesh: what is filled, what is tied, and what its solutions are."""
 
+from pathlib import Path
+
 import attrs
 import numpy as np
 import pytest
 
 from mu_addon.design import load_preset, shapes
+from mu_addon.design.body import read_body
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.profile import cavity_polygon, outer_polygon
 from mu_addon.design.solid import QUALITY, lattice_solid
@@ -17,8 +20,10 @@ from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.lattice import without_loose_parts
 from mu_addon.resolved.unit import mesh_printed
 
+from ..fem.bodies import box
 from .ties import require_linear_motions_kept
 
 SMALL = load_preset("mu-1.0x")
@@ -28,6 +33,39 @@ SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))
 @pytest.fixture(scope="module")
 def mesh():
     return mesh_printed(SMALL)
+
+
+def test_a_part_that_hangs_by_a_node_is_left_out():
+    # Two stacks of elements that share one node, the first of them held.
+    first, second = box((1, 1, 1), (1.0, 1.0, 1.0)), box((1, 1, 1), (1.0, 1.0, 1.0))
+    corner = len(first.nodes) - 1
+    top = int(np.argmax(first.nodes.sum(axis=1)))
+    own = np.argmin(second.nodes.sum(axis=1))
+    number = corner + 1 + np.arange(len(second.nodes))
+    number[own] = top
+    nodes = np.vstack([first.nodes, second.nodes + first.nodes[top]])
+    count = len(first.tets) + len(second.tets)
+    both = attrs.evolve(
+        first,
+        nodes=nodes,
+        tets=np.vstack([first.tets, number[second.tets]]),
+        region=np.full(count, LATTICE),
+        filled=np.ones((count, 4)),
+    )
+    held = nodes[:, 2] == 0.0
+    assert len(without_loose_parts(both, held).tets) == len(first.tets)
+    assert without_loose_parts(both, np.ones(len(nodes), bool)) is both
+
+
+@pytest.mark.nightly("test_a_part_that_hangs_by_a_node_is_left_out")
+def test_a_users_body_that_cuts_slivers_off_still_bears_its_pressure():
+    folder = Path(__file__).parents[2] / "assets/examples/finger-in-a-body"
+    chambers = attrs.evolve(SMALL.chambers, wall_mm=0.8)
+    lattice = attrs.evolve(SMALL.lattice, junction_diameter_mm=1.398)
+    thin = attrs.evolve(SMALL, chambers=chambers, lattice=lattice)
+    mesh = mesh_printed(thin, MeshSettings(refine=0.3), body=read_body(folder / "body.obj"))
+    body = Equilibrium(Model(mesh, threads=1), materials_of(thin, mesh), explains=False)
+    assert bending_angle_deg(mesh, body.reach(0.002, [body.at_zero_pressure()]).u) > 0.1
 
 
 def printed_volume_mm3(unit):
