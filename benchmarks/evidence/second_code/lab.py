@@ -23,7 +23,7 @@ RIGHT: dict[str, tuple[str, ...]] = {
     "slip": ("force_scale", "step_change"),
     "selfheat": ("self_heating", *SCALE),
     "warming_room": ("temperature_drift",),
-    "nonlinear_gauge": ("force_nonlinearity",),
+    "nonlinear_gauge": ("force_nonlinearity", "pressure_nonlinearity"),
     "rezero": ("force_drift", "pressure_drift", "pressure_offset", "step_change"),
     "unit_change": (),
     "bursts": (),
