@@ -18,7 +18,7 @@ from compare import unit_problem
 from peers.chamber import chamber
 from peers.process import run
 
-from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.bending_angle import bending_angle_deg
 
 GOAL = 0.01
 

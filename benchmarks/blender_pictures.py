@@ -502,7 +502,7 @@ else:
     handles = module("blender.scene.handles")
     gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
-    studies, bending = module("blender.simulate.study_folder"), module("blender.live.state")
+    studies, bending = module("blender.simulate.study_folder"), module("blender.live_bending.state")
     OPTIMIZATION = module("blender.optimize.state").OPTIMIZATION
     sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
     tracking, MarkerSettings = (

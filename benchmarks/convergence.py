@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit_materials import materials_of

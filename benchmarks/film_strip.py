@@ -21,7 +21,7 @@ from PIL import Image, ImageDraw, ImageFont
 from mu_addon.design.anchors import anchor_points, window
 from mu_addon.design.parameters import read_unit
 from mu_addon.design.surface import stl_surface
-from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.report.render import Cut, Part, fit, render
 from mu_addon.report.shapes import tube
 from mu_addon.report.unit_pictures import PATH_COLOR, SAGITTAL, unit_parts

@@ -21,7 +21,7 @@ from peers.problem import Problem
 from peers.process import run
 
 from mu_addon.design.parameters import Unit, read_unit
-from mu_addon.fem.kinematics import bending_angle_deg
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, Mesh
 from mu_addon.meshing.settings import MeshSettings

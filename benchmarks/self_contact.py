@@ -12,8 +12,8 @@ import attrs
 
 from mu_addon.design import load_preset
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import CONTACT_NEWTON, SELF_CONTACT_NEWTON
 from mu_addon.fem.self_contact import SelfContact

@@ -17,8 +17,8 @@ import numpy as np
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
+from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings

@@ -20,8 +20,8 @@ import numpy as np
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
+from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import TipSection
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import FIDELITIES, MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job

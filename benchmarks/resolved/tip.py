@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mu_addon.design.dimensions import Dimensions
-from mu_addon.fem.kinematics import TipSection
+from mu_addon.fem.bending_angle import TipSection
 from mu_addon.meshing.mesh import TET_EDGES, Mesh, boundary_faces
 
 # Facets of a remeshed cap may end outside its circle by this share of its radius.

@@ -18,7 +18,7 @@ from .dimensions import Dimensions
 from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
 from .surface import Triangles, Vertices, volume, weld
-from .surface_file import SUFFIXES, read_surface
+from .surface_reading import SUFFIXES, read_surface
 
 if TYPE_CHECKING:
     from .anchors import Window

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError, MeshingError
+from ..fem.bending_angle import TipSection
 from ..fem.equilibrium import Equilibrium
 from ..fem.held_tip import HeldTip
-from ..fem.kinematics import TipSection
 from ..fem.state import State
 from ..fem.trajectory import branches
 from ..fem.unit_materials import self_contact_of

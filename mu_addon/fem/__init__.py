@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .arc import ContinuationSettings as ContinuationSettings
     from .batched_newton import BatchedNewton as BatchedNewton
     from .batched_newton import Variant as Variant
+    from .bending_angle import TipSection as TipSection
+    from .bending_angle import bending_angle_deg as bending_angle_deg
     from .continuation import Branch as Branch
     from .continuation import limit_pressure as limit_pressure
     from .continuation import trace_branch as trace_branch
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
     from .embedding import embed as embed
     from .equilibrium import Equilibrium as Equilibrium
     from .kinematics import Probe as Probe
-    from .kinematics import TipSection as TipSection
-    from .kinematics import bending_angle_deg as bending_angle_deg
     from .kinematics import probe as probe
     from .lattice_law import LatticeLaw as LatticeLaw
     from .laws import Foam as Foam

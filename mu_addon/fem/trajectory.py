@@ -12,8 +12,9 @@ import numpy as np
 from ..design.quantity import in_MPa
 from ..errors import InputError
 from ..meshing.mesh import Mesh
+from .bending_angle import TipSection
 from .equilibrium import Equilibrium
-from .kinematics import TipSection, cavity_volume_mm3
+from .kinematics import cavity_volume_mm3
 from .state import State, rest
 
 Array = np.ndarray[Any, Any]

@@ -18,7 +18,7 @@ from ..cells.clock import clock, is_clock
 from ..cells.dialect import Row, split
 from ..cells.notation import judged, number, unit_behind, without_units
 from ..errors import InputError
-from .quantities import Column, column, is_unit, plain
+from .columns import Column, column, is_unit, plain
 from .source import Sheet
 
 Array = np.ndarray[Any, Any]

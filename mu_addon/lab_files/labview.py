@@ -8,7 +8,7 @@ import attrs
 
 from ..cells.dialect import Row
 from ..cells.notation import number
-from .quantities import column, is_unit
+from .columns import column, is_unit
 
 _MAGIC, _TITLES = "LabVIEW Measurement", "X_Value"
 

@@ -15,7 +15,7 @@ from ..cells.notation import number
 from ..errors import InputError
 from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
 from .blocks import Block, Unread
-from .quantities import READ_IN, Column, column, plain, unit_of
+from .columns import READ_IN, Column, column, plain, unit_of
 
 Array = np.ndarray[Any, Any]
 

@@ -14,9 +14,9 @@ from ..cells.dialect import Row, rows_of
 from ..cells.encoding import decoded
 from ..errors import InputError
 from ..reading import file_bytes, require_rows, unreadable
+from .columns import known_words
 from .labview import is_labview, rows_of_labview
 from .markup import is_markup, rows_of_markup
-from .quantities import known_words
 
 # Bytes that a file may have, and that a workbook, which is a ZIP archive, may unpack to.
 _LONGEST, _MOST_UNPACKED = 1 << 26, 1 << 28

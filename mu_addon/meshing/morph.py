@@ -9,45 +9,12 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
-from ..errors import MeshingError
 from .harmonic import Harmonic
-from .membrane import Membrane, Meridian, division, membrane_mesh, stations
+from .membrane import Membrane, division
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh, edge_keys, edges_of
 from .quality import check_positive
 from .settings import CELL_MM, MeshSettings
-
-
-class WallGrid:
-    """Grid of a unit's membrane, repeated node by node for other units."""
-
-    def __init__(
-        self, d: Dimensions, edge_mm: float, turn: float, sectors: int, layers: int, rings: int
-    ) -> None:
-        """d: as printed; edge_mm: along the meridian; the others as `membrane_mesh` has them."""
-        self.meridian = Meridian.of(d)
-        self._heights = stations(self.meridian, edge_mm)
-        self._grid = turn, sectors, layers, rings
-        self.membrane = self._made(self.meridian, self._heights)
-
-    def of(self, b: Dimensions) -> Membrane:
-        """Membrane of other dimensions of the same cell and envelope; raises MeshingError."""
-        a = self.meridian.d
-        if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
-            raise _failed("its envelope differs")
-        second = Meridian.of(b)
-        breaks = [_breaks(m) for m in (self.meridian, second)]
-        order = np.argsort(breaks[0])
-        from_, to = (x[order] for x in breaks)
-        if not (np.diff(to) > 0).all():
-            raise _failed("its profile differs")
-        made = self._made(second, np.interp(self._heights, from_, to))
-        if not np.array_equal(self.membrane.tets, made.tets):
-            raise _failed("its membrane folds")
-        return made
-
-    def _made(self, meridian: Meridian, heights: Array) -> Membrane:
-        turn, sectors, layers, rings = self._grid
-        return membrane_mesh(meridian, turn, heights, sectors, layers, rings)
+from .wall_grid import WallGrid, unmovable
 
 
 class Morph:
@@ -73,7 +40,7 @@ class Morph:
         count = len(self._before.nodes)
         close = 1e-6 * a.cell
         if len(mesh.nodes) < count or np.abs(mesh.nodes[:count] - self._before.nodes).max() > close:
-            raise _failed("its mesh is not by gmsh, or has other settings")
+            raise unmovable("its mesh is not by gmsh, or has other settings")
         known = np.zeros(len(mesh.nodes), bool)
         known[:count] = True
         if mesh.order == 2:
@@ -142,13 +109,6 @@ def shrunk(d: Dimensions, cell: float) -> Dimensions:
     return attrs.evolve(d, cell=cell, grading=grading, **scaled)
 
 
-def _breaks(meridian: Meridian) -> Array:
-    """Heights on the profile where a part ends: cuts, arcs, ends."""
-    d = meridian.d
-    joints = np.arange(d.count)[:, None] * d.cell + np.array([0.0, d.b, d.cell / 2, d.cell - d.b])
-    return np.concatenate([joints.ravel(), [d.height], meridian.cuts])
-
-
 def _ends(mesh: Mesh) -> Array:
     """Corners (n, 2) on either side of every mid-edge node."""
     ends = np.zeros((len(mesh.nodes), 2), int)
@@ -174,9 +134,3 @@ def _laplace(nodes: Array, tets: Array, prescribed: Array) -> Harmonic:
     slopes = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     local = np.einsum("mad,mbd->mab", slopes, slopes)
     return Harmonic(len(nodes), tets, local, prescribed)
-
-
-def _failed(why: str) -> MeshingError:
-    return MeshingError(
-        f"the mesh of a unit cannot be moved: {why}", "unit", "make a new mesh of the other unit"
-    )

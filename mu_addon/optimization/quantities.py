@@ -8,8 +8,8 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..fem.bending_angle import TipSection, tip_faces
 from ..fem.held_tip import HeldTip
-from ..fem.kinematics import TipSection, tip_faces
 from ..fem.lattice_law import deformation_gradients
 from ..fem.model import Model
 from ..fem.relocated import relocated

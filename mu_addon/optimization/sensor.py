@@ -11,7 +11,8 @@ from ..design.anchors import anchor_points, window
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..design.waveguide import waveguide
-from ..fem.kinematics import TipSection, probe
+from ..fem.bending_angle import TipSection
+from ..fem.kinematics import probe
 from ..placement.deviation import centreline
 from ..sensing.embedded_waveguide import Joints, embed_waveguide
 from ..sensing.law import Law, fit_law

@@ -17,9 +17,9 @@ from ..fem.embedding import embed
 from ..meshing.homogenised_unit import mesh_unit
 from ..meshing.membrane import Membrane, division
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
-from ..meshing.morph import WallGrid
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, SOLID, MeshSettings
+from ..meshing.wall_grid import WallGrid
 from .beams import REACH, with_beams
 from .lattice import LEAST_SUPPORT, clearance, struts, support, without_loose_parts
 from .strut import is_half_diagonal

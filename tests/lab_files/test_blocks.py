@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mu_addon.lab_files import blocks
-from mu_addon.lab_files.quantities import column, unit_of
+from mu_addon.lab_files.columns import column, unit_of
 from mu_addon.lab_files.source import sheet_of_text
 
 from . import exports

@@ -13,7 +13,7 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.lab_files.blocks import tables
-from mu_addon.lab_files.quantities import column
+from mu_addon.lab_files.columns import column
 from mu_addon.lab_files.source import read_sheets, sheet_of_text
 from mu_addon.usecases.import_data.report import terminal_lines
 from mu_addon.usecases.import_data.understood import understand

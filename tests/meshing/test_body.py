@@ -11,8 +11,8 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_volume, outer_volume
 from mu_addon.design.surface import bad_edges, volume
 from mu_addon.errors import InputError
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit_materials import materials_of

@@ -8,8 +8,9 @@ import pytest
 
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg, probe
+from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit_materials import materials_of

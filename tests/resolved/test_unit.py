@@ -12,9 +12,9 @@ from mu_addon.design.lattice import lattice_of
 from mu_addon.design.profile import cavity_polygon, outer_polygon
 from mu_addon.design.solid import QUALITY, lattice_solid
 from mu_addon.errors import InputError
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg
 from mu_addon.fem.model import Model
 from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.unit_materials import materials_of

@@ -19,8 +19,9 @@ from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import Run, run
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import bending_angle_deg, probe
+from mu_addon.fem.kinematics import probe
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate

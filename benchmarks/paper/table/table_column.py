@@ -11,8 +11,9 @@ import numpy as np
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import Unit
 from mu_addon.design.quantity import in_kPa
+from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.kinematics import TipSection, probe
+from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.self_intersection import first_self_intersection
 from mu_addon.fem.state import State, rest

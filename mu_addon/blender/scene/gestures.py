@@ -18,7 +18,7 @@ from ...design.anchors import windows
 from ..gripper import object as gripper_object
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, handlers, scene_units, updates
-from ..unit import broken, drawing, live_update
+from ..unit import broken, drawing, preview_update
 from ..unit import object as unit_object
 
 _holders: dict[str, int] = {}
@@ -178,7 +178,7 @@ def _damaged(root: Any) -> bool:
 
 def _rebuild(root: Any) -> None:
     if root.mu_unit.uuid:
-        live_update.schedule(root)
+        preview_update.schedule(root)
     else:
         gripper_object.rebuild(root)
 
@@ -216,7 +216,7 @@ def _after_import(imported: Any) -> None:
                 # Blender may reuse a mesh that it imported before.
                 unit_object.separate(obj)
     look()
-    live_update.catch_up()
+    preview_update.catch_up()
 
 
 def _size_instances(collections: set[Any]) -> None:

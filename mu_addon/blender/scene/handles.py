@@ -18,7 +18,7 @@ from mathutils import Matrix, Vector
 
 from ...design.dimensions import Dimensions
 from ...errors import InputError
-from ..live import state as live
+from ..live_bending import state as live
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import viewports

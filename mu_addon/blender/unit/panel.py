@@ -7,7 +7,7 @@ import bpy
 from ..body import panel as body_panel
 from ..grading import panel as grading_panel
 from ..gripper import object as gripper_object
-from ..live import words as live_words
+from ..live_bending import words as live_words
 from ..node_tree import following
 from ..shared import scene_units
 from ..shared.operators import NO_UNIT, linked

@@ -14,7 +14,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.printer import Printer, printer_text, read_printer
 from ...design.settings import QUALITY
 from ...design.surface import Triangles, Vertices
-from ...design.surface_file import read_surface
+from ...design.surface_reading import read_surface
 from ...errors import InputError
 from ...reading import file_bytes
 from ...run.folder import FolderLayout

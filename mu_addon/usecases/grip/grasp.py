@@ -17,9 +17,10 @@ from ...design.anchors import anchor_points
 from ...design.gripper import Gripper
 from ...design.settings import FRICTION
 from ...errors import ConvergenceError, InputError
+from ...fem.bending_angle import TipSection
 from ...fem.dead_loads import STANDARD_GRAVITY
 from ...fem.equilibrium import Equilibrium
-from ...fem.kinematics import TipSection, probe
+from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.newton_settings import CONTACT_NEWTON, NewtonSettings

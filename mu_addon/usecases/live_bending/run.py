@@ -19,8 +19,8 @@ import numpy as np
 from ...design.dimensions import Dimensions
 from ...design.quantity import in_kPa, in_MPa
 from ...errors import ConvergenceError, InputError, MeshingError, MuError
+from ...fem.bending_angle import TipSection
 from ...fem.equilibrium import Equilibrium
-from ...fem.kinematics import TipSection
 from ...fem.model import Model
 from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
 from ...fem.state import State, rest

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...fem.kinematics import TipSection
+from ...fem.bending_angle import TipSection
 from ...fem.state import State
 from ...fem.stress import peak_stretch
 from ...files import write_csv

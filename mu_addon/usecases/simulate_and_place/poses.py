@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from ...errors import InputError
-from ...fem.kinematics import TipSection
+from ...fem.bending_angle import TipSection
 from .motion_files import Motion
 
 Array = np.ndarray[Any, Any]

@@ -13,7 +13,7 @@ from ...design.anchors import Window, anchor_points, windows
 from ...design.export import write_nodes, write_stl
 from ...design.solid import Solid, build_solid
 from ...errors import ConvergenceError, InputError, MeshingError
-from ...fem.kinematics import TipSection
+from ...fem.bending_angle import TipSection
 from ...fem.model import Model
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory

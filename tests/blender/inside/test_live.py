@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mu_addon.blender.jobs import start_child
-from mu_addon.blender.live import state as live
-from mu_addon.blender.live import words
+from mu_addon.blender.live_bending import state as live
+from mu_addon.blender.live_bending import words
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.scene import gestures, handles
 from mu_addon.blender.shared import displays

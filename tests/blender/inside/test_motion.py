@@ -13,8 +13,8 @@ from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.results import panel as results_panel
 from mu_addon.blender.shared.compat import modifier_input
 from mu_addon.blender.unit import drawing
-from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit import preview_update as live
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import anchor_points
 from mu_addon.usecases.simulate_and_place.result_pictures import write_angle, write_delta

@@ -9,8 +9,8 @@ import numpy as np
 from mu_addon.blender.preview import skeletons
 from mu_addon.blender.shared import updates
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
-from mu_addon.blender.unit import live_update as live
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit import preview_update as live
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.surface import volume, weld
-from mu_addon.design.surface_file import read_surface
+from mu_addon.design.surface_reading import read_surface
 from mu_addon.errors import InputError
 
 OUTLINE = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
