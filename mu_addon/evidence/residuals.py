@@ -29,7 +29,11 @@ FALSE_ALARM = 0.003
 BANDS = 16
 # The pitch of chambers at 1.0x.
 PITCH_MM = Chambers().cell_mm
-ANGLE = "angle_deg"
+ANGLE, TURN = "angle_deg", "orientation_deg"
+BY_TURN = "turn"
+"""Test against the angle that a unit is turned by within a record."""
+# Of a turn, in which a residual is sought.
+HARMONICS = 4
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
 # A column of which less than this share remains after projection has no information.
@@ -132,6 +136,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
             and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
         }
         found += _tested(fitted, name, _powers(record, held), spare)
+    found += _by_turn(fitted, spare)
     found += _tested(fitted, "angle", _powers(record, _angles(fitter, fit)), spare)
     response = _response(fitter, fit)
     for name, condition in CONDITIONS:
@@ -222,6 +227,47 @@ def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Arr
         return np.polynomial.chebyshev.chebvander(x, degree)[:, 1:].T
 
     return record.laid_out(powers)
+
+
+def _by_turn(fitted: _Fitted, spare: Mapping[str, float]) -> list[Dependence]:
+    """Test against the angle that a unit is turned by within a record.
+
+    Such readings have no clock, and so a noise that is estimated from this very residual: a share of it is
+    tested (by the beta distribution), not its size over that noise.
+    """
+    from scipy.stats import beta
+
+    columns = _turns(fitted.fitter.record)
+    if columns is None:
+        return []
+    total = float(fitted.residual @ fitted.residual)
+    left = len(fitted.residual) - len(fitted.along)
+    return [
+        attrs.evolve(
+            d, p_value=float(beta.sf(min(d.statistic / total, 1.0), d.dof / 2, max(left - d.dof, 1) / 2))
+        )
+        for d in _tested(fitted, BY_TURN, columns, spare)
+    ]
+
+
+def _turns(record: Record) -> Array | None:
+    """Harmonics (N, d) of the angle that a unit is turned by within a record; None where it is not turned."""
+    turned = {
+        i: np.radians(e[TURN])
+        for i, e in enumerate(record.experiments)
+        if TURN in e.columns and np.ptp(e[TURN]) > 0.0
+    }
+    if not turned:
+        return None
+    apart = np.unique(np.round(np.concatenate(list(turned.values())) % (2.0 * np.pi), 6))
+    orders = np.arange(1, min(HARMONICS, (len(apart) - 1) // 2) + 1)[:, None]
+
+    def harmonics_of(i: int) -> Array:
+        if i not in turned:
+            return np.zeros((2 * len(orders), len(record.experiments[i])))
+        return np.concatenate([np.cos(orders * turned[i]), np.sin(orders * turned[i])])
+
+    return record.laid_out(harmonics_of) if len(orders) else None
 
 
 def _by_condition(record: Record, values: Array, response: Array) -> Array | None:

@@ -24,6 +24,15 @@ from mu_addon.measured import read_folder
 FOLDER = Path(second_code.__file__).parent
 
 
+@pytest.mark.parametrize(("part", "verdict"), [("outside", "unexplained"), ("clean", "none")])
+def test_what_depends_on_the_turn_of_a_unit_is_no_noise(part, verdict):
+    """A cable pulls on one side: readings of a turn scatter as noise would, but alike at three pressures."""
+    number = 20 if part == "outside" else 30
+    asked = order(part, number, 777)
+    assert (asked.kind, asked.noise) == ("unit_pose", "white")
+    assert judged(asked)["verdict"] == verdict
+
+
 def test_what_makes_the_sets_knows_nothing_of_the_engine():
     # A whole unit has the program's shape and surfaces, and no physics of it.
     shared = {
