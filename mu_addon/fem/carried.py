@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
+_MIDWAY = 0.25
+
 
 def following(mesh: Mesh, u: Array) -> Array:
     """Displacements u (n, 3) in mm with tied and carried nodes set to follow their masters, in place."""
@@ -26,7 +28,9 @@ class Carried:
     """The carried nodes of a mesh with beams (`Mesh.carried`).
 
     A node at X moves by the mean, weighted by its two shares, of what the sections at two beam nodes would
-    do to it: u + (R - 1)(X - X_b), with displacement u and rotation R of the beam node at X_b.
+    do to it: u + (R - 1) a, with displacement u and rotation R of the beam node at X_b, and a = X - X_b for a
+    node of one section. Midway between two, a is shorter by a quarter of the way from X_b to the other
+    section: the axis is then the parabola with the sections as its normals, and their shear is the beam's.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -39,7 +43,11 @@ class Carried:
         self._own, self._node, self._turn = own, node[own, side], turn[own, side]
         self._turns, self._of = np.unique(self._turn, return_inverse=True)
         self._share = shares[own, side]
-        self._arm = mesh.nodes[mesh.carried[own]] - mesh.nodes[self._node]
+        # Shares of three places in each arm: the carried node's, the section's and the other section's.
+        self._other = node[own, 1 - side]
+        self._less = np.where(self._share < 1.0, _MIDWAY, 0.0)[:, None]
+        x = mesh.nodes
+        self._arm = x[mesh.carried[own]] - (1.0 - self._less) * x[self._node] - self._less * x[self._other]
 
     def follow(self, u: Array) -> Array:
         """Displacements u (n, 3) in mm with those of carried nodes set, in place."""
@@ -69,7 +77,8 @@ class Carried:
             by_arm = np.einsum("kiaj,ki,kj->ka", by_axis[self._of], acting, v[self._turn])
         found = np.zeros_like(u)
         np.add.at(found, self.nodes[self._own], by_arm)
-        np.subtract.at(found, self._node, by_arm)
+        np.subtract.at(found, self._node, (1.0 - self._less) * by_arm)
+        np.subtract.at(found, self._other, self._less * by_arm)
         return found
 
     def _axes(self) -> Array:

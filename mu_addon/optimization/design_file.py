@@ -337,8 +337,6 @@ def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fix
         if target.kind in OF_SENSOR:
             return f"{target.kind} is of a sensor, which a printed body has meshed into it"
     for name in (*(f.name for f in freedoms), *fixed):
-        if name == PATH:
-            return "a path is a freedom, and a printed body has its sensor meshed into it"
         if name in OF_LATTICE:
             return f"{name} is of a homogenised lattice: printed struts have the resin's"
     return ""
