@@ -61,7 +61,7 @@ class Description(NamedTuple):
         """The bounds or the choices as text; "" for a flag or a text."""
         if self.type is bool or (self.type is str and not self.choices):
             return ""
-        return " or ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
+        return " or ".join(self.choices) if self.choices else f"{self.low:.8g} to {self.high:.8g}"
 
     @property
     def assumed(self) -> bool:

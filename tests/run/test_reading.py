@@ -327,7 +327,7 @@ def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
         (["record", "--simulate", "--seconds", "nan", "--out", "OUT"], "nan is no number"),
         (["record", "--simulate", "--seconds", "inf", "--out", "OUT"], "no time"),
         (["record", "--simulate", "--seconds", "-1", "--out", "OUT"], "no time"),
-        (["record", "--port", "x", "--baud", "0", "--out", "OUT"], "no rate"),
+        (["record", "--port", "x", "--baud", "0", "--out", "OUT"], "baud = 0 is out of bounds"),
         (["design", "--preset", "mu-1.0x", "--out", "OUT\0x"], "NUL"),
         (["design", "--preset", "mu-1.0x", "--out", "OUT\udcff"], "no UTF-8"),
         (["specimens", "--resin", "", "--out", "OUT"], "empty"),
