@@ -268,7 +268,9 @@ def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
     monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
     ends = [(0.5, 0.5, z) for z in (0.0, 1.0)] + [(0.5, y, 0.5) for y in (0.0, 1.0)]
     ends += [(x, 0.5, 0.5) for x in (0.0, 1.0)]
-    lattices.register(LatticeKind("upright cross", [(0.5, 0.5, 0.5), *ends], [(0, k) for k in range(1, 7)], constant))
+    lattices.register(
+        LatticeKind("upright cross", [(0.5, 0.5, 0.5), *ends], [(0, k) for k in range(1, 7)], constant)
+    )
     unit = Unit(
         lattice=Envelope(kind="upright cross", junction_diameter_mm=1.0, midspan_diameter_mm=1.4),
         waveguide=Waveguide(seats=False),
