@@ -85,7 +85,7 @@ def test_every_parameter_of_the_core_is_a_property():
                 assert abs(p.hard_max - d.high) < 1e-3
                 assert abs(p.default - d.default) < 1e-4
                 assert (p.subtype == "DISTANCE_CAMERA") == (d.unit == "mm")
-                assert f"{d.low:g} to {d.high:g} {d.unit}".rstrip() in p.description
+                assert f"{d.allowed} {d.unit}".rstrip() in p.description
                 if d.unit and d.unit != "mm":
                     assert p.name.endswith(f"({d.unit})")
 
