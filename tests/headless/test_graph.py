@@ -1,5 +1,6 @@
 """`graph` as a user runs it: killed and resumed to the same digits, cached, bad files without a traceback."""
 
+import contextlib
 import json
 import shutil
 import subprocess
@@ -82,12 +83,12 @@ def test_again_nothing_is_computed_and_a_changed_wall_only_its_own(whole, file, 
 
 
 def is_running(process):
-    """True until a process has closed its files, and so let its folder go: a zombie has."""
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state not in "ZX"
+    """True until a process has closed its files, and so let its folder go: all its threads are zombies."""
+    states = []
+    for thread in Path(f"/proc/{process}/task").glob("*/stat"):
+        with contextlib.suppress(OSError):
+            states.append(thread.read_text().rpartition(")")[2].split()[0])
+    return any(state not in "ZX" for state in states)
 
 
 def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, tmp_path):
