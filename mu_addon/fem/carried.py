@@ -59,8 +59,12 @@ class Carried:
 
     def slopes(self, u: Array) -> Array:
         """Slopes (k, 3, 3) of each carried node's displacement by a rotation vector, its share included."""
+        return np.einsum("kiaj,ka->kij", self._by_axis(u), self._share[:, None] * self._arm)
+
+    def _by_axis(self, u: Array) -> Array:
+        """Slopes (k, 3, 3, 3) of each pair's three turned axes, its second index, by its rotation vector."""
         by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
-        return np.einsum("kiaj,ka->kij", by_axis[self._of], self._share[:, None] * self._arm)
+        return np.asarray(by_axis[self._of])
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array:
         """Derivative (n, 3) by all nodes' places of forces (n, 3) times what carried nodes are given.
@@ -73,8 +77,7 @@ class Carried:
             turned = rotation(u[self._turns])[self._of]
             by_arm = np.einsum("kij,ki->kj", turned, acting) - acting
         else:
-            by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
-            by_arm = np.einsum("kiaj,ki,kj->ka", by_axis[self._of], acting, v[self._turn])
+            by_arm = np.einsum("kiaj,ki,kj->ka", self._by_axis(u), acting, v[self._turn])
         found = np.zeros_like(u)
         np.add.at(found, self.nodes[self._own], by_arm)
         np.subtract.at(found, self._node, (1.0 - self._less) * by_arm)

@@ -407,10 +407,17 @@ class Model:
         return MaterialData(tuple(layers), float(least), self.beams_of(materials))
 
     def beams_of(self, materials: Materials) -> Beams | None:
-        """Beams of the mesh, of a body's materials, or None."""
+        """Beams of the mesh, of their elements' mean modulus and Poisson's ratio; None without beams."""
         if not len(self.mesh.beams):
             return None
-        return self._beams(*materials.small_strain(len(self.mesh.tets)))
+        mesh, (part, share) = self.mesh, self.shares_of_beams
+        of = mesh.beam_of[part]
+        E, nu = (
+            np.bincount(of, share * a[part], len(mesh.beams)) for a in materials.small_strain(len(mesh.tets))
+        )
+        chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
+        sections = sections_of(np.linalg.norm(chord, axis=1), mesh.flexible, E, nu)
+        return Beams(chord, frames_along(chord), sections)
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array | float:
         """Derivative (n, 3) by places of forces times what carried nodes are given (`Carried.by_places`)."""
@@ -432,15 +439,6 @@ class Model:
         part = np.flatnonzero(~mesh.solid)
         of, volume = mesh.beam_of[part], self.volumes[part]
         return part, volume / np.bincount(of, volume, len(mesh.beams))[of]
-
-    def _beams(self, modulus_MPa: Array, poisson: Array) -> Beams:
-        """Beams of the mesh, of the mean modulus and Poisson's ratio (m,) of their elements."""
-        mesh, (part, share) = self.mesh, self.shares_of_beams
-        of = mesh.beam_of[part]
-        E, nu = (np.bincount(of, share * a[part], len(mesh.beams)) for a in (modulus_MPa, poisson))
-        chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
-        sections = sections_of(np.linalg.norm(chord, axis=1), mesh.flexible, E, nu)
-        return Beams(chord, frames_along(chord), sections)
 
     def _mean_kappa(self, layer: Layer) -> Array:
         """Bulk modulus (k,) in MPa of a layer that acts on the mean J, 0 where it acts point by point."""

@@ -113,17 +113,17 @@ def _changes(
     found = {}
     for condition, (numbers, lam) in solved.of.items():
         u = states[condition]
-        along = [_everywhere(structure, u, column) for column in lam.T]
+        along = _everywhere(structure, u, lam)
         found[condition] = list(numbers), ResidualChange(structure, condition, u, along)
     return found
 
 
-def _everywhere(structure: Structure, u: Array, free: Array) -> Array:
-    """A change (free,) of the displacements u (n, 3) as one at the nodes (n, 3)."""
-    model = structure.model
-    found = np.zeros_like(u)
-    found.ravel()[model.free] = free
-    return structure.following_change(u, found)
+def _everywhere(structure: Structure, u: Array, free: Array) -> list[Array]:
+    """Changes (free, k) of the displacements u (n, 3) as k at the nodes, (n, 3) each."""
+    changes = np.zeros((free.shape[1], *u.shape))
+    for change, column in zip(changes, free.T, strict=True):
+        change.ravel()[structure.model.free] = column
+    return structure.following_changes(u, list(changes))
 
 
 def _residual_change(plus: Structure, minus: Structure, condition: Condition, states: States) -> Array:
@@ -153,5 +153,5 @@ def _displacement_derivatives(
     for condition, changes in forces.items():
         factor, _ = _tangent_factor(structure, states, condition)
         moved = factor.solve(-np.stack(changes, axis=1))
-        found[condition] = [_everywhere(structure, states[condition], column) for column in moved.T]
+        found[condition] = _everywhere(structure, states[condition], moved)
     return found

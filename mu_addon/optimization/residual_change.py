@@ -119,8 +119,7 @@ class ResidualChange:
             return found
         u = side.following(self._u)
         forces = [obstacle.forces(u) for obstacle in model.obstacles]
-        for k, v in enumerate(self._along):
-            own = side.following_change(self._u, v)
+        for k, own in enumerate(side.following_changes(self._u, self._along)):
             found[k] = sum(float(np.vdot(own[nodes], parts)) for nodes, parts in forces)
             if model.load is not None:
                 found[k] -= float(np.vdot(own, model.load))

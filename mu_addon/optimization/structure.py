@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import attrs
@@ -77,9 +77,10 @@ class Structure:
         mesh = self.model.mesh
         return np.asarray(self.model.following(u.copy())) if len(mesh.tied) or len(mesh.carried) else u
 
-    def following_change(self, u: Array, v: Array) -> Array:
-        """A change v (n, 3) of displacements u (n, 3) in mm, with `following` to first order."""
-        return np.asarray(self.model.passed_back(u, v.reshape(-1, 1).copy()).reshape(v.shape))
+    def following_changes(self, u: Array, changes: Sequence[Array]) -> list[Array]:
+        """Changes (n, 3) of displacements u (n, 3) in mm, with `following` to first order."""
+        columns = np.stack([v.ravel() for v in changes], axis=1)
+        return [column.reshape(u.shape) for column in self.model.passed_back(u, columns).T]
 
     def under(self, condition: Condition) -> Model:
         """Model of a condition: the body's own, or one with the wall that holds its tip."""

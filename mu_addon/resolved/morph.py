@@ -64,6 +64,7 @@ class PrintedMorph:
         self._lattice = with_struts(self._graph, covered)
         self._swept = SweptNodes(self._lattice, self._struts) if is_half_diagonal(a) else None
         self._layers = Layers(mesh, self._lattice, beam_layers(sizes)) if len(turns) else None
+        self._beams = None if self._layers is None else self._layers.of_beams(mesh)
         self._footholds = Footholds.of(wall, mesh.nodes[mesh.tied])
         self._cut, self._outside = self._cut_elements(a)
         self._before = self._shares(mesh.nodes, a, np.arange(len(self._cut)))
@@ -114,12 +115,12 @@ class PrintedMorph:
         mesh, other = self.mesh, with_struts(self._graph, self._covering(d))
         struts = self._struts_of(d, other)
         nodes = np.vstack([wall, struts])
-        if self._layers is None:
+        if self._layers is None or self._beams is None:
             return nodes, mesh.flexible
         nodes = np.vstack([nodes, rotation_nodes(mesh.beams, nodes)[1]])
         if struts is self._struts:
             return nodes, mesh.flexible
-        return nodes, self._layers.flexible(other, *self._layers.of_beams(mesh), zones_of(d))
+        return nodes, self._layers.flexible(other, *self._beams, zones_of(d))
 
     def _struts_of(self, d: Dimensions, other: Lattice) -> Array:
         """The struts' nodes (n, 3) in mm of another lattice of other dimensions; raises InputError."""

@@ -63,7 +63,6 @@ class Live:
     number: int = 0
     design: str = ""
     due_s: float | None = None
-    motion: Motion | None = None
     shape: Shape | None = None
     trouble: str = ""
     _read_ns: int = 0
@@ -230,8 +229,7 @@ def _answered(root: Any, live: Live) -> bool:
     if answer["trouble"]:
         live.trouble = answer["trouble"]
         return True
-    live.motion = read_motion(live.folder / answer["folder"])
-    live.shape = _shape(root, live.motion, answer)
+    live.shape = _shape(root, read_motion(live.folder / answer["folder"]), answer)
     place(root)
     return True
 
