@@ -23,11 +23,15 @@ _LINE_END = re.compile(r"\r\n|\n|\r")
 
 @attrs.frozen
 class Row:
-    """One row of a file or spreadsheet: its line, its cells as text, its last line where it has several."""
+    """One row of a file or spreadsheet: its line, its cells as text, its last line where it has several.
+
+    computed: how its first cell was computed, "" where it was read.
+    """
 
     line: int
     cells: tuple[str, ...]
     last: int = 0
+    computed: str = ""
 
     @property
     def filled(self) -> tuple[str, ...]:

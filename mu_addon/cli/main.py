@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -131,8 +130,7 @@ def main(arguments: list[str]) -> int:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)
         context.short_report = _short_report
-        # Blender itself has no threads of ours.
-        with nullcontext() if "bpy" in sys.modules else context.progress.beating():
+        with context.progress.beating():
             command.run(options, context)
     if context.status == 0 and not getattr(options, "json", False):
         results = [f"results: {context.folder}"] if context.folder is not None else []

@@ -25,7 +25,10 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py track bench.mp4 --markers bench.toml --pressure ladder.csv --out measured",
     )
     command.add_argument(
-        "clip", metavar="CLIP", help="Movie, first image of a sequence, or a CSV file of tracked pixels."
+        "clip",
+        metavar="CLIP",
+        help="Movie, first image of a sequence, or a table of tracked pixels (CSV), also by DeepLabCut, "
+        "TrackMate or Kinovea.",
     )
     command.add_argument(
         "--markers",

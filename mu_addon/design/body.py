@@ -18,7 +18,7 @@ from .dimensions import Dimensions
 from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
 from .surface import Triangles, Vertices, volume, weld
-from .surface_reading import SUFFIXES, read_surface
+from .surface_reading import SUFFIXES, read_surface, require_mesh
 
 if TYPE_CHECKING:
     from .anchors import Window
@@ -131,17 +131,15 @@ def read_body(path: str | Path) -> Body:
     """
     path = Path(path)
     remedy = "give a closed surface as STL, OBJ or PLY, in mm"
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"the file type {path.suffix or '(none)'} is not supported for a body", str(path), remedy
-        )
     try:
         content = file_bytes(path, MOST_BYTES)
+        if path.suffix.lower() not in SUFFIXES:
+            require_mesh(content[:64], path.name)
+            raise InputError(f"the file type {path.suffix or '(none)'} is not supported", path.name, remedy)
+        return body_of(*read_surface(content, path.name), path.name)
     except OSError as error:
         why = error.strerror or error
         raise InputError(f"no body can be read from it: {why}", str(path), remedy) from error
-    try:
-        return body_of(*read_surface(content, path.name), path.name)
     except InputError as error:
         raise InputError(f"no body can be read from it: {error.what}", str(path), error.remedy) from error
 

@@ -16,6 +16,28 @@ from .surface import Triangles, Vertices, stl_surface
 SUFFIXES = (".stl", ".obj", ".ply")
 _VERTEX = re.compile(r"(?<!\S)vertex(?!\S)")
 _CORNER = re.compile(_VERTEX.pattern + r"\s+(\S+)\s+(\S+)\s+(\S+)")
+# What files that are no mesh of ours begin with or are named: what they are, and what to do.
+_CAD = "in the CAD program export the solid as STL, in mm, with a chord error of 0.05 mm or less"
+_BLENDER = "open it in Blender and export the part as STL"
+_OTHERS = (
+    (
+        b"PK\x03\x04",
+        (".3mf", ".amf"),
+        "an archive, as a 3MF",
+        "open it in a slicer and export the part as STL",
+    ),
+    (b"ISO-10303-21", (".step", ".stp"), "a STEP file", _CAD),
+    (
+        b"",
+        (".iges", ".igs", ".brep", ".sldprt", ".ipt", ".f3d", ".fcstd", ".x_t", ".sat"),
+        "a CAD file",
+        _CAD,
+    ),
+    (b"glTF", (".glb", ".gltf"), "a glTF scene", _BLENDER),
+    (b"Kaydara FBX", (".fbx", ".dae", ".usd", ".blend"), "a scene", _BLENDER),
+    (b"version https://git-lfs", (), "a pointer of Git LFS", "fetch the file itself with git lfs pull"),
+    (b"<", (".html", ".xml"), "a web page or XML", "download the file itself, or export the part as STL"),
+)
 # Errors by meshio for an invalid PLY file.
 _DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
 
@@ -26,6 +48,7 @@ def read_surface(content: bytes, name: str, most_triangles: int | None = None) -
     name: of the file, whose suffix tells OBJ and PLY; all else is STL, binary or text. most_triangles: refuse
     an STL file with more before it is parsed. Raises InputError with the line or number at fault.
     """
+    require_mesh(content[:64], name)
     suffix = PurePath(name).suffix.lower()
     if suffix == ".obj":
         points, triangles = _obj(_text(content), name)
@@ -38,6 +61,14 @@ def read_surface(content: bytes, name: str, most_triangles: int | None = None) -
     return points, triangles
 
 
+def require_mesh(content: bytes, name: str) -> None:
+    """Raise InputError with a remedy for content or a name of a format that is known, but no mesh of ours."""
+    suffix = PurePath(name).suffix.lower()
+    named = [row for row in _OTHERS if suffix in row[1]]
+    for _, _, what, remedy in named or [row for row in _OTHERS if row[0] and content.startswith(row[0])]:
+        raise InputError(f"the file is {what}, no STL, OBJ or PLY", name, remedy)
+
+
 def _text(content: bytes) -> str:
     """Text with any line ends; bytes that are not ASCII, in names, stay as they are."""
     return content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
@@ -48,8 +79,6 @@ def _malformed(name: str, why: str) -> InputError:
 
 
 def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangles]:
-    if content.startswith(b"PK\x03\x04"):
-        raise InputError("the file is an archive, as a 3MF, no STL", name, "export the part as STL")
     count = int.from_bytes(content[80:84], "little")
     binary = len(content) >= 84 and len(content) == 84 + 50 * count
     if not binary:

@@ -190,6 +190,17 @@ class Evaluation:
                 self._make(name)
         return self.states
 
+    def order(self, name: str) -> Order | None:
+        """Run of a node whose sources are evaluated; None for any other node. Raises MuError."""
+        node = self.tree.nodes[name]
+        definition = self.definitions[node.kind]
+        if definition.order is None or node.muted or not all(map(self._is_made, self.tree.sources(name))):
+            return None
+        if not all(source in self.outputs for source in self.tree.sources(name)):
+            return None
+        found: Order = definition.order(self._call(name, node, definition, self._settings(node, definition)))
+        return found
+
     def _set(self, name: str, state: State) -> None:
         self.states[name] = state
         self.report(name, state)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -53,11 +52,11 @@ class FolderRuns:
     def start(self, node: str, order: Order) -> Finished:
         """Run it to its end; raises its MuError, and Stopped when the whole evaluation is to stop."""
         errors: list[Message] = []
-        inner = Progress([_of_node(node, self.progress.sinks, errors)])
+        inner = Progress([_of_node(node, self.progress, errors)])
         place = self.place(order)
         if order.after is not None:
             _take_up(order.after / CACHE, place / CACHE)
-        with run_to_end(inner) as context:
+        with run_to_end(inner) as context, inner.beating():
             context.wants_report = self.reports
             order.use_case.start(order.job, place, context)
         summary = _summary(place)
@@ -94,16 +93,16 @@ def _take_up(before: Path, now: Path) -> None:
                 (now / f".{path.name}.part").replace(now / path.name)
 
 
-def _of_node(node: str, sinks: Sequence[Sink], errors: list[Message]) -> Sink:
+def _of_node(node: str, progress: Progress, errors: list[Message]) -> Sink:
     """A sink that passes on a run's stages and warnings under the node's name, and keeps its errors."""
 
     def sink(message: Message) -> None:
         if message["type"] == "error":
             errors.append(message)
-        elif message["type"] in ("progress", "warning"):
-            key = "stage" if message["type"] == "progress" else "what"
-            for one in sinks:
-                one({**message, key: f"{node}: {message[key]}"})
+        elif message["type"] == "progress":
+            progress.part(node, message)
+        elif message["type"] == "warning":
+            progress.emit({**message, "what": f"{node}: {message['what']}"})
 
     return sink
 

@@ -437,11 +437,19 @@ def _block(
                 unsure=any(read[k].unsure for k in group),
                 clock=next((n for n, k in enumerate(group) if read[k].clock), None),
                 noted=tuple(
-                    f"{_named(columns[k].title, k)}: {read[k].noted}" for k in group if read[k].noted
+                    f"{_named(columns[k].title, k)}: {noted}"
+                    for k in group
+                    for noted in _noted(read[k], k, rows)
                 ),
             )
         )
     return parts
+
+
+def _noted(one: _Read, k: int, rows: Sequence[Row]) -> list[str]:
+    """Conclusions on column k: how it was read, or computed."""
+    computed = dict.fromkeys(row.computed for row in rows if k == 0 and row.computed)
+    return [*([one.noted] if one.noted else []), *computed]
 
 
 def _named(title: str, k: int) -> str:

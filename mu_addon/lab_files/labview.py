@@ -28,7 +28,8 @@ def rows_of_labview(rows: Sequence[Row]) -> tuple[Row, ...]:
             count = 0
             found.append(attrs.evolve(row, cells=_titles(row.cells, header)))
         elif row.cells and not row.cells[0] and row.numeric and count >= 0:
-            found.append(attrs.evolve(row, cells=(_time(header, count), *row.cells[1:])))
+            time, computed = _time(header, count)
+            found.append(attrs.evolve(row, cells=(time, *row.cells[1:]), computed=computed))
             count += 1
         elif row.numeric and not row.cells[0][:1].isalpha() and count >= 0:
             found.append(row)
@@ -53,11 +54,12 @@ def _titles(cells: Sequence[str], header: dict[str, tuple[str, ...]]) -> tuple[s
     return tuple(named)
 
 
-def _time(header: dict[str, tuple[str, ...]], count: int) -> str:
-    """Time of a row by the beginning and step of its segment, "" where these are no numbers."""
+def _time(header: dict[str, tuple[str, ...]], count: int) -> tuple[str, str]:
+    """Time of a row by the beginning and step of its segment, and how; "" where these are no numbers."""
     decimal = (header.get("Decimal_Separator") or (".",))[0]
     texts = [(header.get(key) or ("",))[0] for key in ("X0", "Delta_X")]
     begin, step = (number(text, decimal) for text in texts)
     if begin is None or step is None:
-        return ""
-    return f"{begin + count * step:.12g}".replace(".", decimal)
+        return "", ""
+    time = f"{begin + count * step:.12g}".replace(".", decimal)
+    return time, f"computed from X0 = {begin:g} and Delta_X = {step:g}, as no row has it"

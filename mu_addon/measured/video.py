@@ -34,13 +34,15 @@ class Tracks:
     """Markers tracked through a clip: (m, n, 2) in pixels, right and down from the upper left corner.
 
     names: of the m markers; positions are nan in frames where a marker was lost. fps: frames per s, 0 where
-    the clip does not give it; time_s (n,): of the frames in s, None where only fps says it.
+    the clip does not give it; time_s (n,): of the frames in s, None where only fps says it. remarks: on how
+    they were read.
     """
 
     names: tuple[str, ...]
     pixels: Array
     fps: float = 0.0
     time_s: Array | None = None
+    remarks: tuple[Remark, ...] = ()
 
     def __len__(self) -> int:
         return int(self.pixels.shape[1])

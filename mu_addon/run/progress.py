@@ -4,6 +4,7 @@ A `Progress` makes messages, plain dictionaries with a `type`, and hands each to
 
 - plan: the stages that are expected, as [name, seconds], and the seconds of all
 - progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
+  of a run within this one its name before the stage, and part (0..1) and part_seconds_left of that run,
   and detail where there is something to say of what was just done, at its end of what the stage made; where
   there is a plan also whole (0..1) and whole_seconds_left, of the run, and why the latter grew, if it did;
   beat where nothing is new but the time
@@ -66,7 +67,13 @@ class Progress:
 
     @contextmanager
     def beating(self, every_s: float = BEAT_S) -> Iterator[None]:
-        """Context in which a thread reports a stage's time if it has reported nothing for `every_s`."""
+        """Context in which a thread reports a stage's time if it has reported nothing for `every_s`.
+
+        None in Blender, which bears no threads.
+        """
+        if "bpy" in sys.modules:
+            yield
+            return
         ended = threading.Event()
 
         def beat() -> None:
@@ -145,6 +152,15 @@ class Progress:
                 with suppress(OSError, MuError):
                     sink(message)
 
+    def part(self, name: str, message: Message) -> None:
+        """Send a progress message of a run within this one, which the plan has as stage `name`."""
+        own = {**message, "stage": f"{name}: {message['stage']}"}
+        for key in ("whole", "whole_seconds_left", "why"):
+            if key in own:
+                own[key.replace("whole", "part")] = own.pop(key)
+        with self._one_at_a_time:
+            self._emit_estimated(own)
+
     def emit(self, message: Message) -> None:
         """Send `message` to every sink."""
         with self._one_at_a_time:
@@ -167,13 +183,17 @@ class Progress:
                 **({"detail": detail} if detail else {}),
                 **({"beat": True} if beat else {}),
             }
-            self.estimate.tell(message)
-            if self.estimate.count:
-                message["whole"] = self.estimate.fraction
-                message["whole_seconds_left"] = self.estimate.seconds_left
-                if self.estimate.why:
-                    message["why"] = self.estimate.why
-            self.emit(message)
+            self._emit_estimated(message)
+
+    def _emit_estimated(self, message: Message) -> None:
+        """Send a progress message with the state of the whole run."""
+        self.estimate.tell(message)
+        if self.estimate.count:
+            message["whole"] = self.estimate.fraction
+            message["whole_seconds_left"] = self.estimate.seconds_left
+            if self.estimate.why:
+                message["why"] = self.estimate.why
+        self.emit(message)
 
 
 def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> Sink:

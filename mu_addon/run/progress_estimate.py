@@ -75,10 +75,9 @@ class ProgressEstimate:
     def tell(self, message: Mapping[str, Any]) -> None:
         """Process a progress message, see `progress`."""
         stage, share = str(message.get("stage", "")), message.get("fraction")
-        whole, _, _ = stage.rpartition(": ")
-        if stage not in self._expected and whole in self._expected:
-            left = message.get("seconds_left")
-            self._tell_part(whole, float(left) if isinstance(left, int | float) else 0.0)
+        whole = next((name for name in self._expected if stage.startswith(f"{name}: ")), "")
+        if stage not in self._expected and whole:
+            self._tell_part(whole, message)
             return
         added = ""
         if stage not in self._expected:
@@ -108,10 +107,10 @@ class ProgressEstimate:
             self._share, self._own_left = 1.0, 0.0
         self._estimate(added)
 
-    def _tell_part(self, stage: str, left: float) -> None:
+    def _tell_part(self, stage: str, message: Mapping[str, Any]) -> None:
         """Process a message of a planned stage's part: "wall 0.9: Model A".
 
-        Its parts are not known before, so its share goes by the clock. left: of its present part, in s.
+        The stage's share goes by its own plan, `part` of the message, or by the clock where it has none.
         """
         now = self._clock()
         if stage != self._stage:
@@ -119,8 +118,14 @@ class ProgressEstimate:
                 self._taken.setdefault(self._stage, now - self._began)
             self._stage, self._began = stage, now
         self._spent = now - self._began
-        self._share = min(self._spent / self._expected[stage], MOST_BY_CLOCK)
-        self._own_left = max(self._expected[stage] - self._spent, left)
+        share, left = (message.get(key) for key in ("part", "part_seconds_left"))
+        if isinstance(share, int | float):
+            self._share, self._own_left = float(share), float(left) if isinstance(left, int | float) else None
+        else:
+            left = message.get("seconds_left")
+            self._share = min(self._spent / self._expected[stage], MOST_BY_CLOCK)
+            left = float(left) if isinstance(left, int | float) else 0.0
+            self._own_left = max(self._expected[stage] - self._spent, left)
         self._estimate("")
 
     def _add(self, stage: str) -> None:

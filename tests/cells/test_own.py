@@ -12,7 +12,7 @@ from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
 from mu_addon.usecases.export.sheets import measured_limits
 from mu_addon.usecases.sensor.calibrate import _joined_angles
-from mu_addon.usecases.track_video.run import read_pixels
+from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 PIXELS = (
     "cl right_px,cl down_px,cr right_px,cr down_px\n400.00,100.00,600.25,100.00\n401.05,100.52,600.25,1.5\n"

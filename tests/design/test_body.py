@@ -326,6 +326,26 @@ def test_a_file_without_points_and_an_archive_are_named(tmp_path):
         read_body(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "what", "remedy"),
+    [
+        ("plate.3mf", b"PK\x03\x04", "as a 3MF", "slicer and export the part as STL"),
+        ("part.step", b"ISO-10303-21;", "a STEP file", "chord error"),
+        ("renamed.stl", b"ISO-10303-21;", "a STEP file", "chord error"),
+        ("part.f3d", b"PK\x03\x04", "a CAD file", "chord error"),
+        ("scene.glb", b"glTF\x02", "a glTF scene", "Blender"),
+        ("pulled.stl", b"version https://git-lfs.github.com/spec/v1", "Git LFS", "git lfs pull"),
+        ("saved.stl", b"<!DOCTYPE html>", "a web page", "download the file itself"),
+    ],
+)
+def test_other_formats_are_told_with_what_to_do(tmp_path, name, content, what, remedy):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=what) as caught:
+        read_body(path)
+    assert remedy in caught.value.remedy
+
+
 def test_a_body_of_slivers_alone_is_refused():
     """Found by the fuzzer: nothing is left of it once vertices that agree are merged."""
     with pytest.raises(InputError, match="no surface"):

@@ -40,7 +40,10 @@ def file(tmp_path_factory):
 def evaluated(file, out, *more):
     done = here("graph", file, "--out", out, "--json", *more)
     assert done.returncode == 0, done.stdout + done.stderr
-    return json.loads(done.stdout.splitlines()[-1])["summary"]
+    messages = [json.loads(line) for line in done.stdout.splitlines()]
+    shares = [message["whole"] for message in messages if "whole" in message]
+    assert shares == sorted(shares), "one fraction of all nodes, which only grows"
+    return messages[-1]["summary"]
 
 
 @pytest.fixture(scope="module")

@@ -344,6 +344,8 @@ def test_a_file_of_labview_has_its_times_and_units(tmp_path, columns, decimal):
     assert p.columns["force_N"] == pytest.approx(1.5 * np.arange(9))
     assert p.columns["displacement_mm"] == pytest.approx(0.2 * np.arange(9))
     assert told == ["column 'Comment': no cell in it"]
+    computed = "column 'X_Value [s]': computed from X0 = 0.25 and Delta_X = 0.5, as no row has it"
+    assert [words for words in p.concluded if "computed" in words] == ([computed] if columns == "No" else [])
 
 
 def test_settings_above_the_titles_are_no_reading(tmp_path):

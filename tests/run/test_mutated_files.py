@@ -30,7 +30,7 @@ from mu_addon.measured.folder import read_folder
 from mu_addon.sensing.recording import read_recording
 from mu_addon.usecases.grip.phases import read_phases, shipped_phases
 from mu_addon.usecases.resume import use_case_of
-from mu_addon.usecases.track_video.run import read_pixels
+from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 from ..homogenize.lattice_laws import body_centred
 from .test_reading import READERS

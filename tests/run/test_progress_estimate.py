@@ -177,6 +177,14 @@ def test_a_stage_that_tells_its_parts_counts_down_by_the_clock():
     assert run.why == "thick takes longer than expected"
 
 
+def test_a_part_with_a_plan_of_its_own_counts_by_that():
+    run, _ = estimate((("thin", 100.0), ("thick", 100.0)))
+    run.tell({**message("thin: Model A", 0.9, 10.0, 1.0), "part": 0.5, "part_seconds_left": 30.0})
+    assert (run.number, run.fraction, run.seconds_left) == (1, 0.25, 130.0)
+    run.tell({**message("thick: sweep: Model A", 0.9, 10.0, 1.0), "part": 0.1, "part_seconds_left": 90.0})
+    assert (run.number, run.count, run.fraction) == (2, 2, 0.55)
+
+
 def test_a_slow_first_step_does_not_frighten():
     """A hundredth of a compression took 32 s, by which all of it takes an hour: it took five minutes."""
     run, clock = estimate((("specimen", 110.0), ("report", 10.0)))

@@ -42,7 +42,8 @@ from mu_addon.usecases.export.job import path_of
 from mu_addon.usecases.export.sheets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
-from mu_addon.usecases.track_video.run import read_bench, read_pixels, read_pressure
+from mu_addon.usecases.track_video.run import read_bench, read_pressure
+from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 ASSETS = Path(__file__).parents[2] / "assets"
 

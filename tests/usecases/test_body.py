@@ -65,7 +65,7 @@ def test_design_in_a_body(files, capsys):
     ("words", "expected"),
     [
         (["--body", "none.stl"], "no body can be read from it"),
-        (["--body", "unit.toml"], "the file type .toml is not supported for a body"),
+        (["--body", "unit.toml"], "the file type .toml is not supported"),
     ],
 )
 def test_files_without_a_body_end_with_what_to_do(files, words, expected, capsys):

@@ -257,3 +257,16 @@ def test_the_command_line(tmp_path):
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': no quantity that is read"]
     assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)
+
+
+def test_a_long_import_tells_one_fraction_that_only_grows(tmp_path, monkeypatch):
+    monkeypatch.setattr("mu_addon.usecases.import_data.run._SHORT_S", 0.0)
+    messages = []
+    paths = [written(tmp_path, exports.PLAIN, f"{n}.csv") for n in range(3)]
+    answers = COUPON | {"unit.Weg": "mm", "unit.Kraft": "N"}
+    import_files(paths, tmp_path / "out", answers, RunContext(Progress([messages.append])))
+    assert messages[0]["type"] == "plan"
+    assert [name for name, _ in messages[0]["stages"]] == ["read", "import"]
+    shares = [message["whole"] for message in messages if message["type"] == "progress"]
+    assert shares == sorted(shares)
+    assert len(set(shares)) >= 7, "each file read, each one written"

@@ -16,9 +16,9 @@ from mu_addon.usecases.track_video.run import (
     MarkerSettings,
     filmed,
     read_bench,
-    read_pixels,
     write_experiment,
 )
+from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 from ..measured.test_video import VIEW, arc, picture
 

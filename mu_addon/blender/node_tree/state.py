@@ -25,6 +25,7 @@ from ...graph.tree import Source
 from ...run.folder import write_run
 from ...usecases.graph.definitions import definitions
 from ...usecases.graph.job import LAYOUT, Job, file_name
+from ...usecases.graph.plan import plan_of
 from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
 from ..shared import handlers
@@ -34,7 +35,6 @@ from ..unit import object as unit_object
 from ..unit.properties import PARAMETERS_CHANGED, to_unit
 from . import classes, conversion, following
 from .classes import CHANGED, TREE
-from .plan import plan_of
 
 WAIT_S = 0.05
 SCENE_KEY = "mu_node_trees"

@@ -15,6 +15,7 @@ from ...run.usecase import UseCase
 from .comparison import Comparison, write_comparison
 from .definitions import definitions
 from .job import LAYOUT, STATES, Job, file_name, read_job
+from .plan import plan_of
 from .report import write_report
 
 
@@ -39,6 +40,10 @@ def run_graph(job: Job, folder: Path, context: RunContext) -> Evaluation:
         if state.state == FAILED and state.error is not None:
             context.progress.warning(f"{name}: {state.error.what}", state.error.where, state.error.remedy)
 
+    # What is known without a run says which nodes need one.
+    refreshed = Evaluation(job.tree, definitions(), records=records)
+    known = refreshed.run(job.wanted)
+    context.progress.plan(plan_of(job.tree, known, job.wanted, folder, refreshed.order))
     found.report = report
     context.report = lambda stopped: write_report(found, folder, context, stopped)
     try:

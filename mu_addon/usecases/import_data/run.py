@@ -22,6 +22,8 @@ from .understood import Understood, understand
 PAGE = "import.html"
 # Choices that are written into the option which answers a question.
 _FEW = 6
+# Seconds to read a megabyte of a file, and to write what is in it; shorter imports have no plan.
+_READ_S, _WRITE_S, _SHORT_S = 0.8, 0.4, 3.0
 Ask = Callable[[Proposal, Question], str]
 
 
@@ -42,9 +44,10 @@ def import_files(
     """
     given = dict(answers)
     remarks: list[Remark] = []
+    done = _planned(files, context)
     with context.progress.stage("read"):
         # A file that is missing or holds no table leaves no folder.
-        found = understand(files, given)
+        found = understand(files, given, done)
     context.open_folder(folder)
     context.console_summary = console_summary
     with context.progress.stage("import"):
@@ -57,7 +60,7 @@ def import_files(
         if dry:
             write_page(found, folder)
         else:
-            remarks = write(found, folder)
+            remarks = write(found, folder, context.progress.update)
     for remark in remarks:
         context.progress.warning(remark.what, remark.where, remark.remedy)
     context.summary |= {
@@ -78,17 +81,30 @@ def write_page(found: Understood, folder: Path) -> None:
     write_text(folder / PAGE, page_of(found, folder.name))
 
 
-def write(found: Understood, folder: Path) -> list[Remark]:
+def _planned(files: Sequence[Path], context: RunContext) -> Callable[[int], None]:
+    """Plan the stages by the sizes of the files; the result reports that so many files are read."""
+    sizes = [path.stat().st_size / 1e6 if path.is_file() else 0.0 for path in files]
+    whole = sum(sizes)
+    if whole * (_READ_S + _WRITE_S) > _SHORT_S:
+        context.progress.plan([("read", _READ_S * whole), ("import", _WRITE_S * whole)])
+    return lambda count: context.progress.update(sum(sizes[:count]) / whole if whole else 1.0)
+
+
+def write(
+    found: Understood, folder: Path, done: Callable[[float], None] = lambda fraction: None
+) -> list[Remark]:
     """Write the page and, without open questions, all experiments, each read back as `diagnose` reads it.
 
-    Returns the remarks of that reader. Raises InputError where a question is open, OutputError.
+    Returns the remarks of that reader. done: called with the written fraction. Raises InputError where a
+    question is open, OutputError.
     """
     write_page(found, folder)
     if found.open:
         raise InputError(*_open_questions(found, folder))
     ready: list[tuple[str, str, str]] = []
     remarks: list[Remark] = []
-    for p in found.proposals:
+    for k, p in enumerate(found.proposals):
+        done((k + 0.2) / len(found.proposals))
         file = f"{file_stem(p.name)}.csv"
         block = "[[experiment]]\n" + toml_text({**p.keys, "file": file})
         text = _table(p)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -63,17 +63,20 @@ class Understood:
         return tuple(first.values())
 
 
-def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
+def understand(
+    files: Sequence[Path], answers: Mapping[str, str], read: Callable[[int], None] = lambda count: None
+) -> Understood:
     """Read the experiments in files; raises InputError for unreadable files and unused answers.
 
-    answers: by key, or by name of an experiment, a point and key, as text.
+    answers: by key, or by name of an experiment, a point and key, as text; read: called with the number of
+    files that are read.
     """
     proposals: list[Proposal] = []
     left_out: list[str] = []
     decimal = answers.get(DECIMAL)
     if decimal is not None and decimal not in DECIMALS:
         raise InputError(f"decimal = {decimal!r} is not known", "--set", "write decimal=. or decimal=,")
-    for path in files:
+    for count_read, path in enumerate(files, 1):
         before = len(proposals)
         refused: InputError | None = None
         known_tables, unknown = _tables(path, decimal, left_out)
@@ -103,6 +106,7 @@ def understand(files: Sequence[Path], answers: Mapping[str, str]) -> Understood:
             ]
         if len(proposals) == before:
             raise refused or _no_table(path, decimal)
+        read(count_read)
     _require_used(answers, proposals)
     return Understood(tuple(proposals), tuple(left_out))
 

@@ -5,7 +5,6 @@ Tracks come from Blender's tracker, or from any other as a CSV file of pixels.
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from collections.abc import Callable, Mapping
@@ -15,7 +14,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...cells.own import own_lines, own_rows, own_text
+from ...cells.own import own_text
 from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
@@ -24,9 +23,10 @@ from ...measured.rest import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
-from ...reading import file_text, require_rows, unreadable
+from ...reading import file_text, unreadable
 from ...run.context import RunContext
 from ...toml_writer import toml_text
+from .tracked_table import PROJECTS, SUFFIXES, read_pixels
 
 Array = np.ndarray[Any, Any]
 
@@ -237,7 +237,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
     Frames outside the pressure's record are left out. Raises InputError for a clip without a clock, one that
     does not meet the record, and a view that does not fit.
     """
-    remarks = []
+    remarks = list(tracks.remarks)
     fps = bench.fps if bench.fps is not None else tracks.fps
     wrong = not (math.isfinite(fps) and fps > 0)
     if wrong and (bench.fps is not None or tracks.time_s is None):
@@ -346,66 +346,22 @@ def _pixels(found: Filmed, starts_s: float) -> str:
     return _csv(columns)
 
 
-def read_pixels(path: Path) -> Tracks:
-    """Markers tracked by any program: a CSV with `NAME right_px`, `NAME down_px` for each.
-
-    One row a frame; empty where a marker was lost; time_s, if present, is the time of each. Raises
-    InputError.
-    """
-    try:
-        lines = own_lines(own_text(path))
-        require_rows(len(lines) - 1, str(path))
-        (_, head), *body = own_rows(lines) or [(0, [])]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the tracked markers: {unreadable(error)}", str(path), "check path and file"
-        ) from error
-    except csv.Error as error:
-        raise InputError(f"not CSV: {error}", str(path), "separate the columns by commas") from error
-    names = tuple(h.removesuffix(" right_px") for h in head if h.endswith(" right_px"))
-    wanted = [f"{name} {side}_px" for name in names for side in ("right", "down")]
-    missing = [column for column in wanted if column not in head]
-    if not names or missing or len(body) < 2:
-        raise InputError(
-            f"column {missing[0]!r} is missing" if missing else "the file contains no tracked markers",
-            str(path),
-            "name the columns `NAME right_px` and `NAME down_px`, a row a frame",
-        )
-    timed = [*wanted, "time_s"] if "time_s" in head else wanted
-    read = np.empty((len(timed), len(body)))
-    for i, (number, cells) in enumerate(body):
-        try:
-            read[:, i] = [float(cells[head.index(column)] or "nan") for column in timed]
-        except (ValueError, IndexError) as error:
-            raise InputError(
-                "a row holds something that is not a number", f"{path}, row {number}", "correct that row"
-            ) from error
-    pixels = read[: len(wanted)].reshape(len(names), 2, -1).transpose(0, 2, 1)
-    if timed is wanted:
-        return Tracks(names, pixels)
-    time = read[-1]
-    wrong = np.flatnonzero(~np.isfinite(time) | np.concatenate([[False], ~(np.diff(time) > 0)]))
-    if len(wrong):
-        raise InputError(
-            "time_s is missing, or does not increase",
-            f"{path}, row {body[wrong[0]][0]}",
-            "correct it, or leave the column out and give fps",
-        )
-    return Tracks(names, pixels, time_s=time)
-
-
 def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filmed:
     """Experiment in a clip; writes nothing. Raises InputError.
 
-    follow: tracks the markers, see `Tracker`; not used if the clip is a CSV file of pixels.
+    follow: tracks the markers, see `Tracker`; not used if the clip is a table of pixels.
     """
     if not Path(clip).exists():
         raise InputError(
             "the clip does not exist", str(clip), "give a movie, or the first picture of a sequence"
         )
     recorded = read_pressure(pressure)
-    if Path(clip).suffix.lower() == ".csv":
+    if Path(clip).suffix.lower() in SUFFIXES:
         tracks = read_pixels(clip)
+    elif Path(clip).suffix.lower() in PROJECTS:
+        raise InputError(
+            "the file is no table in text", str(clip), "export the tracked positions in pixels as CSV"
+        )
     else:
         unplaced = {*bench.view.base, *(bench.view.tip or ()), *(bench.view.ruler or ())} - {
             *bench.markers.pixels

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
-from ...graph.evaluation import WAITING, State
+from ...errors import MuError
+from ...graph.evaluation import WAITING, Order, State
 from ...graph.tree import NodeTree
 from ...reading import file_text, is_number, parse_json
 from ...run.progress_estimate import Plan
-from ...usecases.graph.definitions import definitions
-from ...usecases.graph.job import STATES
-from ..shared.file_cache import UNREADABLE
+from .definitions import definitions
+from .job import STATES
 
 SECONDS = {
     "simulate": 110.0,
@@ -24,21 +25,30 @@ SECONDS = {
     "calibrate": 2.0,
     "measure": 1.0,
 }
-"""Expected seconds of a kind of node on two cores, if it never ran in the tree's folder."""
+"""Expected seconds of a kind of node on two cores, if it never ran in the folder and has no plan."""
 OTHER_S = 30.0
 
 
-def plan_of(tree: NodeTree, states: Mapping[str, State], wanted: Iterable[str], folder: Path) -> Plan:
+def plan_of(
+    tree: NodeTree,
+    states: Mapping[str, State],
+    wanted: Iterable[str],
+    folder: Path,
+    order_of: Callable[[str], Order | None] = lambda name: None,
+) -> Plan:
     """Nodes still to be run, in order, with the seconds of each.
 
     states: of the tree's latest refresh; wanted: nodes asked for, all if empty; folder: of the tree's runs,
-    whose last evaluation has each node's seconds.
+    whose last evaluation has each node's seconds; order_of: order of a node where it is known, for its plan.
     """
     order, _ = tree.ordered()
     needed = tree.upstream(tuple(wanted) or tree.nodes)
     taken = _taken(folder)
     return [
-        (name, taken.get(name) or SECONDS.get(tree.nodes[name].kind, OTHER_S))
+        (
+            name,
+            taken.get(name) or _planned(order_of, name) or SECONDS.get(tree.nodes[name].kind, OTHER_S),
+        )
         for name in order
         if name in needed and name in states and states[name].state == WAITING and _runs(tree, name)
     ]
@@ -49,11 +59,20 @@ def _runs(tree: NodeTree, name: str) -> bool:
     return definitions()[node.kind].runs and not node.muted
 
 
+def _planned(order_of: Callable[[str], Order | None], name: str) -> float:
+    """Seconds of the stages that a node's job plans, 0 where none are known."""
+    with suppress(MuError):
+        order = order_of(name)
+        if order is not None:
+            return sum(seconds for _, seconds in order.use_case.plan(order.job))
+    return 0.0
+
+
 def _taken(folder: Path) -> dict[str, float]:
     """Seconds of the nodes when they were last computed in a folder, by name."""
     path = folder / STATES
     try:
         nodes = parse_json(file_text(path), str(path))["nodes"]
         return {name: float(n["cost_s"]) for name, n in nodes.items() if is_number(n.get("cost_s"))}
-    except (*UNREADABLE, AttributeError):
+    except (OSError, MuError, KeyError, TypeError, ValueError, AttributeError):
         return {}

@@ -1,0 +1,123 @@
+"""Tables of tracked markers as other trackers export them: read, or refused with line and remedy."""
+
+import numpy as np
+import pytest
+
+from mu_addon.errors import InputError
+from mu_addon.usecases.track_video.run import followed, read_bench
+from mu_addon.usecases.track_video.tracked_table import read_pixels
+
+DEEPLABCUT = """scorer,net,net,net,net,net,net
+bodyparts,cl,cl,cl,cr,cr,cr
+coords,x,y,likelihood,x,y,likelihood
+0,400.5,100,0.99,600,100.25,0.99
+1,7,7,0.2,600,100.25,0.99
+3,401,100,0.99,600,100.25,0.99
+"""
+TRACKMATE = """LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME
+Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame
+,,,(quality),(pixel),(pixel),(pixel),(sec),
+ID7,7,0,3,400.5,100,0,0,0
+ID8,8,1,3,600,100.25,0,0,0
+ID9,9,0,3,401,100,0,0.1,1
+ID10,10,,3,5,5,0,0.1,1
+"""
+
+
+def table(tmp_path, text, name="a.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_deeplabcut_with_its_three_rows_of_titles(tmp_path):
+    read = read_pixels(table(tmp_path, DEEPLABCUT))
+    assert read.names == ("cl", "cr")
+    assert read.time_s is None
+    nan = np.nan
+    np.testing.assert_array_equal(read.of("cl"), [[400.5, 100], [nan, nan], [nan, nan], [401, 100]])
+    np.testing.assert_array_equal(read.of("cr")[[0, 1, 3]], [[600, 100.25]] * 3)
+    assert np.isnan(read.of("cr")[2]).all(), "frame 2 is not in the table"
+    assert any("1 positions of cl with a likelihood below 0.6" in remark.what for remark in read.remarks)
+    several = DEEPLABCUT.replace("bodyparts", "individuals,a,a,a,b,b,b\nbodyparts").replace("cr", "cl")
+    assert read_pixels(table(tmp_path, several)).names == ("a cl", "b cl")
+
+
+def test_a_row_for_each_marker_and_frame(tmp_path):
+    read = read_pixels(table(tmp_path, TRACKMATE))
+    assert read.names == ("0", "1")
+    assert read.time_s.tolist() == [0.0, 0.1]
+    np.testing.assert_array_equal(read.of("0"), [[400.5, 100], [401, 100]])
+    np.testing.assert_array_equal(read.of("1"), [[600, 100.25], [np.nan, np.nan]])
+    assert next(remark.what for remark in read.remarks) == "1 rows without TRACK_ID were left out"
+    trackpy = ",y,x,mass,frame,particle\n0,2,1,9,5,0\n1,4,3,9,5,1\n2,2,1.5,9,7,0.0\n"
+    read = read_pixels(table(tmp_path, trackpy))
+    np.testing.assert_array_equal(read.of("0"), [[1, 2], [np.nan, np.nan], [1.5, 2]])
+    assert any("begins at frame 5" in remark.what for remark in read.remarks)
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "time_s"),
+    [
+        (
+            "Time (ms);M1 - X (px);M1 - Y (px);M2 - X (px);M2 - Y (px)\n0,00;1,5;2;3;4\n50;1,5;2;3;4\n",
+            ("M1", "M2"),
+            [0.0, 0.05],
+        ),
+        (
+            "\tmass_A\t\tmass_B\t\nt\tx\ty\tx\ty\n0\t1.5\t2\t3\t4\n0.1\t1.5\t2\t3\t4\n",
+            ("mass_A", "mass_B"),
+            [0.0, 0.1],
+        ),
+        (
+            "frame_idx,A.x,A.y,A.score,B_x,B_y,v_x (px/s),v_y (px/s)\n0,1.5,2,1,3,4,1,1\n1,1.5,2,1,3,4,1,1\n",
+            ("A", "B"),
+            None,
+        ),
+    ],
+    ids=["kinovea", "tracker", "sleap"],
+)
+def test_columns_for_each_marker(tmp_path, text, names, time_s):
+    read = read_pixels(table(tmp_path, text))
+    assert read.names == names
+    np.testing.assert_array_equal(read.pixels, [[[1.5, 2]] * 2, [[3, 4]] * 2])
+    assert (read.time_s is None) if time_s is None else read.time_s.tolist() == pytest.approx(time_s)
+    assert any("downward from the upper left corner" in remark.what for remark in read.remarks)
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "where", "remedy"),
+    [
+        (TRACKMATE.replace("(pixel)", "(micron)"), "'POSITION_X' is in micron", "line 1", "in pixels"),
+        ("t,A x (mm),A y (mm)\n0,1,2\n1,1,2\n", "'A x (mm)' is in mm", "line 1", "in pixels"),
+        ("t,A x,A y\n0,1,-20\n1,1,-30\n", "positions are negative", "a.csv", "upper left corner"),
+        ("frame,A x,A y\n0,1,2\n1,1,lost\n", "not a number", "row 3", "correct"),
+        ("frame,A x,A y\n0,1,2\n0,1,2\n", "not after the one before", "row 3", "one animal or track"),
+        ("frame,id,x,y\n0,1,1,2\n0,1,1,2\n", "two rows for one frame", "row 3", "keep the row"),
+        ("id,x,y\n1,1,2\n1,1,2\n", "no column of frames", "a.csv", "frame, id, x and y"),
+        ("A x,A y,A x,A y\n1,2,3,4\n1,2,3,4\n", "two columns hold the x of A", "line 1", "a name of its own"),
+        ("a,b\n1,2\n3,4\n", "no tracked markers", "a.csv", "NAME right_px"),
+        (DEEPLABCUT.replace("3,401", "2.5,401"), "no whole number", "row 6", "correct"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(tmp_path, text, what, where, remedy):
+    with pytest.raises(InputError) as caught:
+        read_pixels(table(tmp_path, text))
+    assert what in caught.value.what
+    assert where in caught.value.where
+    assert remedy in caught.value.remedy
+
+
+def test_a_tracker_s_own_file_is_told_what_to_export(tmp_path):
+    pressure = table(tmp_path, "time_s,pressure_kPa\n0,0\n1,5\n", "p.csv")
+    bench = read_bench(
+        table(
+            tmp_path,
+            'base = ["a", "b"]\nfps = 10\n[[marker]]\nname = "a"\nplace_mm = [0, 0]\n'
+            '[[marker]]\nname = "b"\nplace_mm = [9, 0]\n',
+            "bench.toml",
+        )
+    )
+    with pytest.raises(InputError, match="no table in text") as caught:
+        followed(table(tmp_path, "x", "net.h5"), bench, pressure, lambda clip, markers: None)
+    assert "as CSV" in caught.value.remedy
