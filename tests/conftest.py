@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
@@ -10,6 +11,11 @@ from hypothesis import HealthCheck, settings
 from . import costs, nightly
 
 pytest_plugins = ["tests.light_law"]
+
+# Tests start hundreds of processes: each would compile the whole program anew, and each worker of pytest
+# rewrite all assertions, which together takes as long as a third of the tests.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Read when numpy is loaded, and by every process that a test starts: one core each, also where a test runs
 # alone, since threads that wait for each other on small systems only spin.

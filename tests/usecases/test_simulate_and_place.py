@@ -234,7 +234,7 @@ def of_thin_walls(**given):
     return Job(
         unit=attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3, wall_mm=0.5)),
         protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 0.0])),
-        mesh=MeshSettings(refine=0.4, fidelity="resolved"),
+        mesh=MeshSettings(refine=0.3, fidelity="resolved"),
         times=3,
         stages=("design", "simulate"),
         self_contact=True,

@@ -1,4 +1,4 @@
-"""Tests here run in Blender, a process a file, each in a Blender as new; pytest itself never imports them.
+"""Tests here run in Blender, a process for all, each in a Blender as new; pytest itself never imports them.
 
 A test is given its arguments as any other: fixtures from outside, made by `conftest.py` in plain Python, and
 `monkeypatch` of the process that it runs in. Marked `own_process` it has a process to itself, where nothing
@@ -62,10 +62,25 @@ def pytest_pycollect_makemodule(module_path, parent):
     return InBlender.from_parent(parent, path=module_path)
 
 
+@pytest.fixture(scope="session")
+def blenders(tmp_path_factory):
+    """The Blender of a Python, started once: to start one and load the solver takes seconds."""
+    started = {}
+
+    def of(python):
+        if python not in started:
+            started[python] = Blender(python, tmp_path_factory.mktemp("blender"))
+        return started[python]
+
+    yield of
+    for one in started.values():
+        one.close()
+
+
 @pytest.fixture(scope="module")
-def blender(each_bpy, tmp_path_factory):
-    """Runs a function of a module in this file's Blender, or in one of its own."""
-    shared = Blender(each_bpy, tmp_path_factory.mktemp("blender"))
+def blender(each_bpy, blenders, tmp_path_factory):
+    """Runs a function of a module in the Blender of all tests, or in one of its own."""
+    shared = blenders(each_bpy)
 
     def run(module, name, request, **given):
         if request.node.get_closest_marker("own_process") is None:
@@ -76,8 +91,7 @@ def blender(each_bpy, tmp_path_factory):
         finally:
             own.close()
 
-    yield run
-    shared.close()
+    return run
 
 
 # What a quick look takes, with one path of the whole lattice beside the ten of the anchors.

@@ -13,7 +13,6 @@ from mu_addon.blender.node_tree import (
     groups,
     operators,
     panel,
-    plan,
     sockets,
     state,
 )
@@ -21,6 +20,7 @@ from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.run.child import DONE
+from mu_addon.usecases.graph import plan
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.job import STATES
 from mu_addon.usecases.graph.templates import template, template_names
