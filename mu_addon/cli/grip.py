@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_fidelity, add_report, add_results, add_setting, add_solid, help_of, require_out
+from .options import (
+    add_fidelity,
+    add_report,
+    add_results,
+    add_setting,
+    add_solid,
+    fidelity_of,
+    help_of,
+    require_out,
+)
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -67,7 +76,8 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
-    detail = detailed(options.coarse, options.fidelity, options.refine)
+    fidelity, self_contact = fidelity_of(options)
+    detail = detailed(options.coarse, fidelity, options.refine)
     density = options.density_g_per_ml
     job = Job(
         gripper=gripper,
@@ -75,7 +85,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         grip=detail.grip(friction=options.friction, beyond_mm=options.beyond_mm),
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
         mesh=detail.mesh,
-        self_contact=options.self_contact,
+        self_contact=self_contact,
         rules=() if options.solid_only or options.no_paths else detail.rules,
         quality=options.quality,
     )

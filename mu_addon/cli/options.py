@@ -197,40 +197,28 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_fidelity(command: argparse.ArgumentParser) -> None:
-    """Add fidelity and self-contact of a job that simulates a unit many times: homogenised by default."""
+def add_fidelity(command: argparse.ArgumentParser, homogenised_with: str = "") -> None:
+    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice."""
     from ..meshing.settings import FIDELITY, SELF_CONTACT
 
-    add_setting(command, FIDELITY)
-    command.add_argument(
-        "--self-contact",
-        action=argparse.BooleanOptionalAction,
-        default=SELF_CONTACT.default,
-        help=help_of(SELF_CONTACT),
-    )
+    default = str(FIDELITY.default)
+    if homogenised_with:
+        default += f"; homogenised with {homogenised_with}, which need it"
+    command.add_argument("--fidelity", choices=FIDELITY.choices, help=help_of(FIDELITY, default))
+    command.add_argument("--self-contact", action=argparse.BooleanOptionalAction, help=help_of(SELF_CONTACT))
 
 
-def add_fidelity_of_study(command: argparse.ArgumentParser) -> None:
-    """Add fidelity and self-contact of a study, which simulates a unit once: resolved by default."""
-    from ..meshing.settings import STUDY_FIDELITY, STUDY_SELF_CONTACT
+def fidelity_of(options: argparse.Namespace) -> tuple[str, bool]:
+    """The fidelity that options ask for, or that they alone have; and whether parts keep apart."""
+    from ..meshing.settings import FIDELITY, HOMOGENISED
 
-    default = (
-        f"{STUDY_FIDELITY.default}; homogenised with --lattice, --rule, --mesher or --order 1, which need it"
-    )
-    command.add_argument("--fidelity", choices=STUDY_FIDELITY.choices, help=help_of(STUDY_FIDELITY, default))
-    command.add_argument(
-        "--self-contact", action=argparse.BooleanOptionalAction, help=help_of(STUDY_SELF_CONTACT)
-    )
-
-
-def fidelity_of(options: argparse.Namespace) -> str:
-    """The fidelity by a study's options: by `--fidelity` or by options that only one of them has."""
-    from ..meshing.settings import HOMOGENISED, RESOLVED
-
-    if options.fidelity is not None:
-        return str(options.fidelity)
-    only = options.lattice or options.order == 1 or options.mesher != "auto" or getattr(options, "rule", None)
-    return HOMOGENISED if only else RESOLVED
+    named = options.fidelity
+    if named is None:
+        order, mesher = getattr(options, "order", 2), getattr(options, "mesher", "auto")
+        only = order == 1 or mesher != "auto" or any(getattr(options, n, None) for n in ("lattice", "rule"))
+        named = HOMOGENISED if only else FIDELITY.default
+    apart = options.self_contact
+    return str(named), named != HOMOGENISED if apart is None else apart
 
 
 def add_simulation(command: argparse.ArgumentParser) -> None:
@@ -241,7 +229,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     add_setting(command, PROTOCOL, "CSV")
     add_setting(command, ORDER, "P")
     add_setting(command, REFINE, "F")
-    add_fidelity_of_study(command)
+    add_fidelity(command, "--lattice, --rule, --mesher or --order 1")
     add_setting(command, SELF_FRICTION, "MU")
     command.add_argument(
         "--lattice",

@@ -34,11 +34,12 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit = unit_of(options)
     else:
         unit, effects = modelled(options, context)
-        mesh = MeshSettings(order=options.order, refine=options.refine, fidelity=fidelity_of(options))
+        fidelity, self_contact = fidelity_of(options)
+        mesh = MeshSettings(order=options.order, refine=options.refine, fidelity=fidelity)
         extra = {
             "effects": effects,
             "mesh": mesh,
-            "self_contact": mesh.resolved if options.self_contact is None else options.self_contact,
+            "self_contact": self_contact,
             "self_friction": options.self_friction,
             "times": options.times,
             "mesher": options.mesher,

@@ -18,7 +18,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
-from ..meshing.settings import HOMOGENISED, SOLID, MeshSettings, require_self_contact_resolvable
+from ..meshing.settings import HOMOGENISED, RESOLVED, MeshSettings, require_self_contact_resolvable
 from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
@@ -46,14 +46,17 @@ FEWEST = 4
 COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 # Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
 FINE = MeshSettings(meridian_mm=1.0)
-# A printed unit's struts need five layers each, and finer ones as much time again.
-STRUTS = MeshSettings(fidelity=SOLID)
-STRUTS_FINE = MeshSettings(fidelity=SOLID, refine=1.2)
+# The printed body, and the mesh of what effects change it by: of an angle the same share within 2 %.
+STRUTS, STRUTS_COARSE = (MeshSettings(fidelity=RESOLVED, refine=refine) for refine in (1.0, 0.5))
+STRUTS_FINE = MeshSettings(fidelity=RESOLVED, refine=1.3)
+# Of the largest change of a value: below it, two meshes are not compared by their ratio.
+LEAST_CHANGE = 0.05
 # Share of the progress for walls.
 CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
 REACHES = (0.2, 0.5, NEAREST)
 SHARES = (0.15, 0.4, 0.7, 1.0)
+MESH_ERROR = "mesh_error"
 KNOWN = (*EFFECTS, CONTACT)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
@@ -68,15 +71,17 @@ class UnitResponseWarning(UserWarning):
 class UnitSettings:
     """Settings of the unit's simulation for the evidence.
 
-    mesh: the model's; finer: the one that mesh_error compares with. pressures: their approximate number;
-    margin: beyond the measured ones, as a share of their range. effects: names of those to run. distal:
-    chambers behind a clog. lattice: a law for the lattice in place of the unit's moduli. farthest_mm: of a
-    marker from the unit, at scale 1. discrepancy: of the response, as in `UnitResponse`. self_contact: of
-    walls and struts of a resolved unit. workers: processes, one a core by default.
+    mesh: the model's; finer: the one that mesh_error compares with; changes: a coarser one for effects and
+    walls, whose changes of the response are taken over in proportion, or None for the model's. pressures:
+    their approximate number; margin: beyond the measured ones, as a share of their range. effects: names of
+    those to run. distal: chambers behind a clog. lattice: a law for the lattice in place of the unit's
+    moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
+    `UnitResponse`. self_contact: of walls and struts of a resolved unit. workers: processes, one a core.
     """
 
     mesh: MeshSettings = COARSE
     finer: MeshSettings = FINE
+    changes: MeshSettings | None = None
     pressures: int = 12
     margin: float = 0.05
     effects: tuple[str, ...] = KNOWN
@@ -91,7 +96,10 @@ class UnitSettings:
     def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
         """Settings for a unit simulated homogenised or resolved (`MeshSettings.fidelity`)."""
         if fidelity != HOMOGENISED:
-            return cls(mesh=STRUTS, finer=STRUTS_FINE, self_contact=self_contact)
+            mesh, finer, changes = (
+                attrs.evolve(mesh, fidelity=fidelity) for mesh in (STRUTS, STRUTS_FINE, STRUTS_COARSE)
+            )
+            return cls(mesh, finer, changes, self_contact=self_contact)
         return cls(self_contact=self_contact)
 
     def __attrs_post_init__(self) -> None:
@@ -268,9 +276,13 @@ def similar(unit: Unit) -> Unit:
 
 @attrs.frozen
 class _Plan:
-    """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large."""
+    """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large.
+
+    changes: the mesh of effects and walls.
+    """
 
     body: Body
+    changes: MeshSettings
     scale: float
     enlarged: float
     orientations: tuple[tuple[float, Direction], ...]
@@ -310,6 +322,7 @@ class _Plan:
         known = known if gap is None else [FORCE]
         return cls(
             body,
+            settings.changes or settings.mesh,
             scale,
             enlarged,
             _orientations(here),
@@ -330,20 +343,27 @@ class _Plan:
     def case(
         self, effect: str = "", size: float = 0.0, orientation: tuple[float, Direction] = (0.0, X)
     ) -> Run:
-        """A run of an effect whose size is that at 1.0x, of the base where none is named.
+        """A run of an effect whose size is that at 1.0x, of the reference where none is named.
 
-        The base's outline is kept whether or not walls are asked for, so that one run serves both.
+        The reference's outline is kept whether or not walls are asked for, so that one run serves both.
         """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
-        body = attrs.evolve(self.body, orientation_deg=turn, orientation_axis=axis)
+        mesh = self.body.mesh if effect == MESH_ERROR else self.changes
+        body = attrs.evolve(self.body, mesh=mesh, orientation_deg=turn, orientation_axis=axis)
         outline = not effect and not self.held
         return Run(body, self.pressures_kPa, points, effect, size, outline)
 
+    @property
+    def base_case(self) -> Run:
+        """The run of the base model."""
+        return attrs.evolve(self.case(), body=self.body)
+
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """The base first, then the longest runs."""
+        yield self.base_case
         yield self.case()
-        for name in sorted(set(self.names(settings)), key=lambda n: (n != "mesh_error", n)):
+        for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
             effect = effect_of(name)
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in effect.sizes_at(self.enlarged):
@@ -352,7 +372,13 @@ class _Plan:
 
     def base(self, found: dict[str, Result]) -> Result:
         """The free unit's angle, volume and places, or the force of a held one."""
-        result = found[self.case().key()]
+        return self._unit(found[self.base_case.key()])
+
+    def reference(self, found: dict[str, Result]) -> Result:
+        """What effects change on their own mesh, as `base`."""
+        return self._unit(found[self.case().key()])
+
+    def _unit(self, result: Result) -> Result:
         if self.held:
             return result
         return Result(result.values[: 2 + 3 * len(self.markers)], result.why)
@@ -385,13 +411,13 @@ class _Plan:
                 yield side, reach * outward[-1], attrs.evolve(case, pressures_kPa=tuple(steps))
 
     def sides(
-        self, found: dict[str, Result], base: Array, rows: Sequence[int]
+        self, found: dict[str, Result], reference: Array, rows: Sequence[int]
     ) -> dict[int, ObstacleResponse]:
-        """The response to walls by side; `base` (rows, k): all values of the free unit at its pressures."""
+        """The response to walls by side; `reference` (rows, k): of the free unit on the walls' mesh."""
         from scipy.interpolate import CubicSpline
 
-        reached = np.isfinite(base[0])
-        free = CubicSpline(np.array(self.pressures_kPa)[reached], base[:, reached], axis=1)
+        reached = np.isfinite(reference[0])
+        free = CubicSpline(np.array(self.pressures_kPa)[reached], reference[:, reached], axis=1)
         walls: dict[int, list[tuple[float, Array]]] = {}
         for side, reach, case in self.walls(found):
             values = found[case.key()].values
@@ -419,21 +445,21 @@ class _Plan:
 
     def responses(self, settings: UnitSettings, found: dict[str, Result]) -> Iterator[UnitResponse]:
         """The response in each orientation."""
-        base = self.base(found)
+        base, reference = self.base(found), self.reference(found)
         rows = self._rows()
-        reached = np.isfinite(base.values[0])
+        reached = np.isfinite(base.values[0] + reference.values[0])
         if np.count_nonzero(reached) < FEWEST:
             raise ConvergenceError(
                 f"the unit at {self.scale:g}x has an equilibrium at too few of the measured "
-                f"pressures: {base.why}",
+                f"pressures: {base.why or reference.why}",
                 "unit_pressure",
                 "check the unit's moduli and wall against the specimen's",
             )
         if not reached.all():
             missed = ", ".join(f"{p:g}" for p in np.array(self.pressures_kPa)[~reached])
-            _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {base.why}")
+            _warn(f"The unit at {self.scale:g}x does not reach {missed} kPa: {base.why or reference.why}")
         kept = np.ix_(np.array(rows), np.flatnonzero(reached))
-        walls = self.sides(found, self.larger * base.values, rows) if CONTACT in settings.effects else {}
+        walls = self.sides(found, self.larger * reference.values, rows) if CONTACT in settings.effects else {}
         for orientation in self.orientations:
             names = self.names(settings)
             every = {n: self._variant(n, orientation, base, found, kept) for n in names}
@@ -463,7 +489,9 @@ class _Plan:
             result = base if size == null else found[self.case(name, size, orientation).key()]
             if np.isfinite(result.values[kept]).all():
                 sizes.append(size * grown)
-                values.append((self.larger * result.values)[kept])
+                same_mesh = size == null or name == MESH_ERROR
+                changed = result if same_mesh else self._taken_over(result, base, self.reference(found))
+                values.append((self.larger * changed.values)[kept])
             else:
                 missed.append(size * grown)
                 _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
@@ -473,6 +501,19 @@ class _Plan:
         low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
+
+    def _taken_over(self, result: Result, base: Result, reference: Result) -> Result:
+        """The base's response with an effect, from what this one changes of the reference's.
+
+        In proportion to how far both move from rest, which differs by the meshes' errors.
+        """
+        if self.changes == self.body.mesh:
+            return result
+        rest = self.pressures_kPa.index(0.0)
+        far, near = (r.values - r.values[:, [rest]] for r in (base, reference))
+        least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2
+        ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
+        return Result(base.values + ratio * (result.values - reference.values), result.why)
 
     def _rows(self) -> list[int]:
         if self.held:

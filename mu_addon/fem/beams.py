@@ -10,12 +10,15 @@ Unknowns of an element, (12,): displacement and rotation vector of its first nod
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from .rotations import skew
+
+if TYPE_CHECKING:
+    from .beam_fibres import Fibres
 
 Array = np.ndarray[Any, Any]
 
@@ -51,12 +54,13 @@ class Beams:
 
     chord (e, 3): from an element's first to its second end in mm; frames (e, 3, 3): rows are two axes of its
     section and its own axis; sections: its stiffness. An axial stretch makes the section thinner and changes
-    the resin's modulus, and so all other stiffness (`_law`).
+    the resin's modulus, and so all other stiffness (`_law`). fibres: what another law adds.
     """
 
     chord: Array
     frames: Array
     sections: Sections
+    fibres: Fibres | None = None
 
     @property
     def length(self) -> Array:
@@ -65,23 +69,30 @@ class Beams:
 
     def energy_mJ(self, x: Array) -> Array:
         """Energies (e,) in mJ of the unknowns x (e, 12)."""
-        return _law(self.strains(x), self.length, self.sections)[0]
+        return self._law(self.strains(x))[0]
 
     def forces(self, x: Array) -> Array:
         """Derivatives (e, 12) of the energy by the unknowns x (e, 12): N, and N mm for rotation vectors."""
         at = _State.of(self, x)
-        _, stress, _ = _law(at.strains, self.length, self.sections)
+        _, stress, _ = self._law(at.strains)
         return np.asarray(np.einsum("ei,eij->ej", stress, at.slopes))
 
     def stiffness(self, x: Array) -> Array:
         """Second derivatives (e, 12, 12) of the energy by the unknowns x (e, 12)."""
         at = _State.of(self, x)
-        _, stress, moduli = _law(at.strains, self.length, self.sections)
+        _, stress, moduli = self._law(at.strains)
         return np.asarray(at.slopes.transpose(0, 2, 1) @ moduli @ at.slopes + at.curvature(stress))
 
     def strains(self, x: Array) -> Array:
         """Shears (2), stretch, curvatures (2) and twist in 1/mm, (e, 6), along and about the frame's axes."""
         return _State.of(self, x).strains
+
+    def _law(self, strains: Array) -> tuple[Array, Array, Array]:
+        own = _law(strains, self.length, self.sections)
+        if self.fibres is None:
+            return own
+        more = self.fibres.added(strains)
+        return own[0] + more[0], own[1] + more[1], own[2] + more[2]
 
 
 @attrs.frozen(eq=False)

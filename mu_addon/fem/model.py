@@ -16,13 +16,13 @@ from scipy import sparse
 from ..errors import InputError
 from ..meshing.mesh import AXES
 from . import kernels
+from .beam_fibres import fibres_of, mixtures
 from .beams import Beams, frames_along, sections_of
 from .carried import Carried, Folding
 from .conjugate_gradients import ConjugateGradients
 from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
-from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
@@ -372,8 +372,6 @@ class Model:
         points = self._dV.shape[1]
         layers = []
         solid = self.mesh.solid
-        if not solid.all():
-            self._require_neo_hookean_beams(materials)
         for layer in (one.of(solid[one.elements]) for one in materials.layers):
             law, k = layer.law, len(layer.elements)
             if self.mean_dilatation and not law.split_volume:
@@ -407,7 +405,10 @@ class Model:
         return MaterialData(tuple(layers), float(least), self.beams_of(materials))
 
     def beams_of(self, materials: Materials) -> Beams | None:
-        """Beams of the mesh, of their elements' mean modulus and Poisson's ratio; None without beams."""
+        """Beams of the mesh, of their elements' mean laws; None without beams.
+
+        Raises InputError for a law with memory.
+        """
         if not len(self.mesh.beams):
             return None
         mesh, (part, share) = self.mesh, self.shares_of_beams
@@ -416,21 +417,14 @@ class Model:
             np.bincount(of, share * a[part], len(mesh.beams)) for a in materials.small_strain(len(mesh.tets))
         )
         chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
-        sections = sections_of(np.linalg.norm(chord, axis=1), mesh.flexible, E, nu)
-        return Beams(chord, frames_along(chord), sections)
+        length, frames = np.linalg.norm(chord, axis=1), frames_along(chord)
+        sections = sections_of(length, mesh.flexible, E, nu)
+        laws = mixtures(materials.layers, part, of, share, len(mesh.beams))
+        return Beams(chord, frames, sections, fibres_of(laws, length, frames, sections, E, nu))
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array | float:
         """Derivative (n, 3) by places of forces times what carried nodes are given (`Carried.by_places`)."""
         return 0.0 if self._carried is None else self._carried.by_places(u, forces, v)
-
-    def _require_neo_hookean_beams(self, materials: Materials) -> None:
-        for layer in materials.layers:
-            if layer.law is not NeoHooke and not self.mesh.solid[layer.elements].all():
-                raise InputError(
-                    f"{layer.law.name}: struts that are beams are neo-Hookean",
-                    "a mesh of fidelity resolved",
-                    "choose fidelity solid",
-                )
 
     @property
     def shares_of_beams(self) -> tuple[Array, Array]:

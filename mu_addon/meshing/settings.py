@@ -17,19 +17,17 @@ ORDER = described("order", 2, "order of the finite elements; 1 for a quick look 
 REFINE = described("refine", 1.0, "mesh refinement: every element size is divided by it", low=0.2, high=8.0)
 FIDELITY = described(
     "fidelity",
-    HOMOGENISED,
+    RESOLVED,
     "model of the lattice: every strut as printed (resolved: beams where they are whole; solid, to check "
     "these), or a continuum",
     choices=FIDELITIES,
 )
 SELF_CONTACT = described(
     "self_contact",
-    False,
+    True,
     "keep walls and struts of a resolved unit apart, at several times the cost; without it they may cross, "
     "and the run gives the pressure",
 )
-# Of a study, which simulates a unit once: its printed body.
-STUDY_FIDELITY, STUDY_SELF_CONTACT = FIDELITY._replace(default=RESOLVED), SELF_CONTACT._replace(default=True)
 
 
 def _one_of(*allowed: Any) -> Any:
@@ -75,7 +73,7 @@ class MeshSettings:
     through_wall: int = attrs.field(default=1, validator=_between(1, 8))
     anchor_mm: float = attrs.field(default=2.5, validator=_between(0.1, 100.0))
     envelope_mm: float = attrs.field(default=14.0, validator=_between(0.1, 100.0))
-    fidelity: str = FIDELITY.field()
+    fidelity: str = FIDELITY._replace(default=HOMOGENISED).field()
 
     @property
     def resolved(self) -> bool:

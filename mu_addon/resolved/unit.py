@@ -94,7 +94,7 @@ def mesh_printed(
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
     the wall. Struts that are half diagonals are beams where they are whole (`with_beams`), unless the
-    settings ask for the fidelity "solid" or the wall has a law of its own. The base is clamped, the inlet is
+    settings ask for the fidelity "solid" or the wall's law has memory. The base is clamped, the inlet is
     left out.
 
     settings: of it fidelity, fraction ("half" or "full") and `refine` count. cache: folder for the octants
@@ -112,8 +112,8 @@ def mesh_printed(
         )
     d = unit.printed
     own = d if body is None else covering(d, body)
-    # Beams are neo-Hookean: a wall's own law is that of struts, too.
-    beams = s.fidelity != SOLID and is_half_diagonal(d) and not unit.wall.names
+    # The wall's law is that of struts, too, and beams have no memory.
+    beams = s.fidelity != SOLID and is_half_diagonal(d) and not unit.wall.has_memory
     sizes = (sizes or Sizes()).refined(s.refine)
     if beams:
         sizes = attrs.evolve(sizes, layers=beam_layers(sizes))

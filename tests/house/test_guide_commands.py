@@ -26,7 +26,7 @@ QUICK_STUDY = ("--fidelity", "homogenised", "--order", "1", "--refine", "0.4", "
 QUICK = {
     "simulate": QUICK_STUDY,
     "place": (*QUICK_STUDY, "--stations", "11", "--no-mesh-check"),
-    "grip": ("--refine", "0.5"),
+    "grip": ("--fidelity", "homogenised", "--refine", "0.5"),
     "homogenize": ("--cells", "2", "--no-specimen"),
     "design": ("--no-report",),
 }

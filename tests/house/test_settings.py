@@ -159,7 +159,7 @@ def test_nodes_have_the_settings_themselves():
     nodes = {n.kind: n for n in (*study_nodes(), *sweep_nodes(), *optimize_nodes(), *chain_nodes())}
     for kind, d in (
         ("simulate", study.TIMES),
-        ("simulate", mesh.STUDY_SELF_CONTACT),
+        ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
         ("place", path.RULE),
         ("sweep", mesh.ORDER),

@@ -186,7 +186,7 @@ def test_a_grasp_with_friction_from_the_command_line(tmp_path):
     """
     out = tmp_path / "out"
     line = ["grip", "--gripper", str(short_gripper(tmp_path)), "--out", str(out), "--cube", "25"]
-    line += ["--density", "0.6", "--friction", "0.3", "--no-paths", "--coarse"]
+    line += ["--density", "0.6", "--friction", "0.3", "--no-paths", "--coarse", "--fidelity", "homogenised"]
     assert main([*line, "--refine", "0.3"]) == 0
     summary = json.loads((out / "summary.json").read_text())
     g = summary["grasps"]["25"]

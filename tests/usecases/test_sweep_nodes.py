@@ -46,7 +46,7 @@ preset = "mu-0.75x"
 method = "grid"
 [simulate]
 times = 5
-mesh = { order = 2, refine = 0.5, fidelity = "homogenised" }
+mesh = { order = 2, refine = 0.5 }
 [vary]
 "chambers.wall_mm" = { low = 0.8, high = 1.0, steps = 3 }
 "chambers.count" = { values = [4, 6] }
@@ -64,11 +64,12 @@ mesh = { order = 2, refine = 0.5, fidelity = "homogenised" }
     ]
 
 
-def test_studies_of_printed_struts_may_have_walls_that_touch():
-    made = sweep_orders.sweep_order(study(range_of(), fidelity="resolved", self_contact=True)).job.plan
+@pytest.mark.parametrize(("fidelity", "apart"), [("resolved", True), ("homogenised", None)])
+def test_walls_of_printed_units_keep_apart(fidelity, apart):
+    made = sweep_orders.sweep_order(study(range_of(), fidelity=fidelity)).job.plan
     simulate = made.inputs.tables["simulate"]
-    assert simulate["self_contact"] is True
-    assert simulate["mesh"]["fidelity"] == "resolved"
+    assert simulate.get("self_contact") is apart
+    assert simulate["mesh"]["fidelity"] == fidelity
 
 
 def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():

@@ -66,8 +66,8 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
                 column.prop(props, "cube_height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
-            layout.prop(props, "printed_struts")
-            if props.printed_struts:
+            layout.prop(props, "homogenised")
+            if not props.homogenised:
                 layout.prop(props, "self_contact")
         child = grasps.GRASP.child(root)
         start_button(layout, child, "mu.grasp", "PLAY")

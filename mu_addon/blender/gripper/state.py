@@ -50,14 +50,14 @@ def job_of(root: Any) -> Job:
 
     props = root.mu_gripper
     grasps = props.detail != "part"
-    detail = detailed(props.detail == "quick", RESOLVED if props.printed_struts else HOMOGENISED)
+    detail = detailed(props.detail == "quick", HOMOGENISED if props.homogenised else RESOLVED)
     grip = detail.grip(friction=exact(props.friction), beyond_mm=gripper_object.beyond_mm(root))
     return Job(
         gripper=to_gripper(props),
         cubes=(Cube(_side(props), exact(props.density_g_per_ml)),) if grasps else (),
         grip=grip if grasps else Grip(),
         mesh=detail.mesh,
-        self_contact=props.printed_struts and props.self_contact,
+        self_contact=props.self_contact and not props.homogenised,
         rules=detail.rules if props.detail == "paths" else (),
     )
 

@@ -22,7 +22,7 @@ from bpy.props import (
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...fem.solver import DEVICE, SOLVER
-from ...meshing.settings import STUDY_SELF_CONTACT
+from ...meshing.settings import SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
@@ -105,7 +105,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="resolved",
     )
-    self_contact: blender_property(STUDY_SELF_CONTACT, name="Self-Contact")
+    self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
     solver: EnumProperty(
         name="Solver",

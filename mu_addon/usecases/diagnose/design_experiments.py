@@ -23,7 +23,6 @@ from ...measured import Experiment, Measured, read_folder
 from ...meshing.settings import (
     FIDELITY,
     HOMOGENISED,
-    SELF_CONTACT,
     MeshSettings,
     require_self_contact_resolvable,
 )
@@ -103,7 +102,9 @@ class Job:
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
     fidelity: str = FIDELITY.field()
-    self_contact: bool = SELF_CONTACT.field()
+    self_contact: bool = attrs.field(
+        default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
+    )
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)

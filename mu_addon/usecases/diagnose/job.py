@@ -20,7 +20,6 @@ from ...meshing.settings import (
     FIDELITIES,
     FIDELITY,
     HOMOGENISED,
-    SELF_CONTACT,
     MeshSettings,
     require_self_contact_resolvable,
 )
@@ -58,7 +57,9 @@ class Job:
     settings: UnitSettings | None = None
     fidelity: str = FIDELITY.field()
     known: ExtendedModel | None = None
-    self_contact: bool = SELF_CONTACT.field()
+    self_contact: bool = attrs.field(
+        default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
+    )
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)

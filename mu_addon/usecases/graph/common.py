@@ -7,22 +7,16 @@ from importlib import import_module
 from typing import Any
 
 from ...graph.definition import FILE, Setting
-from ...meshing.settings import FIDELITY as FIDELITY_OF_MANY
-from ...meshing.settings import ORDER as ORDER_OF_ELEMENTS
-from ...meshing.settings import REFINE as REFINEMENT
-from ...meshing.settings import SELF_CONTACT as SELF_CONTACT_OF_MANY
-from ...meshing.settings import STUDY_FIDELITY, STUDY_SELF_CONTACT
+from ...meshing import settings as mesh
 from ..simulate_and_place import settings as study
 
-FIDELITY, SELF_CONTACT = Setting(STUDY_FIDELITY), Setting(STUDY_SELF_CONTACT)
-# Of nodes that solve a unit tens of times, or in time.
-QUICK_FIDELITY, QUICK_SELF_CONTACT = Setting(FIDELITY_OF_MANY), Setting(SELF_CONTACT_OF_MANY)
+FIDELITY, SELF_CONTACT = Setting(mesh.FIDELITY), Setting(mesh.SELF_CONTACT)
 SELF_FRICTION, TIMES = Setting(study.SELF_FRICTION), Setting(study.TIMES)
 ORIENTATION = Setting(study.ORIENTATION)
 PROTOCOL = Setting(study.PROTOCOL, FILE)
-ORDER, REFINE = Setting(ORDER_OF_ELEMENTS), Setting(REFINEMENT)
+ORDER, REFINE = Setting(mesh.ORDER), Setting(mesh.REFINE)
 QUICK_TIMES = Setting(study.TIMES._replace(default=7))
-QUICK_REFINE = Setting(REFINEMENT._replace(default=0.5))
+QUICK_REFINE = Setting(mesh.REFINE._replace(default=0.5))
 
 
 def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:

@@ -18,7 +18,7 @@ from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...homogenize.effective import Effective, read_effective
 from ...measured import Measured
-from ...meshing.settings import MeshSettings
+from ...meshing.settings import HOMOGENISED, MeshSettings
 from ...placement.settings import PRINTED, rules_of
 from ..check_print.job import Job as CheckJob
 from ..check_print.run import USE_CASE as CHECK
@@ -213,7 +213,7 @@ def grip_order(call: Call) -> Order:
         cubes=tuple(Cube(side, s["density_g_per_ml"]) for side in sides),
         grip=detail.grip(friction=s["friction"]),
         mesh=detail.mesh,
-        self_contact=s["self_contact"],
+        self_contact=detail.mesh.resolved and s["self_contact"],
         rules=detail.rules if s["rank_paths"] else (),
     )
     return Order(GRIP, job)
@@ -242,9 +242,8 @@ def diagnose_order(call: Call) -> Order:
     assert isinstance(measured, Measured)
     unit = None if design is None else design.unit
     s = call.settings
-    return Order(
-        DIAGNOSE, DiagnoseJob(measured, unit, fidelity=s["fidelity"], self_contact=s["self_contact"])
-    )
+    apart = s["self_contact"] and s["fidelity"] != HOMOGENISED
+    return Order(DIAGNOSE, DiagnoseJob(measured, unit, fidelity=s["fidelity"], self_contact=apart))
 
 
 def law_of(call: Call, done: Finished) -> Outputs:

@@ -6,12 +6,12 @@ from ...errors import InputError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
 from ..parameter_study import settings as study
 from .common import (
+    FIDELITY,
     ORDER,
     PROTOCOL,
-    QUICK_FIDELITY,
     QUICK_REFINE,
-    QUICK_SELF_CONTACT,
     QUICK_TIMES,
+    SELF_CONTACT,
     SELF_FRICTION,
     of_orders,
 )
@@ -118,8 +118,8 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 QUICK_TIMES,
                 ORDER,
                 QUICK_REFINE,
-                QUICK_FIDELITY,
-                QUICK_SELF_CONTACT,
+                FIDELITY,
+                SELF_CONTACT,
                 SELF_FRICTION,
                 setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
                 setting("maximize", "", "columns of the table to make large"),

@@ -13,6 +13,7 @@ import attrs
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
+from ...meshing.settings import HOMOGENISED
 from ...reading import file_text
 from ..parameter_study.plan import TABLE, Plan
 from ..parameter_study.run import LAST, USE_CASE, Job
@@ -61,7 +62,7 @@ def _plan_of(call: Call) -> Plan:
     tables: dict[str, dict[str, Any]] = {
         "design": {},
         "simulate": {"times": s["times"], "mesh": mesh}
-        | ({"self_contact": True} if s["self_contact"] else {})
+        | ({"self_contact": True} if s["self_contact"] and s["fidelity"] != HOMOGENISED else {})
         | ({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
         "place": {},
     }

@@ -79,7 +79,7 @@ class Job:
     rules: tuple[str, ...] = RULES
     quality: str = QUALITY.field()
     optics: Optics = attrs.field(factory=Optics)
-    self_contact: bool = SELF_CONTACT.field()
+    self_contact: bool = SELF_CONTACT._replace(default=False).field()
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(self.mesh, self.self_contact)

@@ -15,6 +15,8 @@ from ...design.quantity import Description
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
+from ...meshing.settings import FIDELITY, HOMOGENISED, SELF_CONTACT
+from ...optimization.freedoms import OF_LATTICE
 from ...reading import parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, read_toml
@@ -141,14 +143,13 @@ class Plan:
 
 def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
-    return _plan_of(
-        read_toml(path, "parameter study", "give the path of a TOML file"), path.parent, str(path)
-    )
+    document = read_toml(path, "parameter study", "give the path of a TOML file")
+    return _plan_of(_as_printed(document), path.parent, str(path))
 
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    return _plan_of(parse_toml(text, where), folder, where)
+    return _plan_of(_as_printed(parse_toml(text, where)), folder, where)
 
 
 def read_plan_of_run(folder: Path) -> Plan:
@@ -206,6 +207,27 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
             for name in v.values:
                 protocol_of(plan.folder / str(name))
     return plan
+
+
+def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
+    """The document with the fidelity that its studies have where it names none.
+
+    The printed body, its walls and struts kept apart; homogenised where the lattice's moduli are varied or a
+    setting of the mesh or of placement needs a continuum.
+    """
+    simulate, vary = document.get("simulate", {}), document.get("vary")
+    mesh = simulate.get("mesh", {}) if isinstance(simulate, dict) else None
+    stage = document.get("stages", LAST_STAGE.default)
+    if not isinstance(mesh, dict) or not isinstance(vary, dict) or stage == STAGES[0] or "fidelity" in mesh:
+        return document
+    varied = _flat(vary)
+    if "simulate.mesh.fidelity" in varied:
+        return document
+    continuum = mesh.get("order") == 1 or "simulate.mesh.order" in varied or "mesher" in simulate
+    continuum |= "rules" in document.get("place", {}) or any(name in OF_LATTICE for name in varied)
+    fidelity = HOMOGENISED if continuum else FIDELITY.default
+    apart = {} if fidelity == HOMOGENISED else {"self_contact": SELF_CONTACT.default}
+    return document | {"simulate": apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}
 
 
 def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:

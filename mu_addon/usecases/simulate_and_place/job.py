@@ -88,7 +88,7 @@ class Job:
     # Effects named by measured data beyond the unit's parameters, and the direction of gravity.
     effects: NamedEffects = attrs.field(factory=NamedEffects)
     # Self-contact of a resolved unit's walls and struts, at several times the cost.
-    self_contact: bool = SELF_CONTACT.field()
+    self_contact: bool = SELF_CONTACT._replace(default=False).field()
     self_friction: float = SELF_FRICTION.field()
     # Linear solver: within its tolerance it decides nothing.
     solver: SolverChoice = attrs.field(factory=SolverChoice)

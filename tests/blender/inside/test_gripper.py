@@ -143,13 +143,11 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     assert (job.grip.friction, job.grip.beyond_mm, job.grip.step_s) == (0.3, 3.0, 1.0)
     assert (job.mesh.refine, job.rules) == (0.4, ())
     assert job.gripper.fingers.gap_mm == 26.5
-    assert job.mesh.fidelity == "homogenised"
-    props.printed_struts = props.self_contact = True
+    assert (job.mesh.fidelity, job.self_contact) == ("resolved", True)
     props.detail = "paths"
-    grasps.write_inputs(root, tmp_path / "printed")
-    job = read_job(tmp_path / "printed")
-    assert (job.mesh.fidelity, job.self_contact, job.rules) == ("resolved", True, ("printed",))
-    props.printed_struts = False
+    grasps.write_inputs(root, tmp_path / "paths")
+    assert read_job(tmp_path / "paths").rules == ("printed",)
+    props.homogenised = True
     assert not grasps.job_of(root).self_contact, "it is of printed struts alone"
     props.detail = "part"
     assert grasps.job_of(root).cubes == ()
