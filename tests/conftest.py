@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
@@ -12,8 +13,8 @@ from . import costs, nightly
 
 pytest_plugins = ["tests.light_law"]
 
-# Tests start hundreds of processes: each would compile the whole program anew, and each worker of pytest
-# rewrite all assertions, which together takes as long as a third of the tests.
+# Else each process that a test starts would compile the program anew, half a second, and each of pytest's
+# rewrite all assertions: 20 s instead of 5 to collect.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
@@ -22,9 +23,22 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-# Kernels are compiled once for all processes: Blender's have a HOME of their own, where Warp would find none.
-# Warp builds beside and renames, and names a kernel by its source: processes may share the folder.
-os.environ.setdefault("WARP_CACHE_PATH", str(Path(__file__).resolve().parents[1] / ".pytest_cache" / "warp"))
+
+def kernels():
+    """Folder of Warp's compiled kernels: the user's, for all clones, or this clone's where that is read-only.
+
+    To compile all that tests use takes two minutes of processor time. Warp builds beside and renames, and
+    names a kernel by its source, so that processes may share it. Blender's have a HOME of their own.
+    """
+    shared = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mu_addon-tests" / "warp"
+    with suppress(OSError):
+        shared.mkdir(parents=True, exist_ok=True)
+        if os.access(shared, os.W_OK):
+            return shared
+    return Path(__file__).resolve().parents[1] / ".pytest_cache" / "warp"
+
+
+os.environ.setdefault("WARP_CACHE_PATH", str(kernels()))
 
 # The same examples each time and no limit of time: what fails is the code, on a machine of any speed.
 # `--hypothesis-profile search` draws new ones.
