@@ -18,8 +18,9 @@ from ...design.quantity import describe
 from ...errors import InputError
 from ...reading import parse_json
 from ..preview import materials
-from ..shared import displays, handlers, updates
+from ..shared import displays, updates
 from ..shared.operators import linked, reports_errors
+from ..shared.registration import add_handlers, remove_handlers
 from ..unit import drawing
 from ..unit import object as unit_object
 
@@ -172,12 +173,12 @@ _register, _unregister = bpy.utils.register_classes_factory((MU_OT_take_asset,))
 def register() -> None:
     """Register the operator, and handlers that look for drops."""
     _register()
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_later):
         bpy.app.timers.unregister(_later)
     _unregister()

@@ -25,8 +25,9 @@ from ...run.folder import write_run
 from ...usecases.simulate_and_place.motion_files import REGIONS, Motion, read_motion
 from ..jobs import start_child
 from ..preview import materials, skeletons
-from ..shared import displays, handlers, viewports
+from ..shared import displays, viewports
 from ..shared.displays import LIVE
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import job as simulation
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -311,16 +312,12 @@ _CONNECTIONS = (
 
 def register() -> None:
     """Register handlers and the signals that bend a unit anew."""
-    handlers.add(_HANDLERS)
-    for signal, function in _CONNECTIONS:
-        signal.connect(function)
+    add_handlers(_HANDLERS, _CONNECTIONS)
 
 
 def unregister() -> None:
     """Unregister them, and end every process."""
-    for signal, function in _CONNECTIONS:
-        signal.disconnect(function)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS, _CONNECTIONS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     for live in _every.values():

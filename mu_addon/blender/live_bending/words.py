@@ -8,7 +8,7 @@ import bpy
 
 from ..jobs import start_child
 from ..results import legend
-from ..shared.overlay import Overlay
+from ..shared.viewports import Overlay
 from ..unit import object as unit_object
 from . import state
 

@@ -28,8 +28,8 @@ from ...usecases.graph.job import LAYOUT, Job, file_name
 from ...usecases.graph.plan import plan_of
 from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
-from ..shared import handlers
 from ..shared.file_cache import FileCache
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate.study_folder import default_folder, relative
 from ..unit import object as unit_object
 from ..unit.properties import PARAMETERS_CHANGED, to_unit
@@ -289,18 +289,14 @@ _CONNECTIONS = (
 
 def register() -> None:
     """Register handlers and signals that start a refresh."""
-    handlers.add(_HANDLERS)
-    handlers.add(_DRIVEN)
-    for signal, function in _CONNECTIONS:
-        signal.connect(function)
+    add_handlers(_HANDLERS, _CONNECTIONS)
+    add_handlers(_DRIVEN)
 
 
 def unregister() -> None:
     """Unregister them, and cancel a waiting refresh."""
-    for signal, function in _CONNECTIONS:
-        signal.disconnect(function)
-    handlers.remove(_DRIVEN)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_DRIVEN)
+    remove_handlers(_HANDLERS, _CONNECTIONS)
     for timer in (_refresh_pending, _redraw_running):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..shared import handlers
+from ..shared.registration import add_handlers, remove_handlers
 from ..unit import object as unit_object
 from .operators import selected_candidate
 
@@ -75,11 +75,11 @@ _HANDLERS = {
 
 def register() -> None:
     """Register handlers that watch the active object."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_choose):
         bpy.app.timers.unregister(_choose)

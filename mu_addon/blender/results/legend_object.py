@@ -15,8 +15,9 @@ from mathutils import Matrix
 
 from ...errors import InputError
 from ..preview import materials, skeletons
-from ..shared import displays, handlers
+from ..shared import displays
 from ..shared.displays import LEGEND
+from ..shared.registration import add_handlers, remove_handlers
 from ..unit import object as unit_object
 from . import field_colours, legend
 from . import motion as motion_parts
@@ -122,11 +123,11 @@ _HANDLERS = {"frame_change_pre": _before_frame}
 
 def register() -> None:
     """Register the handler that writes time and pressure, and the update when colours change."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
     motion_parts.COLOURED.connect(update)
 
 
 def unregister() -> None:
     """Unregister them."""
     motion_parts.COLOURED.disconnect(update)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)

@@ -29,8 +29,9 @@ from ...usecases.simulate_and_place.motion_files import (
 from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
-from ..shared import displays, handlers, updates
+from ..shared import displays, updates
 from ..shared.displays import MOTION
+from ..shared.registration import add_handlers, remove_handlers
 from ..shared.updates import Signal
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
@@ -516,14 +517,10 @@ _CONNECTIONS = ((unit_object.REBUILT, follow), (JOB_ENDED, _job_ended), (VIEW_CH
 
 def register() -> None:
     """Register handlers that keep the fields at the scene's frame, and the motions with the shown run."""
-    handlers.add(_HANDLERS)
-    for signal, function in _CONNECTIONS:
-        signal.connect(function)
+    add_handlers(_HANDLERS, _CONNECTIONS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    for signal, function in _CONNECTIONS:
-        signal.disconnect(function)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS, _CONNECTIONS)
     _forget()

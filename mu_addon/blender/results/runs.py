@@ -9,7 +9,8 @@ from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProp
 from ...errors import MuError
 from ...usecases.simulate_and_place import history
 from ..jobs.start_child import JOB_ENDED
-from ..shared import handlers, viewports
+from ..shared import viewports
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import motion as motion_parts
@@ -146,14 +147,14 @@ def register() -> None:
     """Register the list on the window manager: no file keeps it, and undo leaves it alone."""
     _add()
     bpy.types.WindowManager.mu_runs = PointerProperty(type=MU_PG_runs)
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
     JOB_ENDED.connect(refresh)
 
 
 def unregister() -> None:
     """Unregister it."""
     JOB_ENDED.disconnect(refresh)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_later):
         bpy.app.timers.unregister(_later)
     del bpy.types.WindowManager.mu_runs

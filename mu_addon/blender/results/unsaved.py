@@ -16,8 +16,9 @@ from ...errors import MuError
 from ...usecases.simulate_and_place import history
 from ..gripper import object as gripper_object
 from ..gripper import state as grasps
-from ..shared import displays, handlers
+from ..shared import displays
 from ..shared.compat import user_folder
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
@@ -112,10 +113,10 @@ _HANDLERS = {"save_pre": _before_save, "save_post": _after_save, "load_post": _l
 
 def register() -> None:
     """Register handlers of saving and loading."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     _homes.clear()

@@ -17,7 +17,8 @@ from bpy.app.handlers import persistent
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
 from ..preview.nodes import unit as unit_group
-from ..shared import displays, handlers, scene_units, updates
+from ..shared import displays, scene_units, updates
+from ..shared.registration import add_handlers, remove_handlers
 from ..unit import broken, drawing, preview_update
 from ..unit import object as unit_object
 
@@ -241,11 +242,11 @@ _HANDLERS = {
 
 def register() -> None:
     """Register handlers that check after every gesture."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     for kept in (_holders, _given, _hidden):
         kept.clear()

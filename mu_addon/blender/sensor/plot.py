@@ -18,7 +18,7 @@ from mathutils import Vector
 
 from ...usecases.sensor.traces import steady_range, unbroken
 from ..results.legend import TEXT, ticks, write
-from ..shared.overlay import Overlay
+from ..shared.viewports import Overlay
 from ..unit import object as unit_object
 from . import state as sensor
 from . import twin

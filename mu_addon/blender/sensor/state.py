@@ -20,8 +20,9 @@ from ...run.folder import write_run
 from ...usecases.sensor.watch import Watched
 from ..jobs import start_child
 from ..jobs.start_child import JobKind
-from ..shared import handlers, viewports
+from ..shared import viewports
 from ..shared.file_cache import FileCache
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import study_folder as studies
 from . import twin
 from .session import Session
@@ -301,7 +302,7 @@ _HANDLERS = {
 
 def register() -> None:
     """Register the handlers."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
@@ -314,4 +315,4 @@ def unregister() -> None:
     _calibrating.clear()
     if bpy.app.timers.is_registered(_poll):
         bpy.app.timers.unregister(_poll)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)

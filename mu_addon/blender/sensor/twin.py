@@ -19,8 +19,9 @@ from ...usecases.simulate_and_place.motion_files import REGIONS, Motion
 from ...usecases.simulate_and_place.poses import Poses, poses
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts
-from ..shared import displays, handlers
+from ..shared import displays
 from ..shared.displays import TWIN
+from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 
@@ -163,11 +164,11 @@ _HANDLERS = {"load_post": _loaded}
 
 def register() -> None:
     """Register the handler for loading."""
-    handlers.add(_HANDLERS)
+    add_handlers(_HANDLERS)
 
 
 def unregister() -> None:
     """Unregister it."""
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS)
     _shapes.clear()
     _status.clear()

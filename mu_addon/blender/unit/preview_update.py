@@ -12,7 +12,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..jobs.start_child import JOB_ENDED
-from ..shared import handlers, updates, viewports
+from ..shared import updates, viewports
+from ..shared.registration import add_handlers, remove_handlers
 from . import object as unit_object
 from .properties import PARAMETERS_CHANGED, VIEW_CHANGED
 
@@ -91,16 +92,12 @@ _CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show), (JOB_ENDE
 
 def register():
     """Register handlers for undo, redo and load, and the signals that start a rebuild."""
-    handlers.add(_HANDLERS)
-    for signal, function in _CONNECTIONS:
-        signal.connect(function)
+    add_handlers(_HANDLERS, _CONNECTIONS)
 
 
 def unregister():
     """Unregister handlers, signals and a waiting rebuild."""
-    for signal, function in _CONNECTIONS:
-        signal.disconnect(function)
-    handlers.remove(_HANDLERS)
+    remove_handlers(_HANDLERS, _CONNECTIONS)
     if bpy.app.timers.is_registered(_rebuild_pending):
         bpy.app.timers.unregister(_rebuild_pending)
     _pending.clear()
