@@ -176,8 +176,10 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = add(preset="mu-0.75x")
     root.mu_unit.chambers.count = 3
+    # Of its thirteen instants few have a pressure of their own.
     protocol = tmp_path / "both.csv"
-    protocol.write_text("time_s,pressure_kPa\n0,0\n1,-2.5\n2,0\n3,5\n")
+    rows = "0,0\n0.25,-2.5\n1.25,-2.5\n1.5,0\n1.75,5\n3,5\n"
+    protocol.write_text(f"time_s,pressure_kPa\n{rows}")
     study = root.mu_unit.study
     study.command, study.detail, study.protocol = "simulate", "quick", str(protocol)
     assert job_of(root).mesh == QUICK
