@@ -257,9 +257,10 @@ def _pure_error(record: Record, series: Sequence[Series], residual: Array) -> fl
         e = record.experiments[s.experiment]
         drives = [e.columns[c] for c in sorted(e.columns) if record.driven(s.experiment, c)]
         place = (s.channel, e.scale, e.orientation_deg, e.axis, e.mode, e.section_mm, e.length_mm, e.cells)
-        for k, value in enumerate(residual[s.at]):
-            if len(residual[s.at]) == len(e):
-                alike.setdefault((place, *(float(d[k]) for d in drives)), []).append(float(value))
+        for block, value in enumerate(residual[s.at]):
+            row = s.samples(block)
+            if row.stop - row.start == 1:
+                alike.setdefault((place, *(float(d[row.start]) for d in drives)), []).append(float(value))
     repeats = [np.array(v) for v in alike.values() if len(v) > 1]
     dof = sum(len(v) - 1 for v in repeats)
     if dof < 2:

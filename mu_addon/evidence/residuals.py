@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import attrs
@@ -233,7 +233,8 @@ def _by_turn(fitted: _Fitted, spare: Mapping[str, float]) -> list[Dependence]:
     """Test against the angle that a unit is turned by within a record.
 
     Such readings have no clock, and so a noise that is estimated from this very residual: a share of it is
-    tested (by the beta distribution), not its size over that noise.
+    tested (by the beta distribution), not its size over that noise. Outliers are part of it, so that records
+    are also compared with each other (`_turned_alike`).
     """
     from scipy.stats import beta
 
@@ -242,12 +243,36 @@ def _by_turn(fitted: _Fitted, spare: Mapping[str, float]) -> list[Dependence]:
         return []
     total = float(fitted.residual @ fitted.residual)
     left = len(fitted.residual) - len(fitted.along)
-    return [
+    found = [
         attrs.evolve(
             d, p_value=float(beta.sf(min(d.statistic / total, 1.0), d.dof / 2, max(left - d.dof, 1) / 2))
         )
         for d in _tested(fitted, BY_TURN, columns, spare)
     ]
+    found += _turned_alike(fitted.fitter.record, fitted.residual)
+    least = sorted(found, key=lambda d: d.p_value)[:1]
+    return [attrs.evolve(d, p_value=min(1.0, len(found) * d.p_value)) for d in least]
+
+
+def _turned_alike(record: Record, r: Array) -> list[Dependence]:
+    """Test whether records leave the same residual (N,) at the same orientations, by its ranks in each.
+
+    Of normal scores (van der Waerden 1952), in which an outlier is no larger than other readings.
+    """
+    from scipy.stats import norm, rankdata
+
+    scores: list[dict[float, float]] = []
+    for s in record.series:
+        e, own = record.experiments[s.experiment], r[s.at]
+        if TURN in e.columns and math.isnan(s.sample_s) and s.group != KNOWN and len(own) > 2:
+            z = norm.ppf(rankdata(own) / (len(own) + 1.0))
+            turned = np.round(s.mean(e[TURN]) % 360.0, 6).tolist()
+            scores.append(dict(zip(turned, (z / z.std()).tolist(), strict=True)))
+    products = [a[o] * b[o] for a, b in combinations(scores, 2) for o in a.keys() & b.keys()]
+    if not products:
+        return []
+    z = sum(products) / math.sqrt(len(products))
+    return [Dependence(BY_TURN, z, float(norm.sf(z)), "all records alike")]
 
 
 def _turns(record: Record) -> Array | None:

@@ -11,7 +11,9 @@ import numpy as np
 
 from ..errors import MuError
 from ..measured import Experiment
+from ..measured.kinds import quantity_of
 from .simulator import Composite
+from .unclocked import Points, lone, points
 
 Array = np.ndarray[Any, Any]
 
@@ -275,14 +277,16 @@ def without_unpredicted_readings(
 ) -> tuple[list[Experiment], list[str]]:
     """The experiments without readings that stand alone in a fit's residual, and these in words.
 
-    Where a quantity changes fast from sample to sample, only the prediction shows that a reading is wrong.
+    Where a quantity changes fast from sample to sample, only the prediction shows that a reading is wrong; so
+    where there is no clock (`unclocked.lone`).
     """
     found: list[Experiment] = []
     words: list[str] = []
+    unclocked: dict[tuple[str, str], list[Points]] = {}
     steps = display_steps(experiments, simulator)
     for e in experiments:
         columns = dict(e.columns)
-        channels = _timed_channels(e, simulator)
+        channels = simulator.channels(e) if simulator.knows(e) else ()
         try:
             predicted = simulator.predict(e, values) if channels else np.empty((0, len(e)))
         except MuError:
@@ -298,11 +302,20 @@ def without_unpredicted_readings(
             if copied is not None:
                 # It does not count twice, and stays equal so that the record detects it.
                 columns[channel] = columns[copied]
-                continue
-            wrong = unpredicted_readings(e[channel], predicted[row], steps[e.kind, channel])
-            _set_aside(e, channel, columns, wrong, words)
+            elif "time_s" in e.columns:
+                wrong = unpredicted_readings(e[channel], predicted[row], steps[e.kind, channel])
+                _set_aside(e, channel, columns, wrong, words)
+            elif (own := points(e, channel, predicted[row], steps[e.kind, channel])) is not None:
+                unclocked.setdefault((e.kind, channel), []).append(own)
         changed = any(columns[c] is not e.columns[c] for c in columns)
         found.append(attrs.evolve(e, columns=columns) if changed else e)
+    for every in unclocked.values():
+        for p, alone in zip(every, lone(every), strict=True):
+            at = experiments.index(p.experiment)
+            columns, wrong = dict(found[at].columns), np.zeros(len(p.experiment), bool)
+            wrong[p.rows[alone]] = True
+            _set_aside(p.experiment, p.channel, columns, wrong, words, p.drive)
+            found[at] = attrs.evolve(found[at], columns=columns) if wrong.any() else found[at]
     return found, words
 
 
@@ -312,12 +325,19 @@ def _timed_channels(experiment: Experiment, simulator: Composite) -> tuple[str, 
 
 
 def _set_aside(
-    e: Experiment, channel: str, columns: dict[str, Array], wrong: Array, words: list[str]
+    e: Experiment,
+    channel: str,
+    columns: dict[str, Array],
+    wrong: Array,
+    words: list[str],
+    by: str = "time_s",
 ) -> None:
     if not wrong.any():
         return
     columns[channel] = np.where(wrong, math.nan, columns[channel])
-    at = ", ".join(f"{t:.4g} s" for t in e["time_s"][wrong][:5])
+    quantity, unit = quantity_of(by) or (by, "")
+    at = ", ".join(f"{v:.4g} {unit}".rstrip() for v in e[by][wrong][:5])
+    at = at if by == "time_s" else f"{quantity.replace('_', ' ')} {at}"
     more = " and others" if np.count_nonzero(wrong) > 5 else ""
     words.append(
         f"{e.name}, {channel}: {np.count_nonzero(wrong)} of {len(e)} readings stand alone, "
