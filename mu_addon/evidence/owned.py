@@ -14,19 +14,18 @@ from .residuals import strict_table, structure
 from .selection import (
     CAMERA,
     FALSE_ALARM_RATE,
-    PROMISING,
     RIVAL_DELTA_CHI2,
     Cause,
     Selection,
     at_a_bound,
+    beside,
     causes_of,
     cost,
     false_alarm_probability,
     gain_of,
+    hypotheses,
     loss,
-    promise,
     promising_rivals,
-    ranked,
     size_at_bound,
     sudden,
 )
@@ -184,7 +183,7 @@ def select_owned(
     singles = found.singles
     wider: list[Fit] = []
     for seed in seeds:
-        pool = _pool(fitter, seed, usable, progress)
+        pool = hypotheses(fitter, [seed], usable, progress, MOST_FITS)
         if seed is found.base:
             wider = pool
             singles = tuple(sorted([*singles, *pool], key=cost))
@@ -278,10 +277,7 @@ def further_owners(
         progress(first.name)
         pool = []
         for whose in others:
-            effect = attrs.evolve(first, whose=whose)
-            pool.append(
-                fitter.best([*chosen.effects, effect], [{**chosen.values, **s} for s in effect.starts()])
-            )
+            pool.append(beside(fitter, chosen.effects, attrs.evolve(first, whose=whose), chosen.values))
         best = min(pool, key=cost)
         gain = gain_of(fitter, chosen, best)
         p = min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(first.keys))))
@@ -300,15 +296,3 @@ def further_owners(
 
 def _owner(fit: Fit) -> str:
     return fit.effects[-1].whose
-
-
-def _pool(fitter: Fitter, seed: Fit, effects: Sequence[Effect], progress: Callable[[str], None]) -> list[Fit]:
-    """Fits of a model with one more effect, of the most promising ones, best first."""
-    promised = [(promise(fitter, seed, e), e) for e in effects if e.name not in seed.names]
-    promised.sort(key=lambda pair: -pair[0])
-    found = []
-    for promises, e in promised[:MOST_FITS]:
-        if promises > PROMISING:
-            progress(" and ".join((*seed.names, e.name)))
-            found.append(fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()]))
-    return ranked(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -118,7 +118,7 @@ def select(
     pool: list[Fit] = []
     for e in effects:
         progress(e.name)
-        pool.append(fitter.best([e], [{**base.values, **s} for s in e.starts()]))
+        pool.append(beside(fitter, (), e, base.values))
     pool = ranked(pool)
     singles = tuple(pool)
     chosen, ps, doubted, p_best = base, [], "", 1.0
@@ -130,14 +130,14 @@ def select(
             # Tests differ in scale by far more than by a common effect: see `owned`, `pooled`.
             break
         if level:
-            pool = _extended(fitter, effects, levels[-1][:1], progress)
+            pool = hypotheses(fitter, levels[-1][:1], effects, progress)
         if not pool or _of_the_law(chosen, pool[0], taken):
             break
         p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
         # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
-            pool = ranked([*pool, *_extended(fitter, effects, _other_seeds(levels[-1]), progress)])
+            pool = ranked([*pool, *hypotheses(fitter, _other_seeds(levels[-1]), effects, progress)])
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if level == 0 and p >= FALSE_ALARM_RATE:
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
@@ -239,7 +239,7 @@ def _hidden_pair(
     raw = base.chi2 - singles[0].chi2 - _by_gauges(fitter, base, singles[0])
     if false_alarm_probability(fitter, base, seen, raw) >= FALSE_ALARM_RATE:
         return None
-    pool = _extended(fitter, effects, list(singles[:SEEDS]), progress)
+    pool = hypotheses(fitter, singles[:SEEDS], effects, progress)
     if not pool:
         return None
     best = refined(fitter, pool[0], progress)
@@ -359,7 +359,7 @@ def one_more(
     if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
         return found
     effects = tuple({s.effect.keys: s.effect for s in seen if s.worth_a_fit}.values())
-    pool = _extended(fitter, effects, [found.chosen], progress)
+    pool = hypotheses(fitter, [found.chosen], effects, progress)
     if not pool:
         return found
     best = pool[0]
@@ -512,8 +512,7 @@ def _any_within(fitter: Fitter, found: Selection, others: Sequence[Effect], marg
         e = f.effects[0]
         if e.name in chosen.names or not _promises(fitter, less, e):
             continue
-        more = fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()])
-        if more.chi2 - chosen.chi2 < margin:
+        if beside(fitter, others, e, chosen.values).chi2 - chosen.chi2 < margin:
             return True
     return False
 
@@ -594,19 +593,34 @@ def ranked(fits: Iterable[Fit]) -> list[Fit]:
     return sorted((f for f in fits if math.isfinite(f.chi2)), key=cost)
 
 
-def _extended(
-    fitter: Fitter, effects: Sequence[Effect], seeds: Sequence[Fit], progress: Callable[[str], None]
+def beside(fitter: Fitter, others: Sequence[Effect], effect: Effect, values: Mapping[str, float]) -> Fit:
+    """The best fit of an effect beside others, from each of its starts and the others' values by key."""
+    return fitter.best([*others, effect], [{**values, **start} for start in effect.starts()])
+
+
+def hypotheses(
+    fitter: Fitter,
+    seeds: Sequence[Fit],
+    effects: Sequence[Effect],
+    progress: Callable[[str], None] = lambda _: None,
+    most: int | None = None,
 ) -> list[Fit]:
-    """Every seed with one more effect, each set of effects once, best first."""
+    """Each seed with one of some effects more, each set of effects once, best first.
+
+    Fitted are effects that promise more than `PROMISING` beside a seed, the most promising first; of one
+    mechanism and of a camera's faults a model has one. most: of the fits of a seed; all where it is None.
+    """
     found: dict[frozenset[tuple[str, ...]], Fit] = {}
     for seed in seeds:
+        promised = []
         for e in effects:
             every = frozenset((*(o.keys for o in seed.effects), e.keys))
             twice = e.name in seed.names or (e.name in CAMERA and CAMERA.intersection(seed.names))
-            if twice or every in found or not _promises(fitter, seed, e):
-                continue
+            if not twice and every not in found and (gain := promise(fitter, seed, e)) > PROMISING:
+                promised.append((gain, every, e))
+        for _, every, e in sorted(promised, key=lambda one: -one[0])[:most]:
             progress(" and ".join((*seed.names, e.name)))
-            found[every] = fitter.best([*seed.effects, e], [{**seed.values, **s} for s in e.starts()])
+            found[every] = beside(fitter, seed.effects, e, seed.values)
     return ranked(found.values())
 
 
@@ -795,7 +809,7 @@ def causes_of(
         tried = [f for f in levels[0] if f.names != chosen.names]
         if others:
             tried = [
-                fitter.best([*others, a], [{**chosen.values, **s} for s in a.starts()])
+                beside(fitter, others, a, chosen.values)
                 for a in effects
                 if accepted and a.name not in chosen.names
             ]
@@ -832,7 +846,7 @@ def promising_rivals(
     for e in effects:
         if e.keys not in known and promise(fitter, less, e) >= 0.5 * enough:
             progress(e.title)
-            found.append(fitter.best([*others, e], [{**chosen.values, **s} for s in e.starts()]))
+            found.append(beside(fitter, others, e, chosen.values))
     return ranked(found)
 
 
@@ -881,7 +895,7 @@ def _by_numerics(
         return {}
 
     def meshed(f: Fit) -> Fit:
-        return fitter.best([*f.effects, mesh], [{**f.values, **s} for s in mesh.starts()])
+        return beside(fitter, f.effects, mesh, f.values)
 
     reference, found = meshed(chosen), {}
     for f in tried:
