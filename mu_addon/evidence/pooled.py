@@ -13,16 +13,6 @@ from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
 from .owned import OF_NONE, OF_THE_BENCH, of_specimens, scaled_by
-from .residuals import strict_table, structure
-from .selection import (
-    FALSE_ALARM_RATE,
-    LAW,
-    RIVAL_DELTA_CHI2,
-    Cause,
-    Selection,
-    at_a_bound,
-    sudden,
-)
 
 Array = np.ndarray[Any, Any]
 
@@ -152,52 +142,20 @@ def _own(p: Parameter, owner: str) -> Parameter:
     return attrs.evolve(p, name=f"{p.name}{OF}{owner}", starts=tuple(least))
 
 
-def select_pooled(
-    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
-) -> Selection:
-    """Add to an insufficient selection the effect whose differences among owners explain the data.
+def fits_among(
+    fitter: Fitter, base: Fit, progress: Callable[[str], None] = lambda _: None
+) -> list[tuple[float, Fit]]:
+    """Gain in -2 log L and fit of each effect that differs among owners, the largest gain first.
 
-    Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
-    a chi squared of one degree), times the number of effects and groupings tried. Owners' values from every
-    second quarter of the records must predict the other quarters. Neither a step change nor an effect of one
-    size for all may explain more. Rivals are other effects, or groupings, with as good a likelihood within
-    their law's error (`LAW`).
+    Effects whose owners show no spread are left out.
     """
-    from scipy.stats import chi2
-
-    record = fitter.record
-    effects = pooled_effects(fitter.simulator.effects, record.experiments)
-    fits: list[tuple[float, Fit]] = []
-    for effect in effects:
+    found = []
+    for effect in pooled_effects(fitter.simulator.effects, fitter.record.experiments):
         progress(effect.title)
-        one = _fitted(fitter, found.base, effect)
+        one = _fitted(fitter, base, effect)
         if one is not None:
-            fits.append(one)
-    if not fits:
-        return found
-    fits.sort(key=lambda one: -one[0])
-    found = attrs.evolve(found, wider=(*found.wider, *(f for _, f in fits)))
-    gain, best = fits[0]
-    shape = len(best.effects[0].keys) - len(sizes_of(best.effects[0]))
-    p = min(1.0, len(effects) * 0.5 * float(chi2.sf(max(gain, 0.0), 1 + shape)))
-    if p >= FALSE_ALARM_RATE or at_a_bound(best) or not _predicts(fitter, found.base, best):
-        return found
-    table = tuple(strict_table(fitter, best))
-    if structure(table) or sudden(found.table_base, found.base, best):
-        return found
-    # Smooth structure may pass for slow noise; then a common effect of all owners explains more than a
-    # spread.
-    if any(single.chi2 < best.chi2 for single in found.singles):
-        return found
-    # Nor does a fit with as small a residual as an error of their law.
-    margin = max(RIVAL_DELTA_CHI2, LAW**2 * gain)
-    near = [f.effects[0] for g, f in fits[1:] if gain - g < margin]
-    # Any difference among specimens is also one among their experiments, and another law is the same cause.
-    rivals = dict.fromkeys(
-        e.title for e in near if e.name != best.names[0] or len(sizes_of(e)) < len(sizes_of(best.effects[0]))
-    )
-    cause = Cause(best.effects[0], p, found.base.chi2 - best.chi2, tuple(rivals))
-    return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
+            found.append(one)
+    return sorted(found, key=lambda one: -one[0])
 
 
 def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | None:
@@ -284,18 +242,3 @@ def _directions(columns: Array) -> Array:
     length = np.linalg.norm(columns, axis=0)
     u, s, _ = np.linalg.svd(columns[:, length > 0] / length[length > 0], full_matrices=False)
     return np.asarray(u[:, s > 1e-9 * max(s.max(initial=0.0), 1e-300)])
-
-
-def _predicts(fitter: Fitter, base: Fit, best: Fit) -> bool:
-    """Return True if owners' values from every second quarter of the records predict the other quarters."""
-    record = fitter.record
-    quarter = np.zeros(len(record), int)
-    for s in record.series:
-        many = s.at.stop - s.at.start
-        quarter[s.at] = np.minimum(4 * np.arange(many) // max(many, 1), 3)
-    lost = 0.0
-    for side in (0, 1):
-        left_out = quarter % 2 == side
-        before, after = (fitter.left_out(left_out, model) for model in (base, best))
-        lost += before - after if before != after else 0.0
-    return lost > 0.0

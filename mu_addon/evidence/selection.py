@@ -167,7 +167,7 @@ def select(
         levels.append(pool)
     if len(chosen.effects) > 2:
         chosen = _without_superfluous(fitter, seen, base, chosen)
-    doubted = doubted or _doubts(fitter, table_base, base, chosen)
+    doubted = doubted or doubts(fitter, table_base, base, chosen)
     table = tuple(strict_table(fitter, chosen))
     accepted = not (doubted or structure(table))
     causes = causes_of(fitter, effects, base, chosen, ps, levels, accepted)
@@ -336,49 +336,11 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
                 doubted or f"{e.name} gives no significant gain at the noise that remains with the causes"
             )
     table_base = tuple(dependence_table(fitter, base))
-    doubted = doubted or sudden(table_base, base, chosen) or curved_reading(fitter, base, chosen)
+    doubted = doubted or doubts(fitter, table_base, base, chosen)
     effects = [f.effects[0] for f in singles]
     table = tuple(strict_table(fitter, chosen))
     causes = causes_of(fitter, effects, base, chosen, ps, [singles], not (doubted or structure(table)))
     return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
-
-
-def one_more(
-    fitter: Fitter,
-    seen: Sequence[Sensitivity],
-    found: Selection,
-    progress: Callable[[str], None] = lambda _: None,
-) -> Selection:
-    """Add to a selection that left structure the effect that takes all of it; unchanged without such.
-
-    For noise that was estimated anew around the causes: an effect smaller than the noise assumed before may
-    now be significant. An effect is rejected if its p-value reaches `FALSE_ALARM_RATE`, if structure is left,
-    if it does not predict left-out experiments better, if a step change explains more, or if one experiment
-    (a share above `ALONE`) alone supports it.
-    """
-    if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
-        return found
-    effects = tuple({s.effect.keys: s.effect for s in seen if s.worth_a_fit}.values())
-    pool = hypotheses(fitter, [found.chosen], effects, progress)
-    if not pool:
-        return found
-    best = pool[0]
-    p = false_alarm_probability(fitter, found.chosen, seen, gain_of(fitter, found.chosen, best))
-    if (
-        p >= FALSE_ALARM_RATE
-        or max(_share_by_experiment(fitter, best).values()) > ALONE
-        or loss(fitter, found.chosen, best) <= 0.0
-    ):
-        return found
-    table = tuple(strict_table(fitter, best))
-    if (
-        structure(table)
-        or sudden(found.table_base, found.base, best)
-        or curved_reading(fitter, found.base, best)
-    ):
-        return found
-    causes = causes_of(fitter, effects, found.base, best, [*(c.p_value for c in found.causes), p], [pool])
-    return attrs.evolve(found, chosen=best, causes=causes, table=table)
 
 
 def share_taken(fitter: Fitter, base: Fit, fit: Fit) -> float:
@@ -429,7 +391,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
         # What changed in its owner at one moment is none of these.
         return None
     if of_all:
-        shares = _share_by_experiment(fitter, best)
+        shares = share_by_experiment(fitter, best)
         if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
             return None
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
@@ -469,7 +431,7 @@ def _without_the_least(fitter: Fitter, found: Selection) -> Selection | None:
     less = attrs.evolve(found, chosen=chosen, causes=causes)
     if not _plain(fitter, less) or not _with_rivals(fitter, found).causes[-1].rivals:
         return None
-    doubted = _doubts(fitter, found.table_base, found.base, chosen)
+    doubted = doubts(fitter, found.table_base, found.base, chosen)
     return attrs.evolve(less, table=tuple(strict_table(fitter, chosen)), doubted=doubted)
 
 
@@ -498,7 +460,7 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
         if CLEAR * left > near and _any_within(fitter, found, others, CLEAR * left):
             return False
         last = fitter.fit([*others, c.effect], chosen.values)
-        shares = _share_by_experiment(fitter, last)
+        shares = share_by_experiment(fitter, last)
         if len(shares) > 1 and max(shares.values()) > ALONE:
             return False
     return True
@@ -524,12 +486,6 @@ def at_a_bound(fit: Fit) -> bool:
     )
 
 
-def size_at_bound(fit: Fit) -> bool:
-    """Return True if the size of the last effect, its first parameter, lies at a bound not its null."""
-    last = fit.effects[-1]
-    return _bounded(last.parameters[0], fit.values[last.keys[0]])
-
-
 def _bounded(p: Parameter, value: float) -> bool:
     if not p.plausible[0] <= value <= p.plausible[1]:
         # An implausible value is no cause, though a fit may reach it.
@@ -542,9 +498,16 @@ def _bounded(p: Parameter, value: float) -> bool:
     return any(abs(value - b) < 1e-3 * (p.high - p.low) for b in ends)
 
 
-def _doubts(fitter: Fitter, table_base: Sequence[Dependence], base: Fit, chosen: Fit) -> str:
-    """Reason to doubt a fit's effects although they fit, in words; empty without one."""
-    return sudden(table_base, base, chosen) or _too_large(chosen) or curved_reading(fitter, base, chosen)
+def doubts(
+    fitter: Fitter, table_base: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0
+) -> str:
+    """Reason to doubt a fit's effects although they fit, in words; empty without one.
+
+    margin: see `sudden`.
+    """
+    return (
+        sudden(table_base, base, chosen, margin) or _too_large(chosen) or curved_reading(fitter, base, chosen)
+    )
 
 
 def _too_large(chosen: Fit) -> str:
@@ -742,16 +705,29 @@ def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
     """Rise in chi squared of experiments left out in turn, of a model over one with an effect more.
 
     An experiment with most of the information on the effects is left out in parts. Prior knowledge counts as
-    an experiment.
+    an experiment. Of an effect that differs among owners every second quarter of the records is left out, as
+    each owner's value is in its own records alone.
     """
-    lost = fitter.deviance(less)[PRIOR] - fitter.deviance(more)[PRIOR]
-    for rows in _folds(fitter, more):
+    if more.effects[-1].among:
+        lost, folds = 0.0, _quarters(fitter)
+    else:
+        lost, folds = fitter.deviance(less)[PRIOR] - fitter.deviance(more)[PRIOR], _folds(fitter, more)
+    for rows in folds:
         before, after = (fitter.left_out(rows, model) for model in (less, more))
         lost += before - after if before != after else 0.0
     return lost
 
 
-def _share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
+def _quarters(fitter: Fitter) -> list[Array]:
+    """Rows of every second quarter of the series, and those between."""
+    quarter = np.zeros(len(fitter.record), int)
+    for s in fitter.record.series:
+        many = s.at.stop - s.at.start
+        quarter[s.at] = np.minimum(4 * np.arange(many) // max(many, 1), 3)
+    return [quarter % 2 == side for side in (0, 1)]
+
+
+def share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
     """Share of each experiment in the information on the last effect's size."""
     record = fitter.record
     every, own = np.vstack([fit.jacobian, fit.prior]), len(fit.effects[-1].keys)
@@ -767,7 +743,7 @@ def _share_by_experiment(fitter: Fitter, fit: Fit) -> dict[int, float]:
 def _folds(fitter: Fitter, fit: Fit) -> list[Array]:
     record = fitter.record
     folds = []
-    for i, share in _share_by_experiment(fitter, fit).items():
+    for i, share in share_by_experiment(fitter, fit).items():
         rows = record.rows(i)
         timed = "time_s" in record.experiments[i].columns
         if share < 0.6 or rows.sum() < (40 if timed else 12):

@@ -20,13 +20,13 @@ from .next_experiment import Proposal, propose_experiment
 from .noise import Source, estimate, span
 from .outliers import NAME as OUTLIER
 from .outliers import without_outliers
-from .owned import coincident_effects, coinciding, further_owners, select_owned
+from .owned import coincident_effects
 from .plausibility import require_plausible
-from .pooled import select_pooled
 from .record import Record, record
 from .residuals import BY_TURN, strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
+from .search import coinciding, further_owners, one_more, select_owned, select_pooled
 from .selection import (
     FALSE_ALARM_RATE,
     TOGETHER,
@@ -35,7 +35,6 @@ from .selection import (
     at_a_bound,
     interval,
     mainly,
-    one_more,
     ranked,
     reselected,
     select,

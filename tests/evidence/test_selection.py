@@ -12,7 +12,8 @@ from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
-from mu_addon.evidence.selection import one_more, reselected, select
+from mu_addon.evidence.search import one_more
+from mu_addon.evidence.selection import reselected, select
 from mu_addon.evidence.sensitivity import sensitivities
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
