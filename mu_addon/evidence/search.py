@@ -21,6 +21,7 @@ from .selection import (
     Selection,
     at_a_bound,
     beside,
+    by_count,
     causes_of,
     cost,
     doubts,
@@ -169,8 +170,6 @@ def select_pooled(
     all may explain more: smooth structure may pass for slow noise. Rivals are other effects, or groupings,
     with as good a likelihood within their law's error (`LAW`).
     """
-    from scipy.stats import chi2
-
     fits = fits_among(fitter, found.base, progress)
     if not fits:
         return found
@@ -178,7 +177,7 @@ def select_pooled(
     gain, best = fits[0]
     own = sizes_of(best.effects[0])
     tried = len(pooled_effects(fitter.simulator.effects, fitter.record.experiments))
-    p = min(1.0, tried * 0.5 * float(chi2.sf(max(gain, 0.0), 1 + len(best.effects[0].keys) - len(own))))
+    p = by_count(gain, 1 + len(best.effects[0].keys) - len(own), 0.5 * tried)
     common = any(single.chi2 < best.chi2 for single in found.singles)
     if common or not accepted(fitter, found, found.base, best, p):
         return found
@@ -201,8 +200,6 @@ def further_owners(
     An owner is added where it is `accepted` and no structure is left. Unchanged where no effect belongs to
     one specimen.
     """
-    from scipy.stats import chi2
-
     chosen = found.chosen
     if not chosen.effects or found.doubted:
         return found
@@ -220,8 +217,7 @@ def further_owners(
             for whose in others
         ]
         best = min(pool, key=cost)
-        gain = gain_of(fitter, chosen, best)
-        p = min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(first.keys))))
+        p = by_count(gain_of(fitter, chosen, best), len(first.keys), tried)
         if not accepted(fitter, found, chosen, best, p):
             break
         causes.append(Cause(best.effects[-1], p, chosen.chi2 - best.chi2, ()))

@@ -234,8 +234,6 @@ def _hidden_pair(
     Sought where one alone gains by the noise with every cause set aside, and not by the noise of the residual
     as if without cause. The probability that noise gains as much is that of the best of all pairs.
     """
-    from scipy.stats import chi2
-
     raw = base.chi2 - singles[0].chi2 - _by_gauges(fitter, base, singles[0])
     if false_alarm_probability(fitter, base, seen, raw) >= FALSE_ALARM_RATE:
         return None
@@ -245,7 +243,7 @@ def _hidden_pair(
     best = refined(fitter, pool[0], progress)
     more = len(best.keys) - len(base.keys)
     pairs = len(effects) * (len(effects) - 1) / 2
-    p = min(1.0, pairs * float(chi2.sf(max(gain_of(fitter, base, best), 0.0), more)))
+    p = by_count(gain_of(fitter, base, best), more, pairs)
     if p >= FALSE_ALARM_RATE or loss(fitter, base, best) <= 0.0:
         return None
     return p, best
@@ -372,15 +370,14 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     if left > 1.0 - GRADED or base.chi2 < 2.0 * len(fitter.record):
         # Shares are meaningless for a misfit below the noise.
         return None
-    others: dict[str, float] = {}
-    for f in [*found.singles, *found.wider]:
-        if f.effects[0].title != best.effects[0].title and (f.effects[0].whose or f.names != best.names):
-            own = 1.0 - share_taken(fitter, base, f)
-            others[f.effects[0].title] = min(own, others.get(f.effects[0].title, own))
-    reach = (APART if sure else CLEAR) * left
-    near = sorted((title for title, own in others.items() if own < reach), key=lambda n: others[n])
+    others = (
+        (f.effects[0].title, 1.0 - share_taken(fitter, base, f))
+        for f in [*found.singles, *found.wider]
+        if f.effects[0].title != best.effects[0].title and (f.effects[0].whose or f.names != best.names)
+    )
+    near = nearest(others, (APART if sure else CLEAR) * left)
     of_all = any(best is f for f in found.singles)
-    if of_all and near and (not sure or any(others[n] > 1.0 - MAINLY for n in near)):
+    if of_all and near and (not sure or any(own > 1.0 - MAINLY for own in near.values())):
         return None
     table = tuple(strict_table(fitter, best))
     if of_all and near and set(structure(table)) - {OUTLIER}:
@@ -396,17 +393,29 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
             return None
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
         return None
-    p = _by_count(base, best, len(found.singles) + len(found.wider))
+    gain, dof = base.chi2 - best.chi2 - by_search(best), len(best.keys) - len(base.keys)
+    p = by_count(gain, dof, len(found.singles) + len(found.wider))
     cause = Cause(best.effects[0], p, base.chi2 - best.chi2, tuple(near))
     return attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
 
 
-def _by_count(base: Fit, best: Fit, tried: int) -> float:
-    """Probability that noise alone lets the best of so many fits gain as much, by Bonferroni's bound."""
+def by_count(gain: float, dof: int, tried: float) -> float:
+    """Probability that noise alone lets the best of so many fits gain as much, by Bonferroni's bound.
+
+    gain: in chi squared of `dof` degrees of freedom.
+    """
     from scipy.stats import chi2
 
-    gain = base.chi2 - best.chi2 - by_search(best)
-    return min(1.0, tried * float(chi2.sf(max(gain, 0.0), len(best.keys) - len(base.keys))))
+    return min(1.0, tried * float(chi2.sf(max(gain, 0.0), dof)))
+
+
+def nearest(each: Iterable[tuple[str, float]], within: float) -> dict[str, float]:
+    """Rivals by title, the nearest first: those of which a fit lies at a distance below a limit."""
+    least: dict[str, float] = {}
+    for title, distance in each:
+        if distance < within:
+            least[title] = min(distance, least.get(title, distance))
+    return dict(sorted(least.items(), key=lambda one: one[1]))
 
 
 def _with_rivals(fitter: Fitter, found: Selection) -> Selection:
@@ -454,29 +463,17 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
         return False
     left, taken = max(chosen.chi2 - len(fitter.record), 0.0), base.chi2 - chosen.chi2
     for c in found.causes:
-        others = [e for e in chosen.effects if e is not c.effect]
         # So near a rival would have been reported (`causes_of`).
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (taken - c.loss))
-        if CLEAR * left > near and _any_within(fitter, found, others, CLEAR * left):
-            return False
-        last = fitter.fit([*others, c.effect], chosen.values)
+        if CLEAR * left > near:
+            rivals = promising_rivals(fitter, chosen, c.effect, _not_chosen(found))
+            if any(f.chi2 - chosen.chi2 < CLEAR * left for f in rivals):
+                return False
+        last = fitter.fit([*(e for e in chosen.effects if e is not c.effect), c.effect], chosen.values)
         shares = share_by_experiment(fitter, last)
         if len(shares) > 1 and max(shares.values()) > ALONE:
             return False
     return True
-
-
-def _any_within(fitter: Fitter, found: Selection, others: Sequence[Effect], margin: float) -> bool:
-    """Return True if some effect beside the others comes within a margin of the chosen chi squared."""
-    chosen = found.chosen
-    less = fitter.best(others, [chosen.values])
-    for f in found.singles:
-        e = f.effects[0]
-        if e.name in chosen.names or not _promises(fitter, less, e):
-            continue
-        if beside(fitter, others, e, chosen.values).chi2 - chosen.chi2 < margin:
-            return True
-    return False
 
 
 def at_a_bound(fit: Fit) -> bool:
@@ -598,10 +595,6 @@ def _other_seeds(pool: Sequence[Fit]) -> list[Fit]:
     others = list(best.values())[1:]
     physical = [f for f in best.values() if not CAMERA.intersection(f.names)]
     return [f for f in others if f in others[: SEEDS - 1] or f in physical[:SEEDS]]
-
-
-def _promises(fitter: Fitter, fit: Fit, effect: Effect) -> bool:
-    return promise(fitter, fit, effect) > PROMISING
 
 
 def promise(fitter: Fitter, fit: Fit, effect: Effect) -> float:
@@ -792,24 +785,24 @@ def causes_of(
         less = fitter.best(others, [chosen.values])
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
         tried = _with_their_laws(fitter, chosen, less, tried)
-        rivals: dict[str, float] = {}
-        for f in tried:
-            # A rival's gain by its search is no fit.
-            if f.chi2 + by_search(f) - chosen.chi2 - by_search(chosen) < near:
-                name = f.effects[-1].title
-                rivals[name] = min(f.chi2, rivals.get(name, f.chi2))
+        # A rival's gain by its search is no fit.
+        spent = chosen.chi2 + by_search(chosen)
+        rivals = nearest(((f.effects[-1].title, f.chi2 + by_search(f) - spent) for f in tried), near)
         if NUMERICS not in rivals:
             # Where the mesh alone replaces it, anything beside the mesh would.
             rivals |= _by_numerics(
                 fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
             )
-        p = max(ps)
-        found.append(Cause(e, p, less.chi2 - chosen.chi2, tuple(sorted(rivals, key=lambda n: rivals[n]))))
+        found.append(Cause(e, max(ps), less.chi2 - chosen.chi2, tuple(nearest(rivals.items(), math.inf))))
     return tuple(sorted(found, key=lambda c: -c.loss))
 
 
 def promising_rivals(
-    fitter: Fitter, chosen: Fit, cause: Effect, effects: Sequence[Effect], progress: Callable[[str], None]
+    fitter: Fitter,
+    chosen: Fit,
+    cause: Effect,
+    effects: Sequence[Effect],
+    progress: Callable[[str], None] = lambda _: None,
 ) -> list[Fit]:
     """Fits of those of some effects in the place of a cause that promise half of what it takes, or more.
 
@@ -832,12 +825,16 @@ def with_promising_rivals(
     """A selection that is not accepted, its several causes with the rivals that `promising_rivals` finds."""
     causes = []
     for c in found.causes:
-        effects = [f.effects[0] for f in found.singles if f.effects[0].name not in found.chosen.names]
         near = max(RIVAL_DELTA_CHI2, LAW**2 * (found.base.chi2 - found.chosen.chi2 - c.loss))
-        fits = promising_rivals(fitter, found.chosen, c.effect, effects, progress)
-        titles = (f.effects[-1].title for f in fits if cost(f) - cost(found.chosen) < near)
+        fits = promising_rivals(fitter, found.chosen, c.effect, _not_chosen(found), progress)
+        titles = nearest(((f.effects[-1].title, cost(f) - cost(found.chosen)) for f in fits), near)
         causes.append(attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *titles)))))
     return attrs.evolve(found, causes=tuple(causes))
+
+
+def _not_chosen(found: Selection) -> list[Effect]:
+    """Effects that were fitted alone, of mechanisms that the chosen model has not."""
+    return [f.effects[0] for f in found.singles if f.effects[0].name not in found.chosen.names]
 
 
 def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
@@ -861,7 +858,7 @@ def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fi
 def _by_numerics(
     fitter: Fitter, effects: Sequence[Effect], chosen: Fit, tried: Sequence[Fit]
 ) -> dict[str, float]:
-    """Chi squared of models that differ from the chosen one only by the error of its mesh, by rival.
+    """Rivals by title that differ from the chosen model only by the error of its mesh, with the difference.
 
     No mesh is exact, and its error differs with and without the effect. So an effect has as a rival any that
     explains the data as well once either has a free size of that error.
@@ -875,11 +872,11 @@ def _by_numerics(
 
     reference, found = meshed(chosen), {}
     for f in tried:
-        if f.names[-1] != NUMERICS and _promises(fitter, f, mesh):
+        if f.names[-1] != NUMERICS and promise(fitter, f, mesh) > PROMISING:
             other = meshed(f)
             searched = by_search(other) - by_search(reference)
             if other.chi2 - reference.chi2 + searched < RIVAL_DELTA_CHI2:
-                found[f.effects[-1].title] = other.chi2
+                found[f.effects[-1].title] = other.chi2 - reference.chi2 + searched
     return found
 
 

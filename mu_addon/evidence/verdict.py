@@ -11,86 +11,42 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .drive import denoised_drives
 from .effect import Effect, Parameter
 from .fit import Fit, Fitter
 from .fitted_zeros import FittedZeros, fitted_zeros
 from .gain import Gain, gain
 from .next_experiment import Proposal, propose_experiment
-from .noise import Source, estimate, span
-from .outliers import NAME as OUTLIER
-from .outliers import without_outliers
-from .owned import coincident_effects
-from .plausibility import require_plausible
-from .record import Record, record
-from .residuals import BY_TURN, strict_table, structure
-from .resolution import without_unpredicted_readings, without_wrong_readings
-from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
-from .search import coinciding, further_owners, one_more, select_owned, select_pooled
+from .noise import Source
+from .record import Record
 from .selection import (
-    FALSE_ALARM_RATE,
     TOGETHER,
     Cause,
     Selection,
     at_a_bound,
     interval,
-    mainly,
     ranked,
-    reselected,
-    select,
     share_taken,
-    too_far,
     with_promising_rivals,
 )
 from .sensitivity import (
     ABSORBED,
     SEEN,
-    WANDERING,
     Sensitivity,
-    at_bounds,
     best_seen,
-    sensitivities,
-    signatures,
 )
 from .simulator import Composite
-from .thinning import thinned
+from .steps import STEPS, begun, unlikely
 
 Array = np.ndarray[Any, Any]
-
-KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
-# Effects that may belong to one specimen, or differ among them, if no common one explains the data.
-OPEN = ("unexplained", "unidentifiable")
-# A nuisance this many spreads from its prior value is no longer only a nuisance.
-UNLIKELY = 3.0
-# This many effects stand in for one that differs among owners: three leaks as one, with valves shut late.
-STRAINED = 5.0
-# Noise around the causes larger or smaller than around the base model by this factor replaces it.
-RENEWED = 1.5
-# What is off by as much in a whole record, or wanders in it, as slow noise does.
-ZEROS = frozenset(
-    (
-        "pressure_offset",
-        "pressure_drift",
-        "angle_offset",
-        "angle_drift",
-        "force_drift",
-        "led_drift",
-        "ambient_light",
-    )
-)
-# Times that causes are selected anew under noise that is quieter around those found before.
-QUIETER = 2
-# Number of times that isolated outliers are set aside.
-ROUNDS = 3
 
 
 @attrs.frozen(eq=False)
 class Verdict:
     """Verdict of the data on the model: the causes named, their rivals, the gain, the next experiment.
 
-    kind: one of `KINDS` (none, named, ambiguous, unidentifiable, unexplained). experiments: all of them,
-    their drives freed of gauge noise (`drive.denoised_drives`). sources: noise by group of series. intervals:
-    95 % bounds by key, in the parameters' units. identifiability: effects that these data cannot show, with
+    kind: one of `steps.KINDS`. experiments: all of them, their drives freed of gauge noise
+    (`drive.denoised_drives`). sources: noise by group of series. intervals: 95 % bounds by key, in the
+    parameters' units. identifiability: effects that these data cannot show, with
     the reason. set_aside: readings left out, in words (`resolution.wrong_readings`). refused: why models that
     were tried have no prediction, by the titles of their effects. share_taken: of the base model's misfit by
     the chosen one; a verdict `named` or `ambiguous` may leave structure (`selection.mainly`). nearest: title
@@ -189,40 +145,6 @@ class Verdict:
         }
 
 
-def noise_of(
-    measured: Record,
-    simulator: Composite,
-    values: Mapping[str, float] | None = None,
-    effects: Sequence[Effect] = (),
-) -> dict[str, Source]:
-    """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
-
-    values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
-    base model's fit where None. Changes by any effect of the library, and by those of `effects`, do not count
-    as noise; nor does what exceeds a stated accuracy.
-    """
-    if values is None:
-        rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
-        values = rough.fit().values
-    zeros = {p.name for p in simulator.nuisances if p.linear}
-    curved = {k: v for k, v in values.items() if k not in zeros}
-    columns = span(measured, signatures(measured, simulator, curved, effects))
-    found = estimate(measured, measured.values - measured.predict(simulator, values), columns)
-    return within_accuracy(measured, found)
-
-
-def _rough(measured: Record, group: str) -> Source:
-    """Rough sizes: white noise of a hundredth of the group's range."""
-    values = np.concatenate([measured.values[s.at] for s in measured.series if s.group == group])
-    return Source(max(float(np.ptp(values)), 1e-9) / 100.0, 1e-6, 1.0)
-
-
-def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
-    """Sensitivity to each effect of the library beside the base model's values."""
-    curved = {p.name: base.values[p.name] for p in fitter.curved}
-    return at_bounds(fitter, curved, sensitivities(fitter, curved))
-
-
 def diagnose(
     experiments: Sequence[Experiment], simulator: Composite, progress: Callable[[str], None] = lambda _: None
 ) -> Verdict:
@@ -234,142 +156,35 @@ def diagnose(
     is significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
     experiment can be predicted, and where `require_plausible` does.
     """
-    experiments, set_aside = without_wrong_readings(experiments, simulator)
-    experiments, averaged = thinned(experiments, simulator)
-    set_aside += averaged
-    experiments, again = denoised_drives(experiments, simulator)
-    progress("noise")
-    fitted = [e for e in experiments if e.role == "fit"]
-    simulator.groups |= {e.whose: names for e, names in coincident_effects(fitted).items()}
-    measured, fitter, base = _base(experiments, again, simulator)
-    experiments, more = without_unpredicted_readings(experiments, simulator, base.values)
-    if more:
-        set_aside = [*set_aside, *more]
-        measured, fitter, base = _base(experiments, again, simulator)
-    sources = fitter.sources
-    require_plausible(fitter, base)
-    progress("sensitivities")
-    seen = _seen(fitter, base)
-    chosen = select(fitter, seen, progress)
-    for _ in range(QUIETER):
-        if not chosen.causes:
-            break
-        renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
-        if not any(_total(sources[g]) > RENEWED * _total(renewed[g]) for g in sources):
-            break
-        # Around the base model a large cause differs from its slope: it had counted as noise, which hides a
-        # second cause, or another first one.
-        progress("selection under quieter noise")
-        sources, fitter = renewed, Fitter(measured, simulator, renewed)
-        base = fitter.fit()
-        seen = _seen(fitter, base)
-        chosen = select(fitter, seen, progress)
-    if chosen.causes and _kind(fitter, chosen) == "unexplained":
-        # Beside a large misfit isolated readings are not seen.
-        experiments, more = without_unpredicted_readings(experiments, simulator, chosen.chosen.values)
-        if more:
-            set_aside = [*set_aside, *more]
-            measured, fitter, base = _base(experiments, again, simulator)
-            sources = fitter.sources
-            seen = _seen(fitter, base)
-            chosen = reselected(fitter, seen, chosen)
-    if _kind(fitter, chosen) in OPEN:
-        chosen, seen = select_owned(fitter, seen, chosen, progress)
-    if _kind(fitter, chosen) in OPEN or (chosen.causes and _strained(fitter, chosen.chosen)):
-        chosen = select_pooled(fitter, chosen, progress)
-    chosen = further_owners(fitter, chosen, progress)
-    if chosen.causes and not chosen.causes[0].effect.among:
-        progress("noise around the causes")
-        # The nonlinear rest of a large cause had counted as noise.
-        owned = [e for e in chosen.chosen.effects if e.whose]
-        renewed = noise_of(measured, simulator, chosen.chosen.values, _wandering(chosen))
-        if any(_apart(sources[g], renewed[g]) for g in sources):
-            sources, fitter = renewed, Fitter(measured, simulator, renewed)
-            chosen = reselected(fitter, seen, chosen)
-            if chosen.left:
-                seen = _seen(fitter, base)
-                chosen = one_more(fitter, seen, chosen, progress)
-            if _kind(fitter, chosen) == "unexplained" and not owned:
-                chosen, seen = select_owned(fitter, seen, chosen, progress)
-    chosen = coinciding(fitter, chosen, progress)
-    before = experiments, set_aside, fitter, base, seen, chosen
-    for _ in range(ROUNDS):
-        if OUTLIER not in chosen.left or (chosen.doubted and chosen.causes):
-            break
-        experiments, more = without_outliers(experiments, fitter, chosen.chosen, len(chosen.table))
-        if not more:
-            break
-        set_aside = [*set_aside, *more]
-        if chosen.causes:
-            fitter = Fitter(_measured(experiments, again, simulator), simulator, sources)
-            base = fitter.fit()
-        else:
-            measured, fitter, base = _base(experiments, again, simulator)
-        seen = _seen(fitter, base)
-        chosen = reselected(fitter, seen, chosen) if chosen.causes else select(fitter, seen, progress)
-    if chosen.left or chosen.doubted:
-        # There were more faults than these.
-        experiments, set_aside, fitter, base, seen, chosen = before
-    if chosen.causes and _kind(fitter, chosen) != "unexplained":
-        louder = _loud_alone(fitter, seen, chosen, progress)
-        if louder is not None:
-            fitter, chosen, bursts = louder
-            base = chosen.base
-            set_aside = [*set_aside, *bursts]
-    most = None
-    if _kind(fitter, chosen) == "unexplained" and not _of_no_size(fitter, chosen):
-        # Where a cause takes most of a misfit, fast errors of its law would pass for bursts.
-        most = mainly(fitter, chosen)
-    if _kind(fitter, chosen) == "unexplained" and most is None:
-        left = fitter.record.values - fitter.predict(chosen.chosen.values)
-        measured, bursts = with_bursts(fitter.record, left)
-        if bursts:
-            progress("noise in bursts")
-            other = Fitter(measured, simulator, noise_of(measured, simulator, chosen.chosen.values))
-            # What is structure beside all causes and beside none is no burst.
-            both = (other.fit(effects, chosen.chosen.values) for effects in (chosen.chosen.effects, ()))
-            if not all(structure(strict_table(other, f)) for f in both):
-                anew = select(other, seen, progress)
-                if _kind(other, anew) != "unexplained":
-                    fitter, base, chosen = other, anew.base, anew
-                    set_aside = [*set_aside, *bursts]
-    measured, sources = fitter.record, fitter.sources
-    kind = _kind(fitter, chosen)
-    if kind not in ("none", "unidentifiable") and (words := _of_no_size(fitter, chosen)):
-        chosen = attrs.evolve(chosen, chosen=chosen.base, causes=(), doubted="", excused=words)
-        set_aside = [*set_aside, words]
-        kind = _kind(fitter, chosen)
-    if kind == "none" and not chosen.excused and (words := too_far(fitter, chosen.base)):
-        chosen = attrs.evolve(chosen, doubted=words)
-        kind = _kind(fitter, chosen)
-    if kind == "unexplained" and (most := most or mainly(fitter, chosen)) is not None:
-        chosen = most
-        kind = "ambiguous" if any(c.rivals for c in chosen.causes) else "named"
+    now = begun(experiments, simulator, progress)
+    for step in STEPS:
+        now = step(now, progress)
+    fitter, chosen, kind, set_aside = now.fitter, now.chosen, now.kind, list(now.set_aside)
     progress("gain")
-    gained = gain(fitter, chosen.base, chosen.chosen, [e for e in experiments if e.role == "held_out"])
+    gained = gain(fitter, chosen.base, chosen.chosen, [e for e in now.experiments if e.role == "held_out"])
     set_aside += [
         f"{name} was held out but cannot be predicted, and is not in the gain: {why}"
         for name, why in gained.refused.items()
     ]
-    proposal = propose_experiment(fitter, chosen, seen)
+    proposal = propose_experiment(fitter, chosen, now.seen)
     if kind == "unexplained" and len(chosen.causes) > 1:
         chosen = with_promising_rivals(fitter, chosen, progress)
     known = chosen.chosen if chosen.causes else chosen.base
     # For an effect that is no cause the curvature suffices.
     sure = kind != "unexplained"
     bounds = {k: interval(fitter, known, k) if sure else _by_curvature(known, k) for k in known.keys}
-    identifiability = _identifiability(seen, chosen)
+    identifiability = _identifiability(now.seen, chosen)
     return Verdict(
         kind,
         chosen,
-        tuple(seen),
-        sources,
-        measured,
+        tuple(now.seen),
+        fitter.sources,
+        fitter.record,
         gained,
         proposal,
         identifiability,
         bounds,
-        tuple(experiments),
+        now.experiments,
         tuple(set_aside),
         dict(simulator.refused),
         share_taken(fitter, chosen.base, chosen.chosen),
@@ -379,72 +194,15 @@ def diagnose(
     )
 
 
-def _loud_alone(
-    fitter: Fitter, seen: Sequence[Sensitivity], found: Selection, progress: Callable[[str], None]
-) -> tuple[Fitter, Selection, list[str]] | None:
-    """Fitter, selection and remarks under noise in bursts if that explains the causes away; else None.
-
-    Noise that grows with load is largest where laws of the material differ most.
-    """
-    left = fitter.record.values - fitter.predict(found.chosen.values)
-    measured, bursts = with_bursts(fitter.record, left)
-    if not bursts:
-        return None
-    progress("noise in bursts")
-    noise = noise_of(measured, fitter.simulator, found.chosen.values, _wandering(found))
-    other = Fitter(measured, fitter.simulator, noise)
-    if all(c.p_value < FALSE_ALARM_RATE for c in reselected(other, seen, found).causes):
-        return None
-    return other, select(other, seen, progress), bursts
-
-
 def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
     """Title and share of the misfit of the single explanation that takes most of it; None without any."""
     pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
     return (pool[0].effects[0].title, share_taken(fitter, found.base, pool[0])) if pool else None
 
 
-def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Reason why a misfit is none, in words: as small as the scatter, with no cause but a record's zero.
-
-    Slow noise differs from record to record, as zeros do; none depends on how a unit is turned, which is read
-    at rest.
-    """
-    left = fitter.record.values - fitter.predict(found.base.values)
-    drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)
-    if not drifting or BY_TURN in structure(found.table) or not within_scatter(fitter.record, left):
-        return ""
-    depends = [c.effect.title for c in found.causes] or structure(found.table) or ["no quantity"]
-    on = ", ".join(n.replace("_", " ") for n in depends)
-    return (
-        f"the residual depends on {on}, by less than {NEAR:g} times the scatter of the readings: slow or "
-        "uneven noise of the instruments does that"
-    )
-
-
 def _by_curvature(fit: Fit, key: str) -> tuple[float, float]:
     """The 95 % interval (low, high) of a fitted value by the curvature of chi squared, in its unit."""
     return fit.values[key] - 1.96 * fit.sd(key), fit.values[key] + 1.96 * fit.sd(key)
-
-
-def _base(
-    experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
-) -> tuple[Record, Fitter, Fit]:
-    """Record of the fitted experiments, a fitter with its noise, and the fit without effects."""
-    measured = _measured(experiments, again, simulator)
-    fitter = Fitter(measured, simulator, noise_of(measured, simulator))
-    return measured, fitter, fitter.fit()
-
-
-def _measured(
-    experiments: Sequence[Experiment], again: Sequence[Experiment] | None, simulator: Composite
-) -> Record:
-    """Record of the fitted experiments, with drives by a second reading of their gauges."""
-    found = record([e for e in experiments if e.role == "fit"], simulator)
-    if not again:
-        return found
-    other = {e.name: e for e in again}
-    return attrs.evolve(found, again=tuple(other[e.name] for e in found.experiments))
 
 
 def _among(effect: Effect) -> dict[str, Any] | None:
@@ -454,40 +212,6 @@ def _among(effect: Effect) -> dict[str, Any] | None:
     value, low, high = effect.spread
     unit = effect.parameters[0].unit
     return {"what": effect.among, "spread": {"value": value, "low95": low, "high95": high, "unit": unit}}
-
-
-def _wandering(found: Selection) -> list[Effect]:
-    """Chosen effects that the estimate of noise does not set aside itself."""
-    return [e for e in found.chosen.effects if e.whose or e.name in WANDERING]
-
-
-def _total(source: Source) -> float:
-    return math.hypot(source.white, source.slow)
-
-
-def _apart(one: Source, other: Source) -> bool:
-    """Return True if two estimates of one noise differ more than such estimates do."""
-    total = [_total(s) for s in (one, other)]
-    return max(total) > RENEWED * min(total)
-
-
-def _strained(fitter: Fitter, fit: Fit) -> bool:
-    """Return True if a nuisance is much farther from its prior value than its spread allows."""
-    return any(abs(fit.values[p.name] - p.null) > STRAINED * p.spread for p in fitter.known)
-
-
-def _kind(fitter: Fitter, found: Selection) -> str:
-    if found.left or found.doubted:
-        return "unexplained"
-    if found.causes:
-        return "ambiguous" if any(c.rivals for c in found.causes) else "named"
-    return "unidentifiable" if unlikely(fitter.curved, found.base) else "none"
-
-
-def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
-    """Nuisances with values far from prior knowledge, the farthest first."""
-    away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
-    return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
 
 
 def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:

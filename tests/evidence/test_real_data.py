@@ -16,7 +16,8 @@ from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.evidence.record import record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose, noise_of
+from mu_addon.evidence.steps import noise_of
+from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
 
 from .bench import recovered

@@ -14,7 +14,8 @@ from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities, similarity
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose, noise_of
+from mu_addon.evidence.steps import noise_of
+from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
 BASE = {"modulus_factor": 1.05}

@@ -1,0 +1,352 @@
+"""Steps of a diagnosis: each takes where it stands, and returns where it stands then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured import Experiment
+from .drive import denoised_drives
+from .effect import Effect, Parameter
+from .fit import Fit, Fitter
+from .noise import Source, estimate, span
+from .outliers import NAME as OUTLIER
+from .outliers import without_outliers
+from .owned import coincident_effects
+from .plausibility import require_plausible
+from .record import Record, record
+from .residuals import BY_TURN, strict_table, structure
+from .resolution import without_unpredicted_readings, without_wrong_readings
+from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
+from .search import coinciding, further_owners, one_more, select_owned, select_pooled
+from .selection import FALSE_ALARM_RATE, Selection, mainly, reselected, select, too_far
+from .sensitivity import WANDERING, Sensitivity, at_bounds, sensitivities, signatures
+from .simulator import Composite
+from .thinning import thinned
+
+Array = np.ndarray[Any, Any]
+Progress = Callable[[str], None]
+
+KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
+# Effects that may belong to one specimen, or differ among them, if no common one explains the data.
+OPEN = ("unexplained", "unidentifiable")
+# A nuisance this many spreads from its prior value is no longer only a nuisance.
+UNLIKELY = 3.0
+# This many effects stand in for one that differs among owners: three leaks as one, with valves shut late.
+STRAINED = 5.0
+# Noise around the causes larger or smaller than around the base model by this factor replaces it.
+RENEWED = 1.5
+# What is off by as much in a whole record, or wanders in it, as slow noise does.
+ZEROS = frozenset(
+    (
+        "pressure_offset",
+        "pressure_drift",
+        "angle_offset",
+        "angle_drift",
+        "force_drift",
+        "led_drift",
+        "ambient_light",
+    )
+)
+# Times that causes are selected anew under noise that is quieter around those found before.
+QUIETER = 2
+# Number of times that isolated outliers are set aside.
+ROUNDS = 3
+
+
+@attrs.frozen(eq=False)
+class Diagnosis:
+    """Where a diagnosis stands: the data that count, their noise (in the fitter), and what explains them.
+
+    again: see `drive.denoised_drives`. set_aside: readings left out, and other remarks, in words. seen:
+    sensitivities of the effects. graded: the causes are named although structure is left
+    (`selection.mainly`).
+    """
+
+    experiments: tuple[Experiment, ...]
+    again: Sequence[Experiment] | None
+    set_aside: tuple[str, ...]
+    fitter: Fitter
+    seen: Sequence[Sensitivity]
+    chosen: Selection
+    graded: bool = False
+
+    @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        found = self.chosen
+        if (found.left and not self.graded) or found.doubted:
+            return "unexplained"
+        if found.causes:
+            return "ambiguous" if any(c.rivals for c in found.causes) else "named"
+        return "unidentifiable" if unlikely(self.fitter.curved, found.base) else "none"
+
+    def without(self, experiments: Sequence[Experiment], words: Sequence[str]) -> Diagnosis:
+        """With experiments from which readings were taken, and these in words."""
+        return attrs.evolve(self, experiments=tuple(experiments), set_aside=(*self.set_aside, *words))
+
+    def under(self, fitter: Fitter, progress: Progress, found: Selection | None = None) -> Diagnosis:
+        """With another fitter: effects are selected anew, or those of a selection are judged again."""
+        seen = _seen(fitter, fitter.fit())
+        chosen = reselected(fitter, seen, found) if found else select(fitter, seen, progress)
+        return attrs.evolve(self, fitter=fitter, seen=seen, chosen=chosen)
+
+
+def begun(experiments: Sequence[Experiment], simulator: Composite, progress: Progress) -> Diagnosis:
+    """Readings and drives cleaned, their noise estimated, and the common effects selected.
+
+    Raises InputError where no experiment can be predicted, and where `require_plausible` does.
+    """
+    experiments, words = without_wrong_readings(experiments, simulator)
+    experiments, averaged = thinned(experiments, simulator)
+    experiments, again = denoised_drives(experiments, simulator)
+    progress("noise")
+    fitted = [e for e in experiments if e.role == "fit"]
+    simulator.groups |= {e.whose: names for e, names in coincident_effects(fitted).items()}
+    fitter = _fitter(experiments, again, simulator)
+    base = fitter.fit()
+    experiments, alone = without_unpredicted_readings(experiments, simulator, base.values)
+    if alone:
+        fitter = _fitter(experiments, again, simulator)
+        base = fitter.fit()
+    require_plausible(fitter, base)
+    progress("sensitivities")
+    seen = _seen(fitter, base)
+    set_aside = (*words, *averaged, *alone)
+    return Diagnosis(tuple(experiments), again, set_aside, fitter, seen, select(fitter, seen, progress))
+
+
+def under_quieter_noise(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Select anew while the noise around the causes is much quieter.
+
+    Around the base model a large cause differs from its slope: it had counted as noise, which hides a second
+    cause, or another first one.
+    """
+    for _ in range(QUIETER):
+        if not now.chosen.causes:
+            break
+        renewed, before = _noise_around(now), now.fitter.sources
+        if not _louder(before, renewed):
+            break
+        progress("selection under quieter noise")
+        now = now.under(Fitter(now.fitter.record, now.fitter.simulator, renewed), progress)
+    return now
+
+
+def without_lone_readings(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Set aside readings that stand alone beside causes: beside a large misfit they are not seen."""
+    if now.chosen.causes and now.kind == "unexplained":
+        simulator = now.fitter.simulator
+        fewer, words = without_unpredicted_readings(now.experiments, simulator, now.chosen.chosen.values)
+        if words:
+            fitter = _fitter(fewer, now.again, simulator)
+            now = now.without(fewer, words).under(fitter, progress, now.chosen)
+    return now
+
+
+def with_owners(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Add effects of one owner, or that differ among owners, to a selection that explains too little."""
+    if now.kind in OPEN:
+        chosen, seen = select_owned(now.fitter, now.seen, now.chosen, progress)
+        now = attrs.evolve(now, chosen=chosen, seen=seen)
+    values, known = now.chosen.chosen.values, now.fitter.known
+    strained = any(abs(values[p.name] - p.null) > STRAINED * p.spread for p in known)
+    if now.kind in OPEN or (now.chosen.causes and strained):
+        now = attrs.evolve(now, chosen=select_pooled(now.fitter, now.chosen, progress))
+    return attrs.evolve(now, chosen=further_owners(now.fitter, now.chosen, progress))
+
+
+def under_renewed_noise(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Judge the causes under the noise around them: the nonlinear rest of a large one was noise before."""
+    causes = now.chosen.causes
+    if causes and not causes[0].effect.among:
+        progress("noise around the causes")
+        renewed, before = _noise_around(now), now.fitter.sources
+        if _louder(before, renewed) or _louder(renewed, before):
+            owned = any(c.effect.whose for c in causes)
+            fitter = Fitter(now.fitter.record, now.fitter.simulator, renewed)
+            now = attrs.evolve(now, fitter=fitter, chosen=reselected(fitter, now.seen, now.chosen))
+            if now.chosen.left:
+                seen = _seen(fitter, now.chosen.base)
+                now = attrs.evolve(now, seen=seen, chosen=one_more(fitter, seen, now.chosen, progress))
+            if now.kind == "unexplained" and not owned:
+                chosen, seen = select_owned(fitter, now.seen, now.chosen, progress)
+                now = attrs.evolve(now, chosen=chosen, seen=seen)
+    return attrs.evolve(now, chosen=coinciding(now.fitter, now.chosen, progress))
+
+
+def without_outlying_readings(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Set aside outliers where nothing else is left then; unchanged where there were more faults."""
+    later = now
+    for _ in range(ROUNDS):
+        found, simulator = later.chosen, later.fitter.simulator
+        if OUTLIER not in found.left or (found.doubted and found.causes):
+            break
+        fewer, words = without_outliers(later.experiments, later.fitter, found.chosen, len(found.table))
+        if not words:
+            break
+        sources = later.fitter.sources if found.causes else None
+        fitter = _fitter(fewer, later.again, simulator, sources)
+        later = later.without(fewer, words).under(fitter, progress, found if found.causes else None)
+    return now if later.chosen.left or later.chosen.doubted else later
+
+
+def under_bursts(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Judge causes, or a misfit, under noise that comes in bursts or grows with load; unchanged without.
+
+    Such noise is largest where laws of the material differ most. Causes that are significant under it stay,
+    and so does a misfit that is structure both beside all causes and beside none.
+    """
+    found, simulator, unexplained = now.chosen, now.fitter.simulator, now.kind == "unexplained"
+    if now.graded or not (unexplained or found.causes):
+        return now
+    left = now.fitter.record.values - now.fitter.predict(found.chosen.values)
+    measured, words = with_bursts(now.fitter.record, left)
+    if not words:
+        return now
+    progress("noise in bursts")
+    values = found.chosen.values
+    noise = noise_of(measured, simulator, values, () if unexplained else _wandering(found))
+    other = Fitter(measured, simulator, noise)
+    if unexplained:
+        both = (other.fit(effects, values) for effects in (found.chosen.effects, ()))
+        stays = all(structure(strict_table(other, fit)) for fit in both)
+    else:
+        stays = all(c.p_value < FALSE_ALARM_RATE for c in reselected(other, now.seen, found).causes)
+    if stays:
+        return now
+    later = attrs.evolve(now, fitter=other, chosen=select(other, now.seen, progress))
+    if unexplained and later.kind == "unexplained":
+        return now
+    return attrs.evolve(later, set_aside=(*now.set_aside, *words))
+
+
+def with_what_explains_most(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Name what takes most of an unexplained misfit; fast errors of its law would pass for bursts."""
+    if now.kind == "unexplained" and not _of_no_size(now.fitter, now.chosen):
+        most = mainly(now.fitter, now.chosen)
+        now = attrs.evolve(now, chosen=most, graded=True) if most else now
+    return now
+
+
+def by_size(now: Diagnosis, progress: Progress) -> Diagnosis:
+    """Excuse a misfit as small as the scatter, and doubt one that no noise explains."""
+    found = now.chosen
+    ended = now.graded or now.kind in ("none", "unidentifiable")
+    words = "" if ended else _of_no_size(now.fitter, found)
+    if words:
+        none = attrs.evolve(found, chosen=found.base, causes=(), doubted="", excused=words)
+        now = attrs.evolve(now, chosen=none, set_aside=(*now.set_aside, words))
+    if now.kind == "none" and not now.chosen.excused and (words := too_far(now.fitter, found.base)):
+        doubted = attrs.evolve(now, chosen=attrs.evolve(found, doubted=words))
+        now = with_what_explains_most(doubted, progress)
+    return now
+
+
+STEPS = (
+    under_quieter_noise,
+    without_lone_readings,
+    with_owners,
+    under_renewed_noise,
+    without_outlying_readings,
+    with_what_explains_most,
+    under_bursts,
+    by_size,
+)
+
+
+def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
+    """Nuisances with values far from prior knowledge, the farthest first."""
+    away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
+    return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
+
+
+def _fitter(
+    experiments: Sequence[Experiment],
+    again: Sequence[Experiment] | None,
+    simulator: Composite,
+    sources: Mapping[str, Source] | None = None,
+) -> Fitter:
+    """Fitter to the experiments that are fitted, under noise estimated around the base model or given.
+
+    again: the drives by a second reading of their gauges.
+    """
+    measured = record([e for e in experiments if e.role == "fit"], simulator)
+    if again:
+        other = {e.name: e for e in again}
+        measured = attrs.evolve(measured, again=tuple(other[e.name] for e in measured.experiments))
+    return Fitter(measured, simulator, sources or noise_of(measured, simulator))
+
+
+def noise_of(
+    measured: Record,
+    simulator: Composite,
+    values: Mapping[str, float] | None = None,
+    effects: Sequence[Effect] = (),
+) -> dict[str, Source]:
+    """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
+
+    values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
+    base model's fit where None. Changes by any effect of the library, and by those of `effects`, do not count
+    as noise; nor does what exceeds a stated accuracy.
+    """
+    if values is None:
+        rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
+        values = rough.fit().values
+    zeros = {p.name for p in simulator.nuisances if p.linear}
+    curved = {k: v for k, v in values.items() if k not in zeros}
+    columns = span(measured, signatures(measured, simulator, curved, effects))
+    found = estimate(measured, measured.values - measured.predict(simulator, values), columns)
+    return within_accuracy(measured, found)
+
+
+def _rough(measured: Record, group: str) -> Source:
+    """Rough sizes: white noise of a hundredth of the group's range."""
+    values = np.concatenate([measured.values[s.at] for s in measured.series if s.group == group])
+    return Source(max(float(np.ptp(values)), 1e-9) / 100.0, 1e-6, 1.0)
+
+
+def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
+    """Sensitivity to each effect of the library beside the base model's values."""
+    curved = {p.name: base.values[p.name] for p in fitter.curved}
+    return at_bounds(fitter, curved, sensitivities(fitter, curved))
+
+
+def _noise_around(now: Diagnosis) -> dict[str, Source]:
+    found, fitter = now.chosen, now.fitter
+    return noise_of(fitter.record, fitter.simulator, found.chosen.values, _wandering(found))
+
+
+def _of_no_size(fitter: Fitter, found: Selection) -> str:
+    """Reason why a misfit is none, in words: as small as the scatter, with no cause but a record's zero.
+
+    Slow noise differs from record to record, as zeros do; none depends on how a unit is turned, which is read
+    at rest.
+    """
+    left = fitter.record.values - fitter.predict(found.base.values)
+    drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)
+    if not drifting or BY_TURN in structure(found.table) or not within_scatter(fitter.record, left):
+        return ""
+    depends = [c.effect.title for c in found.causes] or structure(found.table) or ["no quantity"]
+    on = ", ".join(n.replace("_", " ") for n in depends)
+    return (
+        f"the residual depends on {on}, by less than {NEAR:g} times the scatter of the readings: slow or "
+        "uneven noise of the instruments does that"
+    )
+
+
+def _wandering(found: Selection) -> list[Effect]:
+    """Chosen effects that the estimate of noise does not set aside itself."""
+    return [e for e in found.chosen.effects if e.whose or e.name in WANDERING]
+
+
+def _louder(one: Mapping[str, Source], other: Mapping[str, Source]) -> bool:
+    """Return True if noise of some group exceeds another estimate by more than such estimates differ."""
+    return any(
+        math.hypot(source.white, source.slow) > RENEWED * math.hypot(other[g].white, other[g].slow)
+        for g, source in one.items()
+    )
