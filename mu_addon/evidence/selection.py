@@ -43,6 +43,8 @@ ALONE = 0.9
 # Chi squared that an effect must take from a fit's residual, to first order, to be fitted beside it: a small
 # part of what `FALSE_ALARM_RATE` asks for.
 PROMISING = 4.0
+# Share of the gain that it needs, to do as well as another model, which an effect must promise to be fitted.
+HALF_WAY = 0.5
 # Share of an effect's amplitude by which another valid law of its mechanism may differ from the library's: an
 # effect with a smaller gain beside it is not named.
 LAW = 0.05
@@ -137,7 +139,8 @@ def select(
         p_best = p if level == 0 else p_best
         # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
-            pool = ranked([*pool, *hypotheses(fitter, _other_seeds(levels[-1]), effects, progress)])
+            others = _other_seeds(levels[-1])
+            pool = ranked([*pool, *hypotheses(fitter, others, effects, progress, reach=pool[0].chi2)])
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if level == 0 and p >= FALSE_ALARM_RATE:
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
@@ -564,11 +567,14 @@ def hypotheses(
     effects: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
     most: int | None = None,
+    reach: float = math.inf,
 ) -> list[Fit]:
     """Each seed with one of some effects more, each set of effects once, best first.
 
     Fitted are effects that promise more than `PROMISING` beside a seed, the most promising first; of one
     mechanism and of a camera's faults a model has one. most: of the fits of a seed; all where it is None.
+    reach: chi squared of the best other model; an effect that promises less than `HALF_WAY` of the way there
+    is not fitted.
     """
     found: dict[frozenset[tuple[str, ...]], Fit] = {}
     for seed in seeds:
@@ -576,7 +582,8 @@ def hypotheses(
         for e in effects:
             every = frozenset((*(o.keys for o in seed.effects), e.keys))
             twice = e.name in seed.names or (e.name in CAMERA and CAMERA.intersection(seed.names))
-            if not twice and every not in found and (gain := promise(fitter, seed, e)) > PROMISING:
+            enough = max(PROMISING, HALF_WAY * (seed.chi2 - reach))
+            if not twice and every not in found and (gain := promise(fitter, seed, e)) > enough:
                 promised.append((gain, every, e))
         for _, every, e in sorted(promised, key=lambda one: -one[0])[:most]:
             progress(" and ".join((*seed.names, e.name)))
@@ -813,7 +820,7 @@ def promising_rivals(
     enough = less.chi2 - chosen.chi2 - RIVAL_DELTA_CHI2
     found = []
     for e in effects:
-        if e.keys not in known and promise(fitter, less, e) >= 0.5 * enough:
+        if e.keys not in known and promise(fitter, less, e) >= HALF_WAY * enough:
             progress(e.title)
             found.append(beside(fitter, others, e, chosen.values))
     return ranked(found)
