@@ -139,8 +139,7 @@ def select(
         p_best = p if level == 0 else p_best
         # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
-            others = _other_seeds(levels[-1])
-            pool = ranked([*pool, *hypotheses(fitter, others, effects, progress, reach=pool[0].chi2)])
+            pool = hypotheses(fitter, _other_seeds(levels[-1]), effects, progress, known=pool)
             p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
         if level == 0 and p >= FALSE_ALARM_RATE:
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
@@ -567,16 +566,17 @@ def hypotheses(
     effects: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
     most: int | None = None,
-    reach: float = math.inf,
+    known: Sequence[Fit] = (),
 ) -> list[Fit]:
     """Each seed with one of some effects more, each set of effects once, best first.
 
     Fitted are effects that promise more than `PROMISING` beside a seed, the most promising first; of one
     mechanism and of a camera's faults a model has one. most: of the fits of a seed; all where it is None.
-    reach: chi squared of the best other model; an effect that promises less than `HALF_WAY` of the way there
-    is not fitted.
+    known: fits of others, best first, with which they are ranked; an effect that promises less than
+    `HALF_WAY` of the way to the first of them is not fitted.
     """
-    found: dict[frozenset[tuple[str, ...]], Fit] = {}
+    found = {frozenset(e.keys for e in fit.effects): fit for fit in known}
+    reach = known[0].chi2 if known else math.inf
     for seed in seeds:
         promised = []
         for e in effects:
