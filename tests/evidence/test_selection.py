@@ -13,7 +13,7 @@ from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
 from mu_addon.evidence.search import one_more
-from mu_addon.evidence.selection import reselected, select
+from mu_addon.evidence.selection import beside, hypotheses, ranked, reselected, select
 from mu_addon.evidence.sensitivity import sensitivities
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
@@ -204,3 +204,21 @@ def test_a_gain_is_told_of_every_quantity_and_first_of_one_that_changed(both_kin
     alone = gain(fitter, base, extended, held[1:])
     assert alone.by_quantity["unit_pressure angle"][1] is None
     assert alone.held_out == alone.by_quantity[fitter.record.groups[0]][1]
+
+
+def test_a_pair_is_fitted_once_from_whichever_effect_it_begins():
+    fitter = fitter_of(RUBBING | HEAVY)
+    effects = [s.effect for s in few(fitter, *LIBRARY)]
+    base = fitter.fit()
+    first, second = ranked(beside(fitter, (), e, base.values) for e in effects)[:2]
+    tried = []
+    pool = hypotheses(fitter, [first], effects, tried.append)
+    once = len(tried)
+    assert once == len(pool) > 1
+    again = hypotheses(fitter, [second], effects, tried.append, known=pool)
+    pairs = [frozenset(f.names) for f in again]
+    assert len(pairs) == len(set(pairs)) == len(tried)
+    assert {id(f) for f in pool} <= {id(f) for f in again}
+    # What promises less than half of the way to the best pair is left alone.
+    alone = hypotheses(fitter, [second], effects)
+    assert len(tried) - once < len(alone)

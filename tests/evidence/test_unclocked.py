@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from benchmarks.evidence.second_code.judging import judged
 from benchmarks.evidence.second_code.sets import Order
+from mu_addon.evidence.noise import estimate
 from mu_addon.evidence.prediction.bench import bench_simulators
+from mu_addon.evidence.record import record
 from mu_addon.evidence.scatter import FEW, TIMES
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unclocked import AROUND, IN_A_ROW, MOST, lone, points
@@ -180,3 +182,18 @@ def test_few_readings_and_a_record_that_is_one_number_are_left_alone():
     known = attrs.evolve(e, columns={**e.columns, "stress_sd_kPa": np.full(40, 0.1)})
     assert points(known, "stress_kPa", known["stress_kPa"], 0.0) is None
     assert IN_A_ROW < MOST * 40 < AROUND
+
+
+def test_repeats_tell_the_noise_though_a_reading_is_missing():
+    """Each strain three times, of a model that is wrong by far more."""
+    rng = np.random.default_rng(5)
+    strain = np.tile(0.01 * np.arange(1, 13), 3)
+    stress = 400.0 * strain**2 + SD * rng.normal(size=36)
+    how = {"axis": "z", "specimen": "A", "section_mm": (30.0, 30.0), "length_mm": 30.0, "cells": 3}
+    for missing in ([], [7, 20]):
+        read = stress.copy()
+        read[missing] = np.nan
+        made = [experiment("lattice_compression", {"strain": strain, "stress_kPa": read}, "A", **how)]
+        data = record(made, Composite(bench_simulators(made)))
+        (source,) = estimate(data, data.values, [np.ones((len(data), 1))]).values()
+        assert source.white == pytest.approx(SD, rel=0.6)
