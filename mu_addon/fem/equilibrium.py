@@ -124,9 +124,22 @@ class Equilibrium:
 
         With friction, one whose bound belongs to it. Raises ConvergenceError where elements invert, progress
         stops, the equilibrium found is unstable, or a component of the displacement differs from the start's
-        by more than `reach_mm`.
+        by more than `reach_mm`. Self-contact is left out where nothing comes near enough to feel it.
         """
+        contact = self.model.self_contact
+        if contact is not None and not contact.friction and not contact.count(u):
+            self.model.self_contact = None
+            try:
+                state = self._newton(u, pressure, reach_mm)
+            except ConvergenceError:
+                state = None
+            finally:
+                self.model.self_contact = contact
+            if state is not None and contact.free_share(u, state.u) == 1.0 and not contact.count(state.u):
+                return state
+        return self._newton(u, pressure, reach_mm)
 
+    def _newton(self, u: Array, pressure: float, reach_mm: float) -> State:
         def found(start: State, again: bool) -> State:
             # The last factor is still about right where only friction's bound has moved.
             state = self._descend(start, factored=again)

@@ -416,7 +416,7 @@ def test_a_tree_runs_in_a_process_of_its_own_and_its_states_stay_with_the_file(t
         tree.nodes.remove(tree.nodes[name])
     for node in tree.nodes:
         if node.definition.kind == "simulate":
-            node.order, node.refine, node.times = 1, 0.4, 4
+            node.fidelity, node.order, node.refine, node.times = "homogenised", 1, 0.4, 4
     assert states(tree)["Compare"] == "waiting"
     child = ended(state.start(tree))
     assert child.state == DONE, child.error
