@@ -48,7 +48,6 @@ COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
 FINE = MeshSettings(meridian_mm=1.0)
 # The printed body, and the mesh of what effects change it by: of an angle the same share within 2 %.
 STRUTS, STRUTS_COARSE = (MeshSettings(fidelity=RESOLVED, refine=refine) for refine in (1.0, 0.5))
-STRUTS_FINE = MeshSettings(fidelity=RESOLVED, refine=1.3)
 # Of the largest change of a value: below it, two meshes are not compared by their ratio.
 LEAST_CHANGE = 0.05
 # Share of the progress for walls.
@@ -72,7 +71,8 @@ class UnitSettings:
     """Settings of the unit's simulation for the evidence.
 
     mesh: the model's; finer: the one that mesh_error compares with; changes: a coarser one for effects and
-    walls, whose changes of the response are taken over in proportion, or None for the model's. pressures:
+    walls, whose changes of the response are taken over in proportion, or None for the model's: mesh_error
+    then compares with this one, and its size 1 is as far again from there. pressures:
     their approximate number; margin: beyond the measured ones, as a share of their range. effects: names of
     those to run. distal: chambers behind a clog. lattice: a law for the lattice in place of the unit's
     moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
@@ -96,10 +96,8 @@ class UnitSettings:
     def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
         """Settings for a unit simulated homogenised or resolved (`MeshSettings.fidelity`)."""
         if fidelity != HOMOGENISED:
-            mesh, finer, changes = (
-                attrs.evolve(mesh, fidelity=fidelity) for mesh in (STRUTS, STRUTS_FINE, STRUTS_COARSE)
-            )
-            return cls(mesh, finer, changes, self_contact=self_contact)
+            mesh, changes = (attrs.evolve(mesh, fidelity=fidelity) for mesh in (STRUTS, STRUTS_COARSE))
+            return cls(mesh, changes=changes, self_contact=self_contact)
         return cls(self_contact=self_contact)
 
     def __attrs_post_init__(self) -> None:
@@ -282,7 +280,7 @@ class _Plan:
     """
 
     body: Body
-    changes: MeshSettings
+    changes: MeshSettings | None
     scale: float
     enlarged: float
     orientations: tuple[tuple[float, Direction], ...]
@@ -322,7 +320,7 @@ class _Plan:
         known = known if gap is None else [FORCE]
         return cls(
             body,
-            settings.changes or settings.mesh,
+            settings.changes,
             scale,
             enlarged,
             _orientations(here),
@@ -349,7 +347,7 @@ class _Plan:
         """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
-        mesh = self.body.mesh if effect == MESH_ERROR else self.changes
+        mesh = self.changes or self.body.mesh
         body = attrs.evolve(self.body, mesh=mesh, orientation_deg=turn, orientation_axis=axis)
         outline = not effect and not self.held
         return Run(body, self.pressures_kPa, points, effect, size, outline)
@@ -364,6 +362,8 @@ class _Plan:
         yield self.base_case
         yield self.case()
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
+            if name == MESH_ERROR and self.changes:
+                continue
             effect = effect_of(name)
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in effect.sizes_at(self.enlarged):
@@ -486,12 +486,16 @@ class _Plan:
         missed: list[float] = []
         values: list[Array] = []
         for size in effect.sizes_at(self.enlarged):
-            result = base if size == null else found[self.case(name, size, orientation).key()]
+            if size == null:
+                result = base
+            elif name == MESH_ERROR and self.changes:
+                result = self._without_mesh_error(size, base, self.reference(found))
+            else:
+                result = found[self.case(name, size, orientation).key()]
+                result = self._taken_over(result, base, self.reference(found))
             if np.isfinite(result.values[kept]).all():
                 sizes.append(size * grown)
-                same_mesh = size == null or name == MESH_ERROR
-                changed = result if same_mesh else self._taken_over(result, base, self.reference(found))
-                values.append((self.larger * changed.values)[kept])
+                values.append((self.larger * result.values)[kept])
             else:
                 missed.append(size * grown)
                 _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
@@ -507,13 +511,18 @@ class _Plan:
 
         In proportion to how far both move from rest, which differs by the meshes' errors.
         """
-        if self.changes == self.body.mesh:
+        if not self.changes:
             return result
         rest = self.pressures_kPa.index(0.0)
         far, near = (r.values - r.values[:, [rest]] for r in (base, reference))
         least = (LEAST_CHANGE * np.nanmax(np.abs(near), axis=1, keepdims=True)) ** 2
         ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
         return Result(base.values + ratio * (result.values - reference.values), result.why)
+
+    @staticmethod
+    def _without_mesh_error(size: float, base: Result, coarser: Result) -> Result:
+        """The base's response beyond its mesh's, by `size` times the way from the coarser one's."""
+        return Result(base.values + size * (base.values - coarser.values), base.why)
 
     def _rows(self) -> list[int]:
         if self.held:
@@ -535,7 +544,9 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Prog
         if result is not None:
             found[key] = result
     missing = {key: case for key, case in cases.items() if key not in found}
-    for key, result in _solved(missing, workers, cache):
+    # One run here first: it compiles the kernels for the other processes.
+    first = 1 if workers > 1 and not found else 0
+    for key, result in _solved(missing, first, workers, cache):
         found[key] = result
         if table is not None:
             table.put("unit", key, {"values": result.values, "why": np.array(result.why)})
@@ -545,10 +556,12 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Prog
     return found
 
 
-def _solved(missing: dict[str, Run], workers: int, cache: Path | None) -> Iterator[tuple[str, Result]]:
+def _solved(
+    missing: dict[str, Run], first: int, workers: int, cache: Path | None
+) -> Iterator[tuple[str, Result]]:
+    """Results by key; the first runs in this process, the others in processes of their own."""
     keys, cases = list(missing), list(missing.values())
-    # One run here first: it compiles the kernels for the other processes.
-    first = 1 if workers > 1 else len(cases)
+    first = first if workers > 1 else len(cases)
     for key, case in zip(keys[:first], cases[:first], strict=True):
         yield key, run(case, cache)
     for number, result in each(partial(run, cache=cache), cases[first:], workers, "unit_pressure"):

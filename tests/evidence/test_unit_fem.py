@@ -427,3 +427,26 @@ def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp
     exact = run(Run(Body(UNIT, COARSE, FINE), tuple(sorted(between)))).values[0]
     met = r.at(np.array(sorted(between)), {})[0]
     assert np.abs(met - exact).max() < 0.05
+
+
+def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
+    effects = ("wall_thickness", "mesh_error")
+    # Orders differ, so that the meshes' errors do by a factor.
+    fine = MeshSettings(refine=0.4, meridian_mm=1.2)
+    alone = UnitSettings(fine, FINER, pressures=4, effects=effects, workers=1)
+    both = attrs.evolve(alone, changes=ROUGH)
+    tests = [bench(markers={})]
+    wanted, found, coarse = (
+        unit_responses(UNIT, tests, how, cache)[0] for how in (alone, both, attrs.evolve(alone, mesh=ROUGH))
+    )
+    np.testing.assert_array_equal(found.values, wanted.values)
+    assert np.abs(coarse.values - wanted.values).max() > 0.2 * np.abs(wanted.values).max()
+    thick = [r.variants["wall_thickness"] for r in (wanted, found, coarse)]
+    np.testing.assert_array_equal(thick[0].at, thick[1].at)
+    changes = [v.values[-1] - r.values for v, r in zip(thick, (wanted, found, coarse), strict=True)]
+    away = np.abs(changes[0]) > 0.1 * np.abs(changes[0]).max()
+    miss = [np.abs(c - changes[0])[away] / np.abs(changes[0])[away] for c in changes[1:]]
+    assert miss[0].max() < 0.5 * miss[1].max()
+    # As far again as from the coarser mesh.
+    beyond = found.variants["mesh_error"].values[-1]
+    np.testing.assert_allclose(beyond - found.values, found.values - coarse.values, atol=1e-12)

@@ -23,7 +23,7 @@ from .grasp import OF_FIDELITY, Cube, Grip
 from .phases import Phases, read_phases, shipped_phases
 from .settings import COARSE_REFINE, REFINE, SIDES
 
-PRINTED_PACE = 10.0
+PRINTED_PACE = 3.0
 """Factor on the seconds of a grasp by printed struts."""
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
