@@ -42,6 +42,9 @@ SKIN_MM = 0.1
 NEXT_TO_NOTHING = 1e-3
 # A size whose path ends before the last pressure is useless: it need not be followed to its end.
 SMOOTH = NewtonSettings(min_step_MPa=1e-3)
+SMOOTH_CONTACT: NewtonSettings = attrs.evolve(
+    RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
+)
 # Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
 KINKED = NewtonSettings(predictor_tolerance=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
@@ -111,7 +114,7 @@ class Body:
         """Settings of Newton's method for a run of this body, with an effect or none."""
         own = effect.newton if effect else SMOOTH
         if self.self_contact:
-            return RESOLVED_CONTACT_NEWTON
+            return RESOLVED_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
         return RESOLVED_NEWTON if self.mesh.resolved and own != CONTACT_NEWTON else own
 
     def materials(self, mesh: Mesh) -> Materials:

@@ -276,7 +276,7 @@ def similar(unit: Unit) -> Unit:
 class _Plan:
     """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large.
 
-    changes: the mesh of effects and walls.
+    changes: the mesh of effects and walls. readings_kPa: the least and the greatest.
     """
 
     body: Body
@@ -285,6 +285,7 @@ class _Plan:
     enlarged: float
     orientations: tuple[tuple[float, Direction], ...]
     pressures_kPa: tuple[float, ...]
+    readings_kPa: tuple[float, float]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
 
@@ -325,6 +326,7 @@ class _Plan:
             enlarged,
             _orientations(here),
             pressures(readings, settings.pressures, settings.margin),
+            (float(readings.min()), float(readings.max())),
             markers,
             tuple(c for c in known if c in measured),
         )
@@ -491,8 +493,9 @@ class _Plan:
             elif name == MESH_ERROR and self.changes:
                 result = self._without_mesh_error(size, base, self.reference(found))
             else:
-                result = found[self.case(name, size, orientation).key()]
-                result = self._taken_over(result, base, self.reference(found))
+                reference = self.reference(found)
+                result = self._continued(found[self.case(name, size, orientation).key()], reference)
+                result = self._taken_over(result, base, reference)
             if np.isfinite(result.values[kept]).all():
                 sizes.append(size * grown)
                 values.append((self.larger * result.values)[kept])
@@ -505,6 +508,23 @@ class _Plan:
         low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
+
+    def _continued(self, result: Result, reference: Result) -> Result:
+        """The result with what it changes grown in proportion to pressure where it ends beyond the readings.
+
+        There it serves gauges alone, and a body that collapses costs most.
+        """
+        if not self.changes:
+            return result
+        at, values = np.array(self.pressures_kPa), result.values.copy()
+        reached = np.isfinite(values[0])
+        low, high = self.readings_kPa
+        for beyond, last in ((at < low, reached.argmax()), (at > high, len(at) - 1 - reached[::-1].argmax())):
+            rows = np.flatnonzero(beyond & ~reached)
+            if len(rows) and at[last] and not (at[rows] * at[last] < 0).any():
+                change = values[:, [last]] - reference.values[:, [last]]
+                values[:, rows] = reference.values[:, rows] + change * at[rows] / at[last]
+        return Result(values, result.why)
 
     def _taken_over(self, result: Result, base: Result, reference: Result) -> Result:
         """The base's response with an effect, from what this one changes of the reference's.

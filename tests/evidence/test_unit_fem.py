@@ -15,6 +15,7 @@ from mu_addon.evidence.unit_effects import EFFECTS, Body, down
 from mu_addon.evidence.unit_fem import (
     COARSE,
     FINE,
+    Result,
     Run,
     UnitResponseWarning,
     UnitSettings,
@@ -450,3 +451,15 @@ def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     # As far again as from the coarser mesh.
     beyond = found.variants["mesh_error"].values[-1]
     np.testing.assert_allclose(beyond - found.values, found.values - coarse.values, atol=1e-12)
+
+
+def test_a_change_goes_on_beyond_the_readings_alone():
+    plan = _Plan(Body(UNIT), ROUGH, 1.0, 1.0, (), (-12.0, -8.0, 0.0, 8.0, 12.0), (-9.0, 12.0), (), ())
+    reference = Result(np.array([[-32.0, -13.0, 0.0, 5.0, 7.0]]))
+    ended = Result(np.array([[np.nan, -11.0, 0.0, 4.0, np.nan]]), "it collapses")
+    found = plan._continued(ended, reference)
+    # At -12 kPa 1.5 times the change at -8 kPa; at 12 kPa, which was read, nothing is made up.
+    np.testing.assert_allclose(found.values, [[-29.0, -11.0, 0.0, 4.0, np.nan]])
+    assert found.why == "it collapses"
+    everywhere = attrs.evolve(plan, changes=None)._continued(ended, reference)
+    np.testing.assert_array_equal(everywhere.values, ended.values)

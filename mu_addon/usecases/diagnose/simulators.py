@@ -17,13 +17,14 @@ from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import HOMOGENISED
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
-from ..simulate_and_place.expected import PACE
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S = 10.0, 150.0
-"""Approximate seconds of the simulations of blocks, and of a homogenised unit with all effects."""
+LATTICE_S, UNIT_S, PRINTED_S = 10.0, 150.0, 900.0
+"""Approximate seconds of the simulations of blocks, and of a homogenised and a printed unit with effects."""
+TOUCHING_KPA, TOUCHING = -8.0, 2.0
+"""Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
     unit_pressure.KIND: unit_pressure.UnitPressure,
@@ -35,7 +36,12 @@ FREE: dict[str, Callable[..., Simulator]] = {
 def simulations_plan(experiments: Sequence[Experiment], fidelity: str) -> Plan:
     """Stages of `simulators_of` with the expected seconds of each on two cores."""
     kinds = {e.kind for e in experiments}
-    unit = UNIT_S * PACE["full" if fidelity == HOMOGENISED else "resolved"]
+    unit = UNIT_S
+    if fidelity != HOMOGENISED:
+        lowest = min(
+            (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
+        )
+        unit = PRINTED_S * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
     lattice = [("lattice", LATTICE_S)] if any(e.cells for e in experiments) else []
     free = [("unit", unit)] if kinds & set(FREE) else []
     return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
