@@ -227,8 +227,10 @@ def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
     ]
 
 
-def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path):
+def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path, monkeypatch):
     """By a thread: its own is in a library meanwhile. Not in the log, which would grow by nothing new."""
+    # Another test of this process may have loaded Blender, beside which there is no thread.
+    monkeypatch.delitem(sys.modules, "bpy", raising=False)
     messages = []
     progress = Progress([messages.append, log_file(tmp_path / "log.ndjson")])
     with progress.beating(every_s=0.05), progress.stage("mesh", expected_s=0.1):
