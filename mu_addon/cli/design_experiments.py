@@ -27,7 +27,7 @@ def add(commands: Commands[Any]) -> None:
         "numbers.",
     )
     add_unit(command, required=False)
-    add_fidelity(command)
+    add_fidelity(command, diagnosed=True)
     add_report(command)
     command.add_argument(
         "--noise",

@@ -23,7 +23,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_unit(command, required=False)
-    add_fidelity(command)
+    add_fidelity(command, diagnosed=True)
     command.add_argument(
         "--model",
         metavar="FILE",

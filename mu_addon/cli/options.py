@@ -197,11 +197,18 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_fidelity(command: argparse.ArgumentParser, homogenised_with: str = "") -> None:
-    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice."""
-    from ..meshing.settings import FIDELITY, SELF_CONTACT
+def add_fidelity(
+    command: argparse.ArgumentParser, homogenised_with: str = "", diagnosed: bool = False
+) -> None:
+    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice.
 
-    default = str(FIDELITY.default)
+    diagnosed: for a diagnosis, which has a default of its own.
+    """
+    from ..meshing.settings import DIAGNOSED, FIDELITY, SELF_CONTACT
+
+    default = str(DIAGNOSED.default if diagnosed else FIDELITY.default)
+    if diagnosed:
+        command.set_defaults(fidelity=default)
     if homogenised_with:
         default += f"; homogenised with {homogenised_with}, which need it"
     command.add_argument("--fidelity", choices=FIDELITY.choices, help=help_of(FIDELITY, default))

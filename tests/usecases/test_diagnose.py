@@ -262,7 +262,8 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
     measured = read_folder(ROOT / "assets" / "examples" / "paper-bending")
     with pytest.raises(InputError, match="self-contact needs walls and struts"):
         Job(measured, fidelity="homogenised", self_contact=True)
-    jobs = [Job(measured, self_contact=False), Job(measured)]
+    jobs = [Job(measured, fidelity="resolved", self_contact=apart) for apart in (False, True)]
+    assert Job(measured, fidelity="resolved").self_contact
     assert [job.unit_settings.self_contact for job in jobs] == [False, True]
     assert jobs[0].texts()["diagnose.toml"] != jobs[1].texts()["diagnose.toml"]
     for name, text in jobs[1].texts().items():

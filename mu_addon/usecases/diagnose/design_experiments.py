@@ -21,7 +21,7 @@ from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
 from ...meshing.settings import (
-    FIDELITY,
+    DIAGNOSED,
     HOMOGENISED,
     MeshSettings,
     require_self_contact_resolvable,
@@ -101,7 +101,7 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
-    fidelity: str = FIDELITY.field()
+    fidelity: str = DIAGNOSED.field()
     self_contact: bool = attrs.field(
         default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
     )

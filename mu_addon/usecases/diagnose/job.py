@@ -17,8 +17,8 @@ from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE
 from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import (
+    DIAGNOSED,
     FIDELITIES,
-    FIDELITY,
     HOMOGENISED,
     MeshSettings,
     require_self_contact_resolvable,
@@ -55,7 +55,7 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
-    fidelity: str = FIDELITY.field()
+    fidelity: str = DIAGNOSED.field()
     known: ExtendedModel | None = None
     self_contact: bool = attrs.field(
         default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)

@@ -6,9 +6,10 @@ import math
 from pathlib import Path
 
 from ...errors import InputError
-from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
+from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...measured import read_folder
-from .common import FIDELITY, SELF_CONTACT, of_orders
+from ...meshing.settings import DIAGNOSED
+from .common import SELF_CONTACT, of_orders
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")
@@ -73,7 +74,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
                 Output("diagnosis", "diagnosis", "the verdict"),
                 Output("model", "model", "the extended model, for a node Simulate"),
             ),
-            (FIDELITY, SELF_CONTACT),
+            (Setting(DIAGNOSED), SELF_CONTACT),
             order=of_orders("diagnose_order"),
             read=lambda call, done: {"diagnosis": done, "model": done.folder / "model.toml"},
             muting="neither this nor what needs it is computed",
