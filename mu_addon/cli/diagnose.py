@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `diagnose`."""
+    from ..meshing.settings import DIAGNOSED
+
     command = commands.add_parser(
         "diagnose",
         help="Diagnose model error from measured data: name the physical effects missing from the model, "
@@ -23,7 +25,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_unit(command, required=False)
-    add_fidelity(command, diagnosed=True)
+    add_fidelity(command, default=DIAGNOSED.default)
     command.add_argument(
         "--model",
         metavar="FILE",

@@ -198,20 +198,20 @@ class _Friction(argparse.Action):
 
 
 def add_fidelity(
-    command: argparse.ArgumentParser, homogenised_with: str = "", diagnosed: bool = False
+    command: argparse.ArgumentParser, homogenised_with: str = "", default: str | None = None
 ) -> None:
     """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice.
 
-    diagnosed: for a diagnosis, which has a default of its own.
+    default: of a command that has one of its own.
     """
-    from ..meshing.settings import DIAGNOSED, FIDELITY, SELF_CONTACT
+    from ..meshing.settings import FIDELITY, SELF_CONTACT
 
-    default = str(DIAGNOSED.default if diagnosed else FIDELITY.default)
-    if diagnosed:
-        command.set_defaults(fidelity=default)
+    words = default or str(FIDELITY.default)
     if homogenised_with:
-        default += f"; homogenised with {homogenised_with}, which need it"
-    command.add_argument("--fidelity", choices=FIDELITY.choices, help=help_of(FIDELITY, default))
+        words += f"; homogenised with {homogenised_with}, which need it"
+    command.add_argument(
+        "--fidelity", choices=FIDELITY.choices, default=default, help=help_of(FIDELITY, words)
+    )
     command.add_argument("--self-contact", action=argparse.BooleanOptionalAction, help=help_of(SELF_CONTACT))
 
 

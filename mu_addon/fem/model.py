@@ -23,6 +23,7 @@ from .conjugate_gradients import ConjugateGradients
 from .elements import triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
+from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
@@ -419,8 +420,11 @@ class Model:
         chord = mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]]
         length, frames = np.linalg.norm(chord, axis=1), frames_along(chord)
         sections = sections_of(length, mesh.flexible, E, nu)
-        laws = mixtures(materials.layers, part, of, share, len(mesh.beams))
-        return Beams(chord, frames, sections, fibres_of(laws, length, frames, sections, E, nu))
+        fibres = None
+        if any(layer.law is not NeoHooke for layer in materials.layers):
+            laws = mixtures(materials.layers, part, of, share, len(mesh.beams))
+            fibres = fibres_of(laws, length, frames, sections, E, nu)
+        return Beams(chord, frames, sections, fibres)
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array | float:
         """Derivative (n, 3) by places of forces times what carried nodes are given (`Carried.by_places`)."""

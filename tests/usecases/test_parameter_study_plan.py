@@ -1,6 +1,7 @@
 """What a sweep varies and where its points lie: every input by name, more points later, none lost."""
 
 import tomllib
+from pathlib import Path
 
 import attrs
 import numpy as np
@@ -240,3 +241,23 @@ def test_the_front_is_what_nobody_beats(points):
 
 def test_a_point_without_a_figure_is_not_on_the_front():
     assert pareto_front(np.array([[np.nan, 0.0], [1.0, 1.0]])).tolist() == [1]
+
+
+@pytest.mark.parametrize("table", ["simulate", "place", "vary"])
+def test_what_is_no_table_is_told_so(table):
+    text = f'format = 1\npreset = "mu-1.0x"\nstages = "place"\n{table} = 3\n'
+    if table != "vary":
+        text += '[vary]\n"chambers.wall_mm" = { low = 0.8, high = 1.0 }\n'
+    with pytest.raises(InputError, match=r"table|no input is varied"):
+        parse_plan(text, Path("/"))
+
+
+@pytest.mark.parametrize(
+    ("name", "fidelity", "apart"),
+    [("chambers.wall_mm", "resolved", True), ("material.lattice_modulus_kPa", "homogenised", None)],
+)
+def test_a_sweep_is_of_the_printed_body_where_that_has_what_is_varied(name, fidelity, apart):
+    low, high = (0.8, 1.0) if name.endswith("mm") else (15.0, 60.0)
+    text = f'format = 1\npreset = "mu-1.0x"\n[vary]\n"{name}" = {{ low = {low}, high = {high} }}\n'
+    simulate = parse_plan(text, Path("/")).inputs.tables["simulate"]
+    assert (simulate["mesh"]["fidelity"], simulate.get("self_contact")) == (fidelity, apart)

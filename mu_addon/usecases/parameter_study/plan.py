@@ -215,16 +215,18 @@ def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     The printed body, its walls and struts kept apart; homogenised where the lattice's moduli are varied or a
     setting of the mesh or of placement needs a continuum.
     """
-    simulate, vary = document.get("simulate", {}), document.get("vary")
-    mesh = simulate.get("mesh", {}) if isinstance(simulate, dict) else None
-    stage = document.get("stages", LAST_STAGE.default)
-    if not isinstance(mesh, dict) or not isinstance(vary, dict) or stage == STAGES[0] or "fidelity" in mesh:
+    simulate, place, vary = (document.get(name, {}) for name in ("simulate", "place", "vary"))
+    # What is no table is refused later, by name.
+    if not (isinstance(simulate, dict) and isinstance(place, dict) and isinstance(vary, dict)):
+        return document
+    mesh, stage = simulate.get("mesh", {}), document.get("stages", LAST_STAGE.default)
+    if not isinstance(mesh, dict) or stage == STAGES[0] or "fidelity" in mesh:
         return document
     varied = _flat(vary)
     if "simulate.mesh.fidelity" in varied:
         return document
     continuum = mesh.get("order") == 1 or "simulate.mesh.order" in varied or "mesher" in simulate
-    continuum |= "rules" in document.get("place", {}) or any(name in OF_LATTICE for name in varied)
+    continuum |= "rules" in place or any(name in OF_LATTICE for name in varied)
     fidelity = HOMOGENISED if continuum else FIDELITY.default
     apart = {} if fidelity == HOMOGENISED else {"self_contact": SELF_CONTACT.default}
     return document | {"simulate": apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}
