@@ -19,6 +19,7 @@ from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
 from .pattern import Pattern
+from .self_contact import SelfContact
 from .state import State, extrapolate, rest
 
 Array = np.ndarray[Any, Any]
@@ -130,7 +131,7 @@ class Equilibrium:
         if contact is not None and not contact.friction and not contact.count(u):
             self.model.self_contact = None
             try:
-                state = self._newton(u, pressure, reach_mm)
+                state = self._newton(u, pressure, reach_mm, free_of=contact)
             except ConvergenceError:
                 state = None
             finally:
@@ -139,10 +140,12 @@ class Equilibrium:
                 return state
         return self._newton(u, pressure, reach_mm)
 
-    def _newton(self, u: Array, pressure: float, reach_mm: float) -> State:
+    def _newton(
+        self, u: Array, pressure: float, reach_mm: float, free_of: SelfContact | None = None
+    ) -> State:
         def found(start: State, again: bool) -> State:
             # The last factor is still about right where only friction's bound has moved.
-            state = self._descend(start, factored=again)
+            state = self._descend(start, factored=again, free_of=free_of)
             if np.abs(state.u - u).max() > reach_mm:
                 raise ConvergenceError("the unit snaps to a distant equilibrium (limit point)")
             return state
@@ -171,10 +174,12 @@ class Equilibrium:
             f"friction does not converge: it still changes by {lag_change:.1e} of its bound"
         )
 
-    def _descend(self, start: State, factored: bool) -> State:
+    def _descend(self, start: State, factored: bool, free_of: SelfContact | None = None) -> State:
         """The equilibrium from a start, friction's bound held; its cost is added to the start's.
 
-        factored: whether the factor that is there belongs to a definite tangent of about this start.
+        factored: whether the factor that is there belongs to a definite tangent of about this start. free_of:
+        contact that the model leaves out; a search that needs further factors and has passed through a touch
+        ends with ConvergenceError, before it finds a body that passes through itself.
         """
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
@@ -196,6 +201,8 @@ class Equilibrium:
                 if factorisations == s.max_factorisations:
                     break
                 convex = touches and search.residual > EXACT_BELOW
+                if free_of is not None and factorisations and free_of.free_share(start.u, search.u) < 1.0:
+                    raise ConvergenceError("the body passes through itself")
                 # A little less than the last time may suffice now; starting from none costs a factorisation
                 # each.
                 definite, added = self._factorise(search.u, pressure, convex, max(added - 1, 0))
