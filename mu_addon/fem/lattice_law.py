@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from .elements import reference_gradients
+from .elements import ReferenceGradients, reference_gradients
 from .materials import Layer
 
 if TYPE_CHECKING:
@@ -49,13 +49,15 @@ class LatticeLaw:
         return digest.hexdigest()
 
 
-def deformation_gradients(mesh: Mesh, u: Array, elements: Array) -> tuple[Array, Array]:
+def deformation_gradients(
+    mesh: Mesh, u: Array, elements: Array, reference: ReferenceGradients | None = None
+) -> tuple[Array, Array]:
     """F (e, q, 3, 3) and volumes (e, q) in mm3 of the quadrature points of some elements (e,).
 
-    u: displacements (n, 3) in mm.
+    u: displacements (n, 3) in mm. reference: of these elements, where it is known.
     """
     tets = mesh.tets[elements]
-    reference = reference_gradients(mesh.nodes, tets)
+    reference = reference or reference_gradients(mesh.nodes, tets)
     return np.eye(3) + np.einsum("eai,eqaj->eqij", u[tets], reference.gradients), reference.volumes
 
 

@@ -28,7 +28,7 @@ from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
 from .reference import Reference
-from .ties import folded_blocks
+from .ties import TiedBlocks
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
@@ -230,9 +230,9 @@ class Model:
         self._block_parts = wp.zeros(parts, dtype=mat33, device=self.device)
         self._blocks = wp.empty(len(keys), dtype=mat33, device=self.device)
         self._block_keys = keys
-        self._folding = None
-        if len(mesh.tied):
-            self._folding, keys = folded_blocks(mesh, keys)
+        self._folding = TiedBlocks(mesh, keys) if len(mesh.tied) else None
+        if self._folding is not None:
+            keys = self._folding.keys
         if len(mesh.beams):
             keys = self._with_beam_blocks(keys)
         block_rows, block_columns = keys % n, keys // n

@@ -23,9 +23,9 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     The two share buffers and factor: use one after the other, and factorise again in between. `load` is the
     first model's and must be set anew where it depends on the places. self_contact: of the other mesh, see
     `SelfContact.relocated`; needed where the first model has one. Raises InputError for a mesh of other
-    elements, for a model with obstacles or self-contact alone, and where the tangent of one with other
-    weights of its ties is asked for: its pattern may be another. An inverted element raises MeshingError when
-    it is first used.
+    elements, for a model with obstacles or self-contact alone, and where the tangent of one whose tied nodes
+    follow others than before is asked for: its pattern is another. An inverted element raises MeshingError
+    when it is first used.
     """
     if model.obstacles or (model.self_contact is not None and self_contact is None):
         raise InputError(
@@ -41,12 +41,6 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     found.reference = Reference(mesh, model.device, model.reference)
     if len(mesh.beams):
         found._carried = Carried(mesh)
-    if not np.array_equal(mesh.tied_weights, model.mesh.tied_weights):
-        found._folding = _refused
+    if model._folding is not None and not np.array_equal(mesh.tied_weights, model.mesh.tied_weights):
+        found._folding = model._folding.of(mesh)
     return found
-
-
-def _refused(blocks: Array) -> Array:
-    raise InputError(
-        "a relocated body with other ties has no tangent", "mesh", "make a new model of the mesh"
-    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..meshing.mesh import TET_EDGES
-from .elements import reference_gradients, shape_functions, tet_quadrature
+from .elements import ReferenceGradients, reference_gradients, shape_functions, tet_quadrature
 from .lattice_law import deformation_gradients, stretches
 from .point import stress
 
@@ -25,15 +25,21 @@ _CUT_AWAY = 1e-6
 _INCOMPRESSIBLE = 0.5
 
 
-def cauchy(mesh: Mesh, u: Array, materials: Materials, history: Sequence[Array] = ()) -> tuple[Array, Array]:
+def cauchy(
+    mesh: Mesh,
+    u: Array,
+    materials: Materials,
+    history: Sequence[Array] = (),
+    reference: ReferenceGradients | None = None,
+) -> tuple[Array, Array]:
     """Cauchy stress (m, q, 3, 3) in MPa and deformation gradients (m, q, 3, 3) at the quadrature points.
 
     u: displacements (n, 3) in mm. sigma = P F^T / det F, the laws of an element added by their weights.
-    history: of each law with one, from `MaterialData.kept`. Raises InputError where it is missing, since such
-    a law's stress depends on it.
+    history: of each law with one, from `MaterialData.kept`. reference: of all elements, where it is known.
+    Raises InputError where a history is missing, since such a law's stress depends on it.
     """
     everywhere = np.arange(len(mesh.tets))
-    F, _ = deformation_gradients(mesh, u, everywhere)
+    F, _ = deformation_gradients(mesh, u, everywhere, reference)
     if len(mesh.beams):
         F = narrowed(mesh, F, everywhere, materials.small_strain(len(mesh.tets))[1])
     P = np.zeros_like(F)
@@ -132,14 +138,16 @@ class NodalMean:
     averaged over the elements around a node by volume; in a resolved mesh by filled volume.
     """
 
-    def __init__(self, mesh: Mesh, elements: Array) -> None:
+    def __init__(self, mesh: Mesh, elements: Array, reference: ReferenceGradients | None = None) -> None:
+        """reference: of all elements of the mesh, where it is known."""
         tets = mesh.tets[elements]
         self._elements = elements
         points, _ = tet_quadrature(mesh.order)
         corners = np.ones((4, 1)) if mesh.order == 1 else np.linalg.inv(points)
         middles = corners[TET_EDGES].mean(axis=1)
         self._to_nodes = corners if mesh.order == 1 else np.vstack([corners, middles])
-        volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
+        every = reference_gradients(mesh.nodes, tets).volumes if reference is None else reference.volumes[elements]
+        volumes = every.sum(axis=1)
         if mesh.resolved:
             # Cut parts follow their neighbours: they count only without others.
             volumes *= np.maximum(mesh.filled[elements].mean(axis=1), _CUT_AWAY)

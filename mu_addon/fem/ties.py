@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
+
+from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
@@ -14,54 +17,89 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 
 
-def folded_blocks(mesh: Mesh, keys: Array) -> tuple[Callable[[Array], Array], Array]:
-    """Map of the tangent's blocks (b, 3, 3) onto the nodes that tied ones follow, and the folded blocks'
-    keys.
+NEGLIGIBLE = 1e-12
+"""Weight up to which a moved node does not follow another: what rounding leaves of 0."""
 
-    keys (b,): of the lower triangle's blocks, column n + row of n nodes, row >= column. Returns the map from
-    those blocks to the folded ones, and the keys (c,) of these, ascending. A node tied to others by weights w
-    gives them w times its force, so that its blocks are spread over theirs by products of weights.
+
+class TiedBlocks:
+    """Map of the tangent's blocks (b, 3, 3) onto the nodes that tied ones follow: to blocks (c, 3, 3).
+
+    keys (b,): of the lower triangle's blocks, column n + row of n nodes, row >= column. A node tied to others
+    by weights w gives them w times its force, so that its blocks are spread over theirs by products of
+    weights. Attribute keys (c,): of the folded blocks, ascending.
     """
-    n = len(mesh.nodes)
-    free = np.ones(n, bool)
-    free[mesh.tied] = False
-    own = np.flatnonzero(free)
-    to = sparse.csr_matrix(
-        (
-            np.concatenate([np.ones(len(own)), mesh.tied_weights.ravel()]),
+
+    def __init__(self, mesh: Mesh, keys: Array) -> None:
+        n = len(mesh.nodes)
+        free = np.ones(n, bool)
+        free[mesh.tied] = False
+        own = np.flatnonzero(free)
+        self._own = len(own)
+        self.weights = self._weights_of(mesh)
+        self._follows = np.flatnonzero(self.weights)
+        to = sparse.csr_matrix(
             (
-                np.concatenate([own, np.repeat(mesh.tied, mesh.tied_to.shape[1])]),
-                np.concatenate([own, mesh.tied_to.ravel()]),
+                self._follows,
+                (
+                    np.concatenate([own, np.repeat(mesh.tied, mesh.tied_to.shape[1])])[self._follows],
+                    np.concatenate([own, mesh.tied_to.ravel()])[self._follows],
+                ),
             ),
-        ),
-        shape=(n, n),
-    )
-    to.eliminate_zeros()
-    rows, columns = keys % n, keys // n
-    per_row = np.diff(to.indptr)
-    many = per_row[rows] * per_row[columns]
-    block = np.repeat(np.arange(len(keys)), many)
-    place = np.arange(len(block)) - np.repeat(np.cumsum(many) - many, many)
-    first = to.indptr[rows][block] + place // per_row[columns][block]
-    second = to.indptr[columns][block] + place % per_row[columns][block]
-    row, column = to.indices[first].astype(np.int64), to.indices[second].astype(np.int64)
-    weight = to.data[first] * to.data[second]
-    # A block off the diagonal stands for its transpose, too: where both its nodes follow one, both fall on
-    # that one's diagonal. One on the diagonal stands for itself, its own other half lies above.
-    off = (rows != columns)[block]
-    straight = row >= column
-    turned = off & (row <= column)
-    found = np.unique(np.concatenate([(column * n + row)[straight], (row * n + column)[turned]]))
+            shape=(n, n),
+        )
+        rows, columns = keys % n, keys // n
+        per_row = np.diff(to.indptr)
+        many = per_row[rows] * per_row[columns]
+        block = np.repeat(np.arange(len(keys)), many)
+        place = np.arange(len(block)) - np.repeat(np.cumsum(many) - many, many)
+        first = to.indptr[rows][block] + place // per_row[columns][block]
+        second = to.indptr[columns][block] + place % per_row[columns][block]
+        row, column = to.indices[first].astype(np.int64), to.indices[second].astype(np.int64)
+        self._pairs = to.data[first], to.data[second]
+        # A block off the diagonal stands for its transpose, too: where both its nodes follow one, both fall
+        # on that one's diagonal. One on the diagonal stands for itself, its own other half lies above.
+        off = (rows != columns)[block]
+        straight = row >= column
+        turned = off & (row <= column)
+        found = np.unique(np.concatenate([(column * n + row)[straight], (row * n + column)[turned]]))
 
-    def spread(chosen: Array, key: Array) -> sparse.csr_matrix:
-        where = np.searchsorted(found, key[chosen])
-        return sparse.csr_matrix((weight[chosen], (where, block[chosen])), shape=(len(found), len(keys)))
+        def spread(chosen: Array, key: Array) -> sparse.csr_matrix:
+            where, number = np.searchsorted(found, key[chosen]), np.flatnonzero(chosen)
+            return sparse.csr_matrix((number, (where, block[chosen])), shape=(len(found), len(keys)))
 
-    direct, transposed = spread(straight, column * n + row), spread(turned, row * n + column)
+        self.keys = found
+        self._places = spread(straight, column * n + row), spread(turned, row * n + column)
 
-    def fold(blocks: Array) -> Array:
+    def _weights_of(self, mesh: Mesh) -> Array:
+        return np.concatenate([np.ones(self._own), mesh.tied_weights.ravel()])
+
+    def of(self, mesh: Mesh) -> TiedBlocks:
+        """The same map with the weights of a mesh whose nodes have moved.
+
+        Raises InputError, once it is used, where a node follows one that it did not follow before.
+        """
+        found = copy.copy(self)
+        found.__dict__.pop("_spread", None)
+        found.weights = self._weights_of(mesh)
+        return found
+
+    @cached_property
+    def _spread(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        left = np.ones(len(self.weights), bool)
+        left[self._follows] = False
+        if np.abs(self.weights[left]).max(initial=0.0) > NEGLIGIBLE:
+            raise InputError(
+                "a relocated body with other ties has no tangent", "mesh", "make a new model of the mesh"
+            )
+        weight = self.weights[self._pairs[0]] * self.weights[self._pairs[1]]
+        direct, transposed = (
+            sparse.csr_matrix((weight[at.data], at.indices, at.indptr), shape=at.shape) for at in self._places
+        )
+        return direct, transposed
+
+    def __call__(self, blocks: Array) -> Array:
+        """The folded blocks (c, 3, 3) of blocks (b, 3, 3)."""
+        direct, transposed = self._spread
         across = np.ascontiguousarray(blocks.transpose(0, 2, 1)).reshape(-1, 9)
         total = direct @ blocks.reshape(-1, 9) + transposed @ across
         return np.asarray(total).reshape(-1, 3, 3)
-
-    return fold, found

@@ -64,6 +64,26 @@ def test_a_pressure_above_the_protocol_is_the_largest(tmp_path):
     assert max(found) == 30.0
 
 
+def test_stretch_and_stress_come_after_the_shape_where_they_are_asked_for(tmp_path, monkeypatch):
+    told, bending = [], LiveBending(tmp_path)
+    write = LiveBending._tell
+
+    def tell(self, found, error, finished):
+        write(self, found, error, finished)
+        answer = json.loads((tmp_path / requests.BENT).read_text())
+        motion = read_motion(tmp_path / answer["folder"])
+        told.append((len(motion.state_kPa), bool(motion.fields["lattice"])))
+
+    monkeypatch.setattr(LiveBending, "_tell", tell)
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0, fields=True)
+    assert bending.step()
+    assert told == [(2, False), (2, True), (3, True)]
+    motion = read_motion(tmp_path / json.loads((tmp_path / requests.BENT).read_text())["folder"])
+    stretch = motion.fields["lattice"]["largest_stretch"]
+    assert stretch[0] == pytest.approx(1.0)
+    assert 1.0 < stretch[1].max() < stretch[2].max() < 1.5
+
+
 def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
     bending, told = LiveBending(tmp_path), []
     write = LiveBending._tell

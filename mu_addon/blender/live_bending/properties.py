@@ -3,13 +3,15 @@
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
 
-SWITCHED, PRESSED = Signal(), Signal()
-"""Sent with a root whose live bending was switched, and with one bent by another pressure."""
+SWITCHED, PRESSED, COLOURED = Signal(), Signal(), Signal()
+"""Sent with a root whose live bending was switched, with one bent by another pressure, and with one whose
+colours were chosen."""
+PLAIN = "plain"
 
 
 class MU_PG_live(bpy.types.PropertyGroup):
@@ -31,6 +33,16 @@ class MU_PG_live(bpy.types.PropertyGroup):
         step=100,
         precision=1,
         update=lambda live, context: PRESSED.send(live.id_data),
+    )
+    colour: EnumProperty(
+        name="Colours",
+        description="What the colours of the bent unit show",
+        items=[
+            (PLAIN, "Plain", "The colours of the parts"),
+            ("largest_stretch", "Stretch", "Largest principal stretch"),
+            ("von_mises_kPa", "Stress", "Von Mises stress, of Cauchy's stress"),
+        ],
+        update=lambda live, context: COLOURED.send(live.id_data),
     )
 
 

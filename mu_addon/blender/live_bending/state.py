@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import time
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,31 +25,41 @@ from ...run.child import RUNNING, Child
 from ...run.folder import write_run
 from ...usecases.simulate_and_place.motion_files import REGIONS, Motion, read_motion
 from ..jobs import start_child
-from ..preview import materials, skeletons
+from ..preview import skeletons
 from ..shared import displays, viewports
 from ..shared.displays import LIVE
 from ..shared.registration import add_handlers, remove_handlers
 from ..simulate import job as simulation
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from .properties import PRESSED, SWITCHED
+from . import colours
+from .properties import COLOURED, PLAIN, PRESSED, SWITCHED
 
 RESTS_S = 0.35
 """Seconds without a change after which the unit is bent anew."""
 TICK_S = 0.1
-_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice"}
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, slots=False)
 class Shape:
-    """The unit's shapes (s, v, 3) in mm by region at pressures (s,), its triangles, and its angles (s,)."""
+    """The unit's shapes (s, v, 3) in mm by region at pressures (s,), its triangles, and its angles (s,).
+
+    fields: by region and name, (s, v), where they were asked for.
+    """
 
     pressure_kPa: Any
     angle_deg: Any
     vertices: dict[str, Any]
     triangles: dict[str, Any]
+    fields: dict[str, dict[str, Any]]
     error: float
     finished: bool
+
+    @cached_property
+    def ends(self) -> dict[str, tuple[float, float]]:
+        """Range of each field over all pressures."""
+        names = {name for found in self.fields.values() for name in found}
+        return {name: colours.ends_of(self.fields, name) for name in names}
 
     def share(self, kPa: float) -> Any:
         """Weights (s,) of the shapes at a pressure up to the largest one."""
@@ -152,6 +163,18 @@ def _pressed(root: Any) -> None:
         _tick_soon()
 
 
+def _coloured(root: Any) -> None:
+    """Show the chosen colours; a field that was not found yet is asked for."""
+    live, wanted = of(root), root.mu_live.colour != PLAIN
+    colours.show(wanted)
+    if live is None or live.shape is None:
+        return
+    pose(root, live.shape)
+    if wanted and not live.shape.fields:
+        live.due_s = time.monotonic()
+        _tick_soon()
+
+
 def _tick_soon() -> None:
     if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=TICK_S, persistent=True)
@@ -206,7 +229,8 @@ def _ask(root: Any, live: Live) -> None:
         shutil.rmtree(live.folder, ignore_errors=True)
         write_run(live.folder, requests.LAYOUT, requests.Job().texts())
     live.number += 1
-    requests.ask(live.folder, live.number, study, root.mu_live.pressure_kPa)
+    kPa, fields = root.mu_live.pressure_kPa, root.mu_live.colour != PLAIN
+    requests.ask(live.folder, live.number, study, kPa, fields)
     if live.child is None:
         command = ["resume", str(live.folder), "--json"]
         live.child = start_child.start(command, live.folder, ends_with_parent=True)
@@ -237,13 +261,15 @@ def _answered(root: Any, live: Live) -> bool:
 
 def _shape(root: Any, motion: Motion, answer: dict[str, Any]) -> Shape:
     cut = bool(root.mu_unit.cut and motion.halved)
-    vertices, triangles = {}, {}
+    vertices, triangles, fields = {}, {}, {}
     for region in REGIONS:
         skin = motion.skin(region, cut)
         moved = skin.of_nodes(motion.mesh.nodes) + skin.of_nodes(motion.model_a)
         vertices[region], triangles[region] = moved.astype(np.float32), skin.triangles
+        fields[region] = {name: skin.of_surface(v) for name, v in motion.fields[region].items()}
     pressure, angle = np.array(answer["states"]).T
-    return Shape(pressure, angle, vertices, triangles, answer["error"], answer["finished"])
+    fields = fields if any(fields.values()) else {}
+    return Shape(pressure, angle, vertices, triangles, fields, answer["error"], answer["finished"])
 
 
 def place(root: Any) -> None:
@@ -261,19 +287,26 @@ def place(root: Any) -> None:
         if part.data.get("mu_triangles") != len(triangles):
             skeletons.write(part.data, skeletons.Skeleton(live.shape.vertices[region][0], faces=(triangles,)))
             part.data["mu_triangles"] = len(triangles)
-            materials.assign(part.data, _LOOKS[region])
     pose(root, live.shape)
     _seen(root, True)
 
 
 def pose(root: Any, shape: Shape) -> None:
-    """Bend the shown parts to the pressure of the slider."""
+    """Bend the shown parts to the pressure of the slider, and colour them as chosen."""
     share = shape.share(root.mu_live.pressure_kPa).astype(np.float32)
+    field = root.mu_live.colour
     for part in parts(root):
-        now = np.tensordot(share, shape.vertices[part[LIVE]], axes=1)
-        if len(part.data.vertices) == len(now):
-            part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(now).ravel())
-            part.data.update()
+        region = part[LIVE]
+        now = np.tensordot(share, shape.vertices[region], axes=1)
+        if len(part.data.vertices) != len(now):
+            continue
+        part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(now).ravel())
+        if field in shape.ends:
+            values = np.tensordot(share, shape.fields[region][field], axes=1)
+            colours.coloured(root, part, field, values, shape.ends[field])
+        else:
+            colours.plain(part, region)
+        part.data.update()
 
 
 def _seen(root: Any, seen: bool) -> None:
@@ -305,6 +338,7 @@ _HANDLERS = dict.fromkeys(("undo_post", "redo_post", "load_post"), _restored)
 _CONNECTIONS = (
     (SWITCHED, _switched),
     (PRESSED, _pressed),
+    (COLOURED, _coloured),
     (unit_object.REBUILT, _changed),
     (start_child.JOB_ENDED, _job_ended),
 )

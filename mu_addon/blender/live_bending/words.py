@@ -7,11 +7,12 @@ from typing import Any
 import bpy
 
 from ..jobs import start_child
-from ..results import legend
+from ..results import field_colours, legend
 from ..shared.viewports import Overlay
 from ..unit import object as unit_object
 from . import state
 
+BESIDE = 180
 LEAST_DEG = 0.1
 """Least stated error of an angle."""
 
@@ -27,6 +28,9 @@ def draw(layout: Any, root: Any) -> None:
     right.prop(root.mu_live, "pressure_kPa", text="kPa", slider=True)
     if root.mu_live.on:
         layout.label(text=words(root), icon="MOD_SIMPLEDEFORM")
+        row = layout.row(align=True)
+        row.use_property_split = False
+        row.prop(root.mu_live, "colour", expand=True)
 
 
 def words(root: Any) -> str:
@@ -58,6 +62,12 @@ def _draw() -> None:
     scale = bpy.context.preferences.system.ui_scale
     left = legend.beside_tools(bpy.context.area) + legend.LEFT * scale
     legend.write(words(root), left, legend.BOTTOM * scale / 2.0, round(14 * scale))
+    ends = {} if live.shape is None else live.shape.ends
+    if root.mu_live.colour in ends and state.is_seen(root):
+        # Beside the legend of motions that stand apart.
+        left += 0.0 if legend.subject(bpy.context) is None else BESIDE * scale
+        legend.field_ramp(root, ends[root.mu_live.colour], scale, left)
+        legend.above([field_colours.BY_NAME[root.mu_live.colour].title], scale, left)
 
 
 _overlay = Overlay(_draw)

@@ -42,6 +42,11 @@ class Field:
     rare: float = RARE
     spots: bool = False
 
+    @property
+    def title(self) -> str:
+        """Its name, with its unit."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
     def ends(self, values: Any) -> tuple[float, float]:
         """The range of values (s, v) over the whole motion without its rarest, NaN left out."""
         if self.spots:
@@ -167,12 +172,12 @@ def _linear(srgb: float) -> float:
     return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
 
 
-def colours(root: Any, values: Any) -> Any:
-    """The ramp's colours (v, 4), linear, of values (v,) of the field."""
-    settings = root.mu_motion
+def colours(root: Any, values: Any, ends: tuple[float, float] | None = None) -> Any:
+    """The ramp's colours (v, 4), linear, of values (v,) of a field; ends: its range, else the motion's."""
+    low, high = ends or (root.mu_motion.low, root.mu_motion.high)
     ramp = material_of(root).node_tree.nodes["Ramp"].color_ramp
     table = np.array([ramp.evaluate(share) for share in np.linspace(0.0, 1.0, TABLE)], np.float32)
-    share = (values - settings.low) / max(settings.high - settings.low, 1e-30)
+    share = (values - low) / max(high - low, 1e-30)
     return table[np.clip(share * TABLE, 0, TABLE - 1).astype(np.int32)]
 
 
@@ -180,10 +185,7 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
     """Set range and field of a unit's material, and give it to the parts that carry the field."""
     settings = root.mu_motion
     found = material_of(root)
-    nodes = found.node_tree.nodes
-    nodes["Field"].attribute_name = settings.field
-    nodes["Range"].inputs["From Min"].default_value = settings.low
-    nodes["Range"].inputs["From Max"].default_value = settings.high
+    set_range(found, settings.field, (settings.low, settings.high))
     for part, carries in parts:
         wanted = found if carries else materials.material(_PLAIN)
         slots = part.data.materials
@@ -193,14 +195,27 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
             slots[0] = wanted
 
 
-def write_colours(root: Any, mesh: Any, values: Any | None) -> None:
-    """Write a field's values (v,) as colours for solid shading; plain without one, and at NaN."""
+def set_range(material: Any, field: str, ends: tuple[float, float]) -> None:
+    """Let a material that `material_of` made colour an attribute over a range."""
+    nodes = material.node_tree.nodes
+    nodes["Field"].attribute_name = field
+    for name, value in zip(("From Min", "From Max"), ends, strict=True):
+        nodes["Range"].inputs[name].default_value = value
+
+
+def write_colours(
+    root: Any, mesh: Any, values: Any | None, ends: tuple[float, float] | None = None
+) -> None:
+    """Write a field's values (v,) as colours for solid shading; plain without one, and at NaN.
+
+    ends: range of the field, else the motion's.
+    """
     attribute = mesh.color_attributes.get(COLOUR) or mesh.color_attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
     plain = np.float32(materials.COLOURS[_PLAIN])
     if values is None:
         found = np.broadcast_to(plain, (len(mesh.vertices), 4))
     else:
-        found = colours(root, np.nan_to_num(values))
+        found = colours(root, np.nan_to_num(values), ends)
         found[np.isnan(values)] = plain
     attribute.data.foreach_set("color", np.ascontiguousarray(found).ravel())
     mesh.color_attributes.active_color = mesh.color_attributes[COLOUR]

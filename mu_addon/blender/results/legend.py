@@ -47,7 +47,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
     field = field_colours.BY_NAME[root.mu_motion.field]
     time = motion_parts.time_of(motion, scene)
     pressure = float(np.interp(time, motion.time_s, motion.pressure_kPa))
-    found = [f"{field.label} [{field.unit}]" if field.unit else field.label]
+    found = [field.title]
     if root != unit_object.active_root(bpy.context):
         found.insert(0, root.name)
     other = studies.run_by_key(root, root.mu_unit.study.against)
@@ -79,10 +79,16 @@ def _draw() -> None:
     if not in_scene:
         left = beside_tools(context.area) + LEFT * scale
         if any(root.mu_motion.field in part.data.attributes for part in shown):
-            _field_ramp(root, scale, left)
-        for line, text in enumerate(reversed(lines(root, motion, context.scene))):
-            write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
+            field_ramp(root, (root.mu_motion.low, root.mu_motion.high), scale, left)
+        above(lines(root, motion, context.scene), scale, left)
     _names(context, root, motion, size)
+
+
+def above(texts: list[str], scale: float, left: float) -> None:
+    """Write lines above the ramp."""
+    size = round(12 * scale)
+    for line, text in enumerate(reversed(texts)):
+        write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
 
 
 def subject(context: Any) -> Any | None:
@@ -98,11 +104,12 @@ def beside_tools(area: Any) -> float:
     return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
 
 
-def _field_ramp(root: Any, scale: float, left: float) -> None:
-    low, high = root.mu_motion.low, root.mu_motion.high
+def field_ramp(root: Any, ends: tuple[float, float], scale: float, left: float) -> None:
+    """Draw a unit's ramp with the values of a range beside it, `left` pixels from the view's left."""
+    low, high = ends
     if high > low:
         marks = [((value - low) / (high - low), f"{value:.4g}") for value in ticks(low, high)]
-        ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1)), marks, scale, left)
+        ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1), ends), marks, scale, left)
 
 
 def ramp(colours: Any, marks: list[tuple[float, str]], scale: float, left: float) -> None:

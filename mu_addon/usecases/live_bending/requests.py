@@ -1,7 +1,7 @@
 """Requests to the process that bends a unit live; no solver is loaded.
 
-request.json: `number` of the latest request, whose study is in `asked/NUMBER`, and `pressure_kPa`, found
-first. bent.json: `number` of the request that it answers, `folder` of the motion, `states` as pairs of kPa
+request.json: `number` of the latest request, whose study is in `asked/NUMBER`, `pressure_kPa`, found first,
+and `fields`, whether stress and stretch are asked for. bent.json: `number` of the request that it answers, `folder` of the motion, `states` as pairs of kPa
 and degrees, `error` of the angle as a share, `finished`, and `trouble` where no shape was found.
 """
 
@@ -56,10 +56,11 @@ def trouble_of(study: Study) -> str:
     return ""
 
 
-def ask(folder: Path, number: int, study: Study, pressure_kPa: float) -> None:
+def ask(folder: Path, number: int, study: Study, pressure_kPa: float, fields: bool = False) -> None:
     """Write a request to the process of a folder: bend this study's unit. Raises InputError, OutputError.
 
-    pressure_kPa: found first, and above the protocol's pressures the largest.
+    pressure_kPa: found first, and above the protocol's pressures the largest. fields: find stress and
+    stretch, too, after the shape.
     """
     mesh = MeshSettings(refine=LEVELS[0][0], fidelity=RESOLVED)
     study = attrs.evolve(
@@ -68,4 +69,4 @@ def ask(folder: Path, number: int, study: Study, pressure_kPa: float) -> None:
     if reason := trouble_of(study):
         raise InputError(reason, "live bending", "switch it off, or change the unit")
     write_study(study, folder / ASKED / str(number))
-    write_json(folder / REQUEST, {"number": number, "pressure_kPa": pressure_kPa})
+    write_json(folder / REQUEST, {"number": number, "pressure_kPa": pressure_kPa, "fields": fields})

@@ -10,6 +10,7 @@ import shutil
 import time
 from collections.abc import Iterable
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from ...fem.bending_angle import TipSection
 from ...fem.equilibrium import Equilibrium
 from ...fem.model import Model
 from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ...fem.relocated import relocated
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory
 from ...files import write_json
@@ -34,7 +36,7 @@ from ...run.context import RunContext
 from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study
 from ..simulate_and_place.job import read_job as read_study
-from ..simulate_and_place.motion_files import write_model_a
+from ..simulate_and_place.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
 from .requests import ASKED, BENT, LAYOUT, LEVELS, REQUEST, Job, read_job
 
 RUNGS = 4
@@ -70,15 +72,36 @@ class _Watched:
         return self.solver.solve(b)
 
 
-@attrs.frozen(eq=False)
-class _Solved:
-    """A unit on one mesh: its model, its states by pressure in kPa, and what moves the mesh."""
+@attrs.frozen(eq=False, slots=False)
+class _Drawn:
+    """A mesh as it was made, its unit and its model, which those of similar units are moved from."""
 
     study: Study
     mesh: Mesh
     model: Model
+    surfaces: dict[str, Surface]
+
+    @cached_property
+    def morph(self) -> PrintedMorph:
+        """What moves the mesh."""
+        return PrintedMorph(self.mesh, self.study.unit, self.study.mesh_settings(self.study.mesh))
+
+
+@attrs.frozen(eq=False, slots=False)
+class _Solved:
+    """A unit on a mesh made for it or moved to it: its states by pressure in kPa, and their fields."""
+
+    study: Study
+    drawn: _Drawn
+    mesh: Mesh
+    model: Model
     states: dict[float, State]
-    morph: PrintedMorph | None
+    fields: dict[float, dict[str, Any]] = attrs.Factory(dict)
+
+    @cached_property
+    def looked(self) -> SurfaceFields:
+        """What finds stress and stretch at the surfaces."""
+        return SurfaceFields(self.mesh, {name: surface.node for name, surface in self.drawn.surfaces.items()})
 
 
 class LiveBending:
@@ -111,7 +134,7 @@ class LiveBending:
             for refine, error in LEVELS:
                 if refine != LEVELS[0][0]:
                     self._rest()
-                self._level(study, refine, error, float(request["pressure_kPa"]))
+                self._level(study, refine, error, float(request["pressure_kPa"]), bool(request["fields"]))
         except _Superseded:
             pass
         except MuError as error:
@@ -129,7 +152,7 @@ class LiveBending:
             self._look()
             time.sleep(LOOK_S)
 
-    def _level(self, study: Study, refine: float, error: float, first_kPa: float) -> None:
+    def _level(self, study: Study, refine: float, error: float, first_kPa: float, fields: bool) -> None:
         """Bend the unit on a mesh of one refinement, the first pressure first, and tell of every state."""
         self._look()
         study = attrs.evolve(study, mesh=attrs.evolve(study.mesh, refine=refine))
@@ -137,40 +160,53 @@ class LiveBending:
         found = self._begun(study, before)
         old = {} if before is None or before.mesh.nodes.shape != found.mesh.nodes.shape else before.states
         body = Equilibrium(found.model, study.materials(found.mesh), NEWTON, explains=False)
+        first = round(first_kPa, 3)
         top = max(float(study.protocol.pressure_kPa.max()), first_kPa, 1.0)
         halfway = [first_kPa / 2.0] if first_kPa > in_kPa(NEWTON.max_step_MPa) and not old else []
         rungs = [*halfway, first_kPa, *(top * (k + 1) / RUNGS for k in range(RUNGS))]
         wanted = [p for p in dict.fromkeys(round(p, 3) for p in rungs) if p > 0.0]
-        coarse = refine == LEVELS[0][0]
+        coarse, finished = refine == LEVELS[0][0], refine == LEVELS[-1][0]
+        coloured = False
         for count, pressure in enumerate(wanted):
             found.states[pressure] = self._state(body, found, pressure, old.get(pressure))
             self._levels[refine] = found
             # A finer level replaces the one before as a whole.
-            if coarse or count + 1 == len(wanted):
-                self._tell(found, error, finished=refine == LEVELS[-1][0])
+            if not coarse and count + 1 < len(wanted):
+                continue
+            # A coarse shape comes before its colours, and later ones with them.
+            if not fields or (coarse and not coloured):
+                self._tell(found, error, finished)
+            if fields and (coloured or first in found.states or first <= 0.0):
+                self._colour(found)
+                self._tell(found, error, finished)
+                coloured = True
 
     def _begun(self, study: Study, before: _Solved | None) -> _Solved:
-        """The study's mesh and model: those of the design before, moved to this one, or new."""
-        mesh, morph = self._mesh(study, before)
-        if before is not None and mesh is before.mesh:
-            model = before.model
-        else:
-            self._look()
-            model = study.model(mesh)
-            model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]
-        return _Solved(study, mesh, model, {0.0: rest(mesh)}, morph)
-
-    def _mesh(self, study: Study, before: _Solved | None) -> tuple[Mesh, PrintedMorph | None]:
-        settings, unit = study.mesh_settings(study.mesh), study.unit
-        if before is not None and before.morph is not None and study.body is None:
-            if before.study.unit.printed == unit.printed:
-                return before.mesh, before.morph
-            if _wall_alone_differs(before.morph.drawn.printed, unit.printed):
+        """The study's mesh and model: those of a similar design before, moved to this one, or new."""
+        if before is not None and study.body is None and before.study.body is None:
+            drawn, unit = before.drawn, study.unit
+            if study.effects == drawn.study.effects and _wall_alone_differs(
+                drawn.study.unit.printed, unit.printed
+            ):
                 with suppress(MeshingError, InputError):
-                    return before.morph.to(unit), before.morph
-        mesh = mesh_of(unit, settings, body=study.body)
+                    mesh = drawn.morph.to(unit)
+                    model = relocated(drawn.model, mesh)
+                    model.load = study.effects.load(unit, mesh, model.device)
+                    return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
+        mesh = mesh_of(study.unit, study.mesh_settings(study.mesh), body=study.body)
         self._look()
-        return mesh, None if study.body is not None else PrintedMorph(mesh, unit, settings)
+        model = study.model(mesh)
+        model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]
+        drawn = _Drawn(study, mesh, model, surfaces_of(mesh))
+        return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
+
+    def _colour(self, found: _Solved) -> None:
+        """Find the fields of the states that have none yet."""
+        materials = found.study.materials(found.mesh)
+        for pressure, state in found.states.items():
+            if pressure not in found.fields:
+                self._look()
+                found.fields[pressure] = found.looked.of_states([state.u], materials)
 
     def _state(self, body: Equilibrium, found: _Solved, pressure: float, old: State | None) -> State:
         """The state at a pressure in kPa: from the design before if it is near, else from those below it."""
@@ -189,7 +225,12 @@ class LiveBending:
         kPa = np.array([state.pressure_kPa for state in states])
         tip = TipSection.of(found.mesh)
         motion = Trajectory(kPa, kPa, states, np.arange(len(states)), found.mesh)
-        write_model_a(folder, found.mesh, found.study.materials(found.mesh), motion, fields=False)
+        materials, fields = found.study.materials(found.mesh), {}
+        if found.fields.keys() >= found.states.keys():
+            every = [found.fields[p] for p in sorted(found.states)]
+            fields = {name: np.concatenate([one[name] for one in every]) for name in every[0]}
+        surfaces = found.drawn.surfaces
+        write_model_a(folder, found.mesh, materials, motion, fields=fields, surfaces=surfaces)
         angles = [[state.pressure_kPa, tip.angle_deg(state.u)] for state in states]
         answer = {"number": self._number, "folder": folder.name, "states": angles}
         write_json(self.folder / BENT, answer | {"error": error, "finished": finished, "trouble": ""})

@@ -218,23 +218,24 @@ def write_model_a(
     trajectory: Trajectory,
     history: Callable[[int], Sequence[Array]] = lambda number: (),
     contact_kPa: Sequence[Array] = (),
-    fields: bool = True,
+    fields: dict[str, Array] | None = None,
+    surfaces: dict[str, Surface] | None = None,
 ) -> None:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
 
     history: of materials with memory in a state, by its number; contact_kPa: of every state the pressure (n,)
-    at the mesh's nodes where the unit touches itself, or none without self-contact. fields: write stress and
-    stretch, too.
+    at the mesh's nodes where the unit touches itself, or none without self-contact. fields: as
+    `SurfaceFields.of_states` gives them, of all states or none, and surfaces, both computed where left out.
     """
     arrays = {f.name: getattr(mesh, f.name) for f in attrs.fields(Mesh)}
     arrays["symmetry"] = np.array(mesh.symmetry, dtype="U1")
-    surfaces = {name: surface_of(mesh, region) for name, region in REGIONS.items()}
+    surfaces = surfaces or surfaces_of(mesh)
     for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
-    found = {}
-    if fields:
+    if fields is None:
         looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
-        found = looked.of_states([state.u for state in trajectory.solved], materials, history)
+        fields = looked.of_states([state.u for state in trajectory.solved], materials, history)
+    found = dict(fields)
     for name, surface in surfaces.items() if len(contact_kPa) else ():
         found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
     write_npz(folder / FOLDER / "mesh.npz", arrays, packed=False)
@@ -256,10 +257,12 @@ class SurfaceFields:
     """Stress and stretch of a mesh's states at some nodes (v,) of each region, given by its name."""
 
     def __init__(self, mesh: Mesh, nodes: dict[str, Array]) -> None:
+        from ...fem.elements import reference_gradients
         from ...fem.stress import NodalMean
 
         self._mesh = mesh
-        self._means = {r: NodalMean(mesh, np.flatnonzero(mesh.region == REGIONS[r])) for r in nodes}
+        self._reference = known = reference_gradients(mesh.nodes, mesh.tets)
+        self._means = {r: NodalMean(mesh, np.flatnonzero(mesh.region == REGIONS[r]), known) for r in nodes}
         self._places = {r: np.searchsorted(self._means[r].nodes, node) for r, node in nodes.items()}
 
     def of_states(
@@ -274,7 +277,7 @@ class SurfaceFields:
 
         found: dict[str, list[Array]] = {f"{r}_{field}": [] for r in self._means for field in FIELDS}
         for number, u in enumerate(displacements):
-            sigma, F = cauchy(self._mesh, u, materials, history(number))
+            sigma, F = cauchy(self._mesh, u, materials, history(number), self._reference)
             for region, mean in self._means.items():
                 stress_kPa = in_kPa(mean(sigma))[self._places[region]]
                 stretch = stretches(mean(F)[self._places[region]])
@@ -283,6 +286,11 @@ class SurfaceFields:
                 for field, value in zip(FIELDS, values, strict=True):
                     found[f"{region}_{field}"].append(value)
         return {name: np.array(values, np.float32) for name, values in found.items()}
+
+
+def surfaces_of(mesh: Mesh) -> dict[str, Surface]:
+    """Surfaces of a mesh's regions, by name."""
+    return {name: surface_of(mesh, region) for name, region in REGIONS.items()}
 
 
 def surface_of(mesh: Mesh, region: int) -> Surface:

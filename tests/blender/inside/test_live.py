@@ -31,6 +31,23 @@ def bent(root, states):
         time.sleep(0.05)
 
 
+def coloured(root):
+    """Wait as a window does, until stretch and stress are there."""
+    end = time.monotonic() + PATIENCE_S
+    while not live.of(root).shape.fields:
+        assert time.monotonic() < end, words.words(root)
+        live._tick()
+        time.sleep(0.05)
+
+
+def painted(root, field):
+    """Values of a field at the vertices of the struts."""
+    part = next(part for part in live.parts(root) if part[displays.LIVE] == "lattice")
+    found = np.empty(len(part.data.vertices), np.float32)
+    part.data.attributes[field].data.foreach_get("value", found)
+    return found
+
+
 def lattice(root):
     """Vertices (v, 3) in mm of the struts as they are shown."""
     part = next(part for part in live.parts(root) if part[displays.LIVE] == "lattice")
@@ -77,6 +94,24 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     root.mu_unit.candidates = True
     root.mu_unit.candidates = False
     assert live.is_seen(root)
+    # The same shape's stretch, asked for once it is there; its largest pressure stretches it most.
+    assert not live.of(root).shape.fields
+    root.mu_live.colour = "largest_stretch"
+    bent(root, 5)
+    coloured(root)
+    low, high = live.of(root).shape.ends["largest_stretch"]
+    assert 1.0 <= low < 1.01 < high < 2.0
+    most = painted(root, "largest_stretch").max()
+    assert most > high, "the range leaves out the rarest"
+    slots = {part.data.materials[0].name for part in live.parts(root)}
+    assert len(slots) == 1
+    assert slots.pop().startswith("MU Live")
+    root.mu_live.pressure_kPa = 20.0
+    assert 1.0 < painted(root, "largest_stretch").max() < most
+    root.mu_live.colour = "von_mises_kPa"
+    assert painted(root, "von_mises_kPa").max() > 1.0
+    root.mu_live.colour = "plain"
+    assert {part.data.materials[0].name for part in live.parts(root)} == {"MU Membrane", "MU Lattice"}
     folder, child = live.of(root).folder, live.of(root).child
     root.mu_live.on = False
     assert live.of(root) is None
