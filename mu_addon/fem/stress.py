@@ -146,8 +146,10 @@ class NodalMean:
         corners = np.ones((4, 1)) if mesh.order == 1 else np.linalg.inv(points)
         middles = corners[TET_EDGES].mean(axis=1)
         self._to_nodes = corners if mesh.order == 1 else np.vstack([corners, middles])
-        every = reference_gradients(mesh.nodes, tets).volumes if reference is None else reference.volumes[elements]
-        volumes = every.sum(axis=1)
+        if reference is None:
+            volumes = reference_gradients(mesh.nodes, tets).volumes.sum(axis=1)
+        else:
+            volumes = reference.volumes[elements].sum(axis=1)
         if mesh.resolved:
             # Cut parts follow their neighbours: they count only without others.
             volumes *= np.maximum(mesh.filled[elements].mean(axis=1), _CUT_AWAY)

@@ -1,7 +1,8 @@
 """Runs inside a Blender with a window: forty gestures on units and node trees, what holds after each.
 
-Beside them beats a clock: how long anything of the extension held the window, and what, is written to
-blocked.json in MU_TEST_FOLDER.
+How long anything of the extension held the window, and what, is written to blocked.json in MU_TEST_FOLDER.
+With MU_HEARTBEAT it is how long anything held it, Blender's own work and drawing too: the longest time
+between two beats of a timer, by gesture (benchmarks/heartbeat.py).
 """
 
 import json
@@ -19,6 +20,7 @@ FOLDER = Path(os.environ["MU_TEST_FOLDER"])
 unit_object, trees = module("blender.unit.object"), module("blender.node_tree.state")
 classes, scene_units = module("blender.node_tree.classes"), module("blender.shared.scene_units")
 SIMULATION = module("blender.simulate.job").SIMULATION
+bending, viewports = module("blender.live_bending.state"), module("blender.shared.viewports")
 OURS = str(Path(sys.modules[package].__file__).parent)
 DIGITS = {"ZERO": "0", "ONE": "1", "TWO": "2", "NINE": "9"}
 done = []
@@ -46,12 +48,39 @@ class Blocked:
                 self.longest[place] = max(self.longest.get(place, 0.0), time.thread_time() - self._entered)
 
 
-blocked = Blocked()
+class Pulse:
+    """Longest time between two beats of a timer in each gesture, by the clock and by the processor."""
+
+    EVERY_S = 0.005
+
+    def __init__(self):
+        self.longest, self.beats, self.gesture = {}, 0, "start"
+        self._last = None
+
+    def __call__(self):
+        self.beat()
+        return self.EVERY_S
+
+    def beat(self):
+        """The time since the last beat belongs to the present gesture."""
+        now = time.perf_counter(), time.thread_time()
+        if self._last is not None:
+            clock, processor = (b - a for a, b in zip(self._last, now, strict=True))
+            before = self.longest.get(self.gesture, (0.0, 0.0))
+            self.longest[self.gesture] = max(before[0], clock), max(before[1], processor)
+            self.beats += 1
+        self._last = now
+
+
+HEARTBEAT = bool(os.environ.get("MU_HEARTBEAT"))
+blocked = Pulse() if HEARTBEAT else Blocked()
 
 
 def gesture(name):
     """The name of what is done next."""
     done.append(name)
+    if HEARTBEAT:
+        blocked.beat()
     blocked.gesture = name
     print(f"{len(done)}. {name}", flush=True)
 
@@ -349,17 +378,64 @@ def while_running():
     assert child.state == "cancelled", (child.state, child.error)
 
 
+def while_bending():
+    root = only()
+    select(root)
+    root.mu_unit.chambers.count = 3
+    yield from settled()
+    gesture("a frame and nothing else")
+    for _ in range(10):
+        viewports.redraw()
+        yield 0.1
+    gesture("Bend")
+    root.mu_live.on = True
+    yield from bent(root)
+    gesture("the pressure dragged")
+    for kPa in range(0, 41, 2):
+        root.mu_live.pressure_kPa = kPa
+        yield 0.05
+    gesture("Stretch painted")
+    root.mu_live.colour = "largest_stretch"
+    yield from until(lambda: bending.of(only()).shape is not None and bending.of(only()).shape.fields)
+    gesture("the pressure dragged, painted")
+    for kPa in range(0, 41, 2):
+        root.mu_live.pressure_kPa = kPa
+        yield 0.05
+    gesture("a wall while bent")
+    root.mu_unit.chambers.wall_mm = 0.98
+    yield from until(lambda: bending.of(only()).shape is None)
+    yield from bent(root)
+    gesture("Bend off")
+    root.mu_live.on = False
+    yield 0.5
+
+
+def bent(root):
+    def is_bent():
+        shape = bending.of(root).shape
+        return shape is not None and len(shape.pressure_kPa) > 4
+
+    yield from until(is_bent)
+
+
 def session():
     yield 2.0
-    sys.setprofile(blocked)
+    if HEARTBEAT:
+        bpy.app.timers.register(blocked, persistent=True)
+    else:
+        sys.setprofile(blocked)
     try:
-        for part in (on_a_unit, in_other_scenes, in_files, in_trees, while_running):
+        for part in (on_a_unit, in_other_scenes, in_files, in_trees, while_running, while_bending):
             yield from part()
         assert len(done) >= 40, len(done)
     finally:
         sys.setprofile(None)
-        worst = sorted(((s, *place) for place, s in blocked.longest.items()), reverse=True)
-        told = {"gestures": done, "calls": blocked.calls, "longest_s": worst[:12]}
+        told = {"gestures": done}
+        if HEARTBEAT:
+            told |= {"beats": blocked.beats, "longest_s": blocked.longest}
+        else:
+            worst = sorted(((s, *place) for place, s in blocked.longest.items()), reverse=True)
+            told |= {"calls": blocked.calls, "longest_s": worst[:12]}
         (FOLDER / "blocked.json").write_text(json.dumps(told, indent=1))
 
 

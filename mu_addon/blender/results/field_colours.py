@@ -203,9 +203,7 @@ def set_range(material: Any, field: str, ends: tuple[float, float]) -> None:
         nodes["Range"].inputs[name].default_value = value
 
 
-def write_colours(
-    root: Any, mesh: Any, values: Any | None, ends: tuple[float, float] | None = None
-) -> None:
+def write_colours(root: Any, mesh: Any, values: Any | None, ends: tuple[float, float] | None = None) -> None:
     """Write a field's values (v,) as colours for solid shading; plain without one, and at NaN.
 
     ends: range of the field, else the motion's.

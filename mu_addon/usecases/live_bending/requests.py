@@ -1,8 +1,9 @@
 """Requests to the process that bends a unit live; no solver is loaded.
 
 request.json: `number` of the latest request, whose study is in `asked/NUMBER`, `pressure_kPa`, found first,
-and `fields`, whether stress and stretch are asked for. bent.json: `number` of the request that it answers, `folder` of the motion, `states` as pairs of kPa
-and degrees, `error` of the angle as a share, `finished`, and `trouble` where no shape was found.
+and `fields`, whether stress and stretch are asked for. bent.json: `number` of the request that it answers,
+`folder` of the motion, `states` as pairs of kPa and degrees, `error` of the angle as a share, `finished`, and
+`trouble` where no shape was found.
 """
 
 from __future__ import annotations

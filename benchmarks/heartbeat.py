@@ -1,0 +1,53 @@
+"""How long Blender's window stands still at each of some fifty gestures, drawing included.
+
+    MU_BLENDER_UI... python benchmarks/heartbeat.py
+
+(MU_BLENDER_UI as of tests/blender/test_installed.py: a Blender with a window, where the built extension is
+installed.) A timer beats in the window while tests/blender/gestures_in_window.py goes through its gestures. A
+row tells of the longest time between two beats, by the clock and by the main thread's processor time. Without
+a graphics card the processor draws, too: the row "a frame and nothing else" is what that alone takes.
+"""
+
+import argparse
+import json
+import os
+import shlex
+import subprocess
+import tempfile
+from pathlib import Path
+
+from circumstances import circumstances
+
+GESTURES = Path(__file__).resolve().parents[1] / "tests" / "blender" / "gestures_in_window.py"
+SECONDS = 900
+
+
+def measured(folder):
+    """Gestures in their order, and the longest block of each by clock and processor in s."""
+    window = shlex.split(os.environ["MU_BLENDER_UI"])
+    command = [*window, str(GESTURES), str(folder / "last.png"), str(SECONDS)]
+    environment = {**os.environ, "MU_TEST_FOLDER": str(folder), "MU_HEARTBEAT": "1"}
+    subprocess.run(command, env=environment, check=False, capture_output=True)
+    outcome = (folder / "outcome.txt").read_text()
+    found = json.loads((folder / "blocked.json").read_text())
+    return outcome, found["gestures"], found["longest_s"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--above", type=float, default=0.0, help="least processor time in ms of a row")
+    above = parser.parse_args().above
+    with tempfile.TemporaryDirectory() as scratch:
+        outcome, gestures, longest = measured(Path(scratch))
+    print(circumstances(), end="\n\n")
+    print("| gesture | clock (ms) | processor (ms) |")
+    print("| --- | --- | --- |")
+    for name in gestures:
+        clock, processor = (1000.0 * s for s in longest.get(name, (0.0, 0.0)))
+        if processor >= above:
+            print(f"| {name} | {clock:.0f} | {processor:.0f} |")
+    print(f"\n{outcome}")
+
+
+if __name__ == "__main__":
+    main()
