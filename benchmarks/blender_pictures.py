@@ -34,7 +34,7 @@ BASE, TIP = ("base a", "base b"), ("tip a", "tip b")
 
 
 def prepare():
-    """A grasp, a unit beside an obstacle, a diagnosis, two rankings and a filmed bench, as .blend files."""
+    """A grasp, units that are simulated, a diagnosis, two rankings and a filmed bench, as .blend files."""
     import mu_addon
     from mu_addon.blender.evidence.state import DIAGNOSIS
     from mu_addon.blender.gripper.state import GRASP
@@ -50,6 +50,7 @@ def prepare():
         "obstacle": ("obstacle", SIMULATION, bpy.ops.mu.simulate),
         "evidence": ("measured", DIAGNOSIS, bpy.ops.mu.evidence_diagnose),
         "gripper": ("gripper", GRASP, bpy.ops.mu.grasp),
+        "printed": ("", SIMULATION, bpy.ops.mu.simulate),
     }
     for name, (scene, kind, start) in jobs.items():
         if ONLY and name not in ONLY:
@@ -58,8 +59,13 @@ def prepare():
         mu_addon.register()
         bpy.ops.mu.millimetres()
         bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / f"{name}.blend"))
-        bpy.ops.mu.sample(scene=scene)
+        if scene:
+            bpy.ops.mu.sample(scene=scene)
+        else:
+            bpy.ops.mu.add(preset="mu-1.0x")
         root = bpy.context.view_layer.objects.active
+        if name == "printed":
+            root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
         if name == "evidence":
             root.mu_evidence.folder = "//blocks"
         assert start() == {"FINISHED"}
@@ -283,6 +289,41 @@ def paint():
     shot("paint")
 
 
+def deviation():
+    yield from new("MU_PT_results", file="runs.blend")
+    assert called(bpy.ops.mu.field_show, field="deviation_mm") == {"FINISHED"}
+    yield 3.0
+    shot("deviation")
+
+
+def stress():
+    yield from new("MU_PT_results", "MU_PT_field", file="printed.blend")
+    assert called(bpy.ops.mu.field_show, field="von_mises_kPa") == {"FINISHED"}
+    yield 3.0
+    over_view(0.4, 0.5)
+    yield 1.0
+    assert called(bpy.ops.mu.probe, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield 1.0
+    over_view(0.41, 0.5)
+    yield 2.0
+    shot("stress")
+    key("ESC")
+    yield 1.0
+
+
+def print_layers():
+    yield from new("MU_PT_print", "MU_PT_print_layers")
+    yield from added(cut=False, path="")
+    assert called(bpy.ops.mu.solid) == {"FINISHED"}
+    while not unit_object.solid_is_current(root()):
+        yield 1.0
+    assert called(bpy.ops.mu.print_layer) == {"FINISHED"}
+    root().mu_print.layer = 0.42
+    seen_from(20)
+    yield from scrolled(9)
+    shot("print-layers")
+
+
 def print_part():
     yield from new("MU_PT_print", "MU_PT_print_files")
     yield from added(preset="mu-0.75x")
@@ -443,6 +484,107 @@ def sensor_live():
     yield 3.0
 
 
+def editor(tree, split=0.0):
+    """A tree in the node editor, in place of the view or beside it, which keeps a share of the width."""
+    window, area, _ = parts()
+    if split:
+        with bpy.context.temp_override(window=window, area=area):
+            bpy.ops.screen.screen_full_area(use_hide_panels=False)
+        yield 2.0
+        while len(window.screen.areas) > 1:
+            other = next(one for one in window.screen.areas if one.type != "VIEW_3D")
+            with bpy.context.temp_override(window=window, area=other):
+                assert bpy.ops.screen.area_close() == {"FINISHED"}
+            yield 1.0
+        area = parts()[1]
+        with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+            bpy.ops.screen.area_split(direction="VERTICAL", factor=split)
+        yield 2.0
+        area = max((one for one in window.screen.areas if one.type == "VIEW_3D"), key=lambda one: one.x)
+    area.ui_type = tree.bl_idname
+    yield 2.0
+    area.spaces.active.node_tree = tree
+    area.spaces.active.show_region_ui = False
+    yield 2.0
+
+
+def framed(tree, labels=()):
+    """All nodes of a tree in its editor, or those of some labels."""
+    for node in tree.nodes:
+        node.select = not labels or node.bl_label in labels
+    yield 1.0
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "NODE_EDITOR")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.node.view_selected()
+    for node in tree.nodes:
+        node.select = False
+    yield 3.0
+
+
+def nodes_walls():
+    yield from new(sidebar=False)
+    assert called(bpy.ops.mu.tree_new, template="three-walls") == {"FINISHED"}
+    (tree,) = trees.trees()
+    yield from editor(tree)
+    yield from framed(tree)
+    motion = next(node for node in tree.nodes if node.bl_label == "Simulate")
+    child = trees.start(tree, (motion.name,))
+    while child.state == "running":
+        yield 1.0
+    assert child.state == "done", child.error
+    compare = next(node for node in tree.nodes if node.bl_label == "Compare")
+    child = trees.start(tree, (compare.name,))
+    while child.state == "running" and not child.progress.get("fraction"):
+        yield 1.0
+    yield 20.0
+    shot("nodes-walls")
+    child.cancel()
+    while child.state == "running":
+        yield 1.0
+
+
+def nodes_unit():
+    yield from new(sidebar=False)
+    yield from added(path="alpha4")
+    assert called(bpy.ops.mu.tree_of_unit, steps=True) == {"FINISHED"}
+    (tree,) = trees.trees()
+    yield from editor(tree, 0.3)
+    parts()[1].spaces.active.show_region_toolbar = False
+    seen_from(0, wider=1.3)
+    yield from framed(tree, ("Profile", "Chambers", "Membranes", "Cells"))
+    shot("nodes-unit")
+    chambers = next(node for node in tree.nodes if node.bl_label == "Chambers")
+    wall = next(s.identifier for s in chambers.inputs if s.name.startswith("Wall"))
+    setattr(chambers, chambers.field_of(wall), 3.0)
+    yield from framed(tree, ("Chambers", "Membranes"))
+    shot("nodes-error")
+
+
+def leave():
+    """A ranking that this session of Blender starts and leaves behind, for the picture goes-on."""
+    yield from new()
+    yield from added(preset="mu-0.75x")
+    assert called(bpy.ops.wm.save_as_mainfile, filepath=str(FOLDER / "left.blend")) == {"FINISHED"}
+    root().mu_unit.study.command, root().mu_unit.study.detail = "place", "full"
+    assert called(bpy.ops.mu.simulate) == {"FINISHED"}
+    yield 2.0
+    assert called(bpy.ops.wm.save_mainfile) == {"FINISHED"}
+
+
+def goes_on():
+    yield from new("MU_PT_simulate", file="left.blend")
+    seen_from(20)
+    yield 6.0
+    shot("goes-on")
+    child = SIMULATION.child(root())
+    assert child.state == "running", child.state
+    assert called(bpy.ops.mu.cancel) == {"FINISHED"}
+    while child.state == "running":
+        yield 1.0
+
+
 def track():
     yield from new(sidebar=False)
     window, area, _ = parts()
@@ -473,8 +615,11 @@ PICTURES = {
     "add": add, "steps": steps, "live": live, "rule": rule, "paths": paths, "results-panel": results_panel,
     "paint": paint, "print": print_part, "print-check": print_check, "simulate": simulate,
     "obstacle": obstacle, "gripper": gripper, "apply": apply, "assets": assets, "optimize": optimize,
-    "sensor-live": sensor_live, "track": track,
+    "sensor-live": sensor_live, "track": track, "deviation": deviation, "stress": stress,
+    "print-layers": print_layers, "nodes-walls": nodes_walls, "nodes-unit": nodes_unit,
 }  # fmt: skip
+AFTER_ONE_ANOTHER = {"leave": leave, "goes-on": goes_on}
+"""Each in a Blender of its own, and asked for by name."""
 
 
 def session():
@@ -484,9 +629,13 @@ def session():
     for number in ids.stdout.split():
         subprocess.run(["xdotool", "windowsize", number, *map(str, SIZE)], check=False)
         subprocess.run(["xdotool", "windowmove", number, "0", "0"], check=False)
+    bpy.context.preferences.view.smooth_view = 0
     yield 3.0
     for name, picture in PICTURES.items():
         if not ONLY or name in ONLY:
+            yield from picture()
+    for name, picture in AFTER_ONE_ANOTHER.items():
+        if name in ONLY:
             yield from picture()
 
 
@@ -502,6 +651,7 @@ else:
     handles = module("blender.scene.handles")
     gripper_object, viewports = module("blender.gripper.object"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
+    trees = module("blender.node_tree.state")
     studies, bending = module("blender.simulate.study_folder"), module("blender.live_bending.state")
     OPTIMIZATION = module("blender.optimize.state").OPTIMIZATION
     sensor, twin = module("blender.sensor.state"), module("blender.sensor.twin")
