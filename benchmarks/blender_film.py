@@ -3,9 +3,9 @@
     MU_FILM=FOLDER MU_TEST_FOLDER=FOLDER MU_BLENDER_UI... benchmarks/blender_film.py last.png SECONDS
 
 (MU_BLENDER_UI as of tests/blender/test_installed.py; it needs ImageMagick's `import`.)
-From an empty scene to a shaped unit, its ranked paths, the painted deviation and the motion: each step by the
-extension's own operators, a picture of the whole window after it. Blender itself makes `film.webm` of them.
-What takes minutes, the simulation, is seen at some of its moments. In background (`blender -b -P
+From an empty scene to a unit that bends while it is shaped, its ranked paths, the painted deviation and the
+motion: each step by the extension's own operators, a picture of the whole window after it. Blender itself makes
+`film.webm` of them. What takes minutes, the simulation, is seen at some of its moments. In background (`blender -b -P
 benchmarks/blender_film.py`) the film is made anew of the pictures in MU_FILM.
 """
 
@@ -49,17 +49,56 @@ def shape():
     parts()[2].active_panel_category = "MU"
     yield 4.0
     shot(1.0)
-    assert called(bpy.ops.mu.add, preset="mu-0.75x") == {"FINISHED"}
+    assert called(bpy.ops.mu.add, preset="mu-1.0x") == {"FINISHED"}
     yield 6.0
+    viewports.frame([root()])
+    yield 4.0
     shot(1.5)
-    props = root().mu_unit
-    for wall in (0.94, 0.98, 1.02, 1.06, 1.0):
-        props.chambers.wall_mm = wall
+
+
+def bend():
+    """The unit bends while it is designed: pressures, walls, and its stretch in colours."""
+    live = root().mu_live
+    live.pressure_kPa, live.on = 0.0, True
+    yield from bent()
+    for kPa in range(0, 41, 4):
+        live.pressure_kPa = kPa
+        yield 1.5
+        shot(0.2)
+    for wall in (1.0, 1.1):
+        root().mu_unit.chambers.wall_mm = wall
         yield 3.0
+        shot(0.4)
+        yield from bent()
+        shot(0.8)
+    live.colour = "largest_stretch"
+    while bending.of(root()).shape is None or not bending.of(root()).shape.fields:
+        yield 0.5
+    yield 2.0
+    shot(1.2)
+    for kPa in (10.0, 20.0, 30.0, 40.0):
+        live.pressure_kPa = kPa
+        yield 1.5
         shot(0.3)
+    live.colour = "plain"
+    live.on = False
+    root().mu_unit.chambers.wall_mm = 0.9
+    yield 4.0
+
+
+def bent():
+    """Wait for all pressures of the coarse shape."""
+    yield 2.0
+    while bending.of(root()).shape is None or len(bending.of(root()).shape.pressure_kPa) < 5:
+        yield 0.5
+    yield 2.0
+
+
+def path():
+    props = root().mu_unit
     props.cut = True
     yield 5.0
-    shot(1.5)
+    shot(1.2)
     props.candidates = True
     yield 5.0
     shot(1.2)
@@ -70,7 +109,7 @@ def shape():
 
 def simulate():
     study = root().mu_unit.study
-    study.command, study.detail = "place", "quick"
+    study.command, study.detail = "place", "full"
     if RUNS:
         study.folder = RUNS
     stage = ""
@@ -96,6 +135,11 @@ def simulate():
 
 
 def results():
+    props = root().mu_unit
+    props.candidates = True
+    yield 4.0
+    shot(1.5)
+    props.candidates = False
     called(bpy.ops.mu.field_show, field="deviation_mm")
     yield 6.0
     shot(2.0)
@@ -145,7 +189,7 @@ def film():
 
 
 def session():
-    for part in (shape, simulate, results):
+    for part in (shape, bend, path, simulate, results):
         yield from part()
     film()
 
@@ -157,5 +201,6 @@ else:
     from simulated import called, module, parts, run
 
     unit_object, jobs = module("blender.unit.object"), module("blender.jobs.start_child")
+    bending, viewports = module("blender.live_bending.state"), module("blender.shared.viewports")
     SIMULATION = module("blender.simulate.job").SIMULATION
     run(session)

@@ -29,7 +29,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
                 "work without. Install the extension built for this Blender and system.",
                 "ERROR",
             )
-        elif lacking := missing_libraries():
+        elif root.mu_unit.study.detail == "full" and (lacking := missing_libraries()):
             text = (
                 f"Without {', '.join(lacking)} of this system a unit is meshed more slowly and less exactly."
             )

@@ -97,9 +97,10 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch):
 
 
 def test_a_missing_system_library_is_told_before_a_run(monkeypatch):
-    add()
-    assert "apt install" not in drawn()
+    root = add()
     monkeypatch.setitem(gmsh_libraries.SYSTEM_LIBRARIES, "libnone.so.1", "libnone1")
+    assert "apt install" not in drawn(), "the grid of the printed body needs no gmsh"
+    root.mu_unit.study.detail = "full"
     assert "Without libnone.so.1 of this system" in drawn()
     assert "apt install libnone1" in drawn()
 
