@@ -15,10 +15,12 @@ from mu_addon.fem.trajectory import simulate
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.candidates import candidate_paths
+from mu_addon.placement.candidates import Evaluation, candidate_paths
+from mu_addon.placement.deviation import centreline_deviation
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
 from mu_addon.usecases.simulate_and_place.job import Job
+from mu_addon.usecases.simulate_and_place.ranking import Ranking
 
 UNIT = load_preset("mu-1.0x")
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])
@@ -91,3 +93,11 @@ def test_what_is_solved_beside_model_a_is_kept_at_once(model_a, tmp_path):
     assert {p: p.stat().st_mtime_ns for p in kept} == before
     _, alone = swept(model_a, tmp_path / "alone")
     assert np.array_equal(found, alone)
+
+
+def test_the_mesh_check_of_printed_paths_takes_those_that_disturb_least():
+    deviations = {}
+    for (candidate, rule), offset in zip(JOBS, (0.3, 0.1, 0.2, 0.4), strict=True):
+        deviation = centreline_deviation(np.full((2, 3, 3), offset), np.zeros((2, 3, 3)))
+        deviations[candidate.name, rule] = Evaluation(candidate.name, rule, deviation, 1.0, 1.0)
+    assert Ranking(deviations).best(JOBS, 2) == [JOBS[1], JOBS[2]]

@@ -234,8 +234,9 @@ class CandidateSolver:
         setting = self._sweeper.setting
         points = np.empty((len(numbers), len(self._jobs), *self._anchors.shape))
         missing = []
-        for row, number in enumerate(numbers):
-            for part in self._parts:
+        # Part by part: a printed candidate's model serves all states that follow each other.
+        for part in self._parts:
+            for row, number in enumerate(numbers):
                 state = trajectory.solved[number]
                 kept = self._cache.get("sweep", self._name(state, part))
                 if kept is None or not self._is_kept(state, part):

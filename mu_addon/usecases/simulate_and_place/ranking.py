@@ -41,6 +41,10 @@ class Ranking:
         limit = self.uncertainty_mm.get(rule, 0.0)
         return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
 
+    def best(self, jobs: Sequence[tuple[Candidate, str]], count: int) -> list[tuple[Candidate, str]]:
+        """The `count` pairs of a path and a rule of least J_hat, the best first."""
+        return sorted(jobs, key=lambda one: self.evaluations[one[0].name, one[1]].deviation.J_hat)[:count]
+
     def write(self, folder: Path, job: Job, paths: Sequence[Candidate]) -> dict[str, Any]:
         """Write deviation.csv and delta.npz; return the figures of the summary. Raises OutputError."""
         chosen, rows, arrays = {}, [], {}

@@ -48,6 +48,9 @@ Array = np.ndarray[Any, Any]
 _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
+# Printed paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only
+# paths near the best can be tied with it.
+PATHS_CHECKED = 3
 
 
 @attrs.define
@@ -318,7 +321,10 @@ class Study:
         return found
 
     def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
-        """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures."""
+        """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures.
+
+        Of printed paths, the best `PATHS_CHECKED`.
+        """
         job, pressure = self.job, self.job.samples[1]
         coarse = attrs.evolve(job.mesh, refine=job.mesh.refine * COARSER)
         chosen = extremes(pressure)
@@ -328,6 +334,8 @@ class Study:
             # The history of contact or wall is of the whole protocol.
             samples = job.protocol.sample(job.times)
             instants = list(range(job.times))
+        if self.mesh is not None and self.mesh.resolved:
+            jobs = self.ranking.best(jobs, PATHS_CHECKED)
         with self.progress.stage("mesh check"):
             mesh = analysis_mesh(job, coarse, self.cache, self.progress.update, self.warn)
             model = job.model(mesh)
