@@ -235,9 +235,10 @@ def live():
     yield from new()
     yield from added(cut=False, path="")
     seen_from(20)
-    root().mu_live.on = True
-    while bending.of(root()).shape is None or len(bending.of(root()).shape.pressure_kPa) < 5:
+    root().mu_live.colour, root().mu_live.on = "largest_stretch", True
+    while bending.of(root()).shape is None or not bending.of(root()).shape.fields:
         yield 0.5
+    yield 5.0
     seen_from(20)
     yield 1.0
     shot("live")
@@ -299,12 +300,13 @@ def deviation():
 def stress():
     yield from new("MU_PT_results", "MU_PT_field", file="printed.blend")
     assert called(bpy.ops.mu.field_show, field="von_mises_kPa") == {"FINISHED"}
+    handles.to_pressure(root(), bpy.context.scene, 40.0)
     yield 3.0
-    over_view(0.4, 0.5)
+    over_view(0.48, 0.5)
     yield 1.0
     assert called(bpy.ops.mu.probe, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     yield 1.0
-    over_view(0.41, 0.5)
+    over_view(0.49, 0.5)
     yield 2.0
     shot("stress")
     key("ESC")

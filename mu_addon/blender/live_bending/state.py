@@ -9,7 +9,6 @@ from __future__ import annotations
 import shutil
 import time
 from contextlib import suppress
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ RESTS_S = 0.35
 TICK_S = 0.1
 
 
-@attrs.frozen(eq=False, slots=False)
+@attrs.frozen(eq=False)
 class Shape:
     """The unit's shapes (s, v, 3) in mm by region at pressures (s,), its triangles, and its angles (s,).
 
@@ -54,12 +53,13 @@ class Shape:
     fields: dict[str, dict[str, Any]]
     error: float
     finished: bool
+    _ends: dict[str, tuple[float, float] | None] = attrs.field(factory=dict, init=False)
 
-    @cached_property
-    def ends(self) -> dict[str, tuple[float, float]]:
-        """Range of each field over all pressures."""
-        names = {name for found in self.fields.values() for name in found}
-        return {name: colours.ends_of(self.fields, name) for name in names}
+    def ends(self, field: str) -> tuple[float, float] | None:
+        """Range of a field over all pressures, or None where it was not asked for."""
+        if field not in self._ends:
+            self._ends[field] = colours.ends_of(self.fields, field)
+        return self._ends[field]
 
     def share(self, kPa: float) -> Any:
         """Weights (s,) of the shapes at a pressure up to the largest one."""
@@ -68,7 +68,10 @@ class Shape:
 
 @attrs.define(eq=False)
 class Live:
-    """A unit's live bending: its process, the latest request, and the shape that answers it."""
+    """A unit's live bending: its process, the latest request, and the shape that answers it.
+
+    arrived: a shape that is shown at the next tick, so that the window draws between its reading and that.
+    """
 
     folder: Path
     child: Child | None = None
@@ -76,6 +79,7 @@ class Live:
     design: str = ""
     due_s: float | None = None
     shape: Shape | None = None
+    arrived: Shape | None = None
     trouble: str = ""
     _read_ns: int = 0
 
@@ -146,7 +150,7 @@ def _changed(root: Any) -> None:
     design = studies.design_of(root)
     if design == live.design:
         return
-    live.design, live.shape, live.trouble = design, None, ""
+    live.design, live.shape, live.arrived, live.trouble = design, None, None, ""
     live.due_s = time.monotonic() + RESTS_S if design else None
     _seen(root, False)
     _tick_soon()
@@ -193,11 +197,18 @@ def _tick() -> float | None:
         except MuError as error:
             live.trouble, live.due_s = error.what, None
             viewports.redraw()
+    if any(live.arrived for live in _every.values()):
+        return 0.0
     return TICK_S if any(live.due_s or live.child for live in _every.values()) else None
 
 
 def _follow(root: Any, live: Live) -> None:
     """Ask the process what is due, and show what it has found."""
+    if live.arrived is not None:
+        live.shape, live.arrived = live.arrived, None
+        place(root)
+        viewports.redraw()
+        return
     if start_child.is_busy():
         if live.child is not None:
             live.end()
@@ -254,8 +265,7 @@ def _answered(root: Any, live: Live) -> bool:
     if answer["trouble"]:
         live.trouble = answer["trouble"]
         return True
-    live.shape = _shape(root, read_motion(live.folder / answer["folder"]), answer)
-    place(root)
+    live.arrived = _shape(root, read_motion(live.folder / answer["folder"]), answer)
     return True
 
 
@@ -295,18 +305,24 @@ def pose(root: Any, shape: Shape) -> None:
     """Bend the shown parts to the pressure of the slider, and colour them as chosen."""
     share = shape.share(root.mu_live.pressure_kPa).astype(np.float32)
     field = root.mu_live.colour
+    ends = shape.ends(field)
     for part in parts(root):
         region = part[LIVE]
-        now = np.tensordot(share, shape.vertices[region], axes=1)
+        now = _mean(share, shape.vertices[region])
         if len(part.data.vertices) != len(now):
             continue
         part.data.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(now).ravel())
-        if field in shape.ends:
-            values = np.tensordot(share, shape.fields[region][field], axes=1)
-            colours.coloured(root, part, field, values, shape.ends[field])
+        if ends is not None:
+            values = _mean(share, shape.fields[region][field])
+            colours.coloured(root, part, field, values, ends)
         else:
             colours.plain(part, region)
         part.data.update()
+
+
+def _mean(share: Any, values: Any) -> Any:
+    # Not by BLAS, whose threads wait for each other on a busy machine.
+    return np.einsum("s,s...->...", share, values)
 
 
 def _seen(root: Any, seen: bool) -> None:

@@ -62,11 +62,11 @@ def _draw() -> None:
     scale = bpy.context.preferences.system.ui_scale
     left = legend.beside_tools(bpy.context.area) + legend.LEFT * scale
     legend.write(words(root), left, legend.BOTTOM * scale / 2.0, round(14 * scale))
-    ends = {} if live.shape is None else live.shape.ends
-    if root.mu_live.colour in ends and state.is_seen(root):
+    ends = None if live.shape is None else live.shape.ends(root.mu_live.colour)
+    if ends is not None and state.is_seen(root):
         # Beside the legend of motions that stand apart.
         left += 0.0 if legend.subject(bpy.context) is None else BESIDE * scale
-        legend.field_ramp(root, ends[root.mu_live.colour], scale, left)
+        legend.field_ramp(root, ends, scale, left)
         legend.above([field_colours.BY_NAME[root.mu_live.colour].title], scale, left)
 
 

@@ -12,11 +12,21 @@ import attrs
 import bpy
 import numpy as np
 
-from ...report.charts import MAP
 from ..preview import materials
 
-STOPS = 9
-"""Initial colours of the ramp; the user may change them, and the legend follows."""
+STOPS = (
+    (0.267, 0.005, 0.329),
+    (0.279, 0.175, 0.483),
+    (0.230, 0.322, 0.546),
+    (0.173, 0.449, 0.558),
+    (0.128, 0.567, 0.551),
+    (0.158, 0.684, 0.502),
+    (0.369, 0.789, 0.383),
+    (0.678, 0.864, 0.190),
+    (0.993, 0.906, 0.144),
+)
+"""Initial colours of the ramp, sRGB; the user may change them, and the legend follows. Those of the map of
+reports, written out: a window would stand still while matplotlib is imported."""
 TABLE = 128
 """Number of distinct colours in solid shading."""
 COLOUR = "mu_field_colour"
@@ -124,9 +134,10 @@ def _make(name: str) -> Any:
     for node, place in ((value, -900), (scaled, -700), (ramp, -500)):
         node.location = (place, 200)
     elements = ramp.color_ramp.elements
-    for number in range(STOPS):
-        at = number / (STOPS - 1)
-        element = elements[0] if number == 0 else elements[-1] if number == STOPS - 1 else elements.new(at)
+    last = len(STOPS) - 1
+    for number in range(len(STOPS)):
+        at = number / last
+        element = elements[0] if number == 0 else elements[-1] if number == last else elements.new(at)
         element.color = of_map(at)
     tree.links.new(value.outputs["Fac"], scaled.inputs["Value"])
     tree.links.new(scaled.outputs["Result"], ramp.inputs["Fac"])
@@ -162,9 +173,8 @@ def _copy_ramp(source: Any, target: Any) -> None:
 
 def of_map(share: float) -> tuple[float, float, float, float]:
     """Linear colour at a share 0 .. 1 of the map that reports use, too."""
-    import matplotlib
-
-    r, g, b, _ = matplotlib.colormaps[MAP](share)
+    places = np.linspace(0.0, 1.0, len(STOPS))
+    r, g, b = (float(np.interp(share, places, column)) for column in zip(*STOPS, strict=True))
     return _linear(r), _linear(g), _linear(b), 1.0
 
 

@@ -99,7 +99,7 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     root.mu_live.colour = "largest_stretch"
     bent(root, 5)
     coloured(root)
-    low, high = live.of(root).shape.ends["largest_stretch"]
+    low, high = live.of(root).shape.ends("largest_stretch")
     assert 1.0 <= low < 1.01 < high < 2.0
     most = painted(root, "largest_stretch").max()
     assert most > 1.01

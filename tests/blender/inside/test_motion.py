@@ -50,6 +50,15 @@ def moved(part):
     )
 
 
+def test_colours_are_those_of_reports():
+    import matplotlib
+
+    from mu_addon.report.charts import MAP
+
+    table = matplotlib.colormaps[MAP](np.linspace(0.0, 1.0, len(fields.STOPS)))
+    assert np.abs(table[:, :3] - fields.STOPS).max() < 1e-3
+
+
 def test_motion_plays_in_its_own_time_and_carries_its_fields(study):
     root = started(study)
     show(name="model_a")
