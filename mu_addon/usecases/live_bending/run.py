@@ -133,6 +133,9 @@ class LiveBending:
             study = read_study(self.folder / ASKED / str(number))
             for refine, error in LEVELS:
                 if refine != LEVELS[0][0]:
+                    if study.body is None:
+                        # Made before the next change asks for it.
+                        _ = self._levels[LEVELS[0][0]].drawn.morph
                     self._rest()
                 self._level(study, refine, error, float(request["pressure_kPa"]), bool(request["fields"]))
         except _Superseded:
@@ -189,7 +192,8 @@ class LiveBending:
                 drawn.study.unit.printed, unit.printed
             ):
                 with suppress(MeshingError, InputError):
-                    mesh = drawn.morph.to(unit)
+                    same = unit.printed == drawn.study.unit.printed
+                    mesh = drawn.mesh if same else drawn.morph.to(unit)
                     model = relocated(drawn.model, mesh)
                     model.load = study.effects.load(unit, mesh, model.device)
                     return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
