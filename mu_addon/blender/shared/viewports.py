@@ -11,6 +11,8 @@ from mathutils import Vector
 
 LOWER, SENSOR_MM = 0.6, 72.0
 """Usual ratio of a 3D view's height to its width, and the width in mm of its camera's sensor."""
+ROOM = 1.2
+"""Factor on what is framed, for headers that cover a view, and for a unit that bends."""
 
 
 def areas() -> Iterator[Any]:
@@ -21,19 +23,22 @@ def areas() -> Iterator[Any]:
                 yield area
 
 
-def frame(objects: Iterable[Any]) -> None:
-    """Frame objects in every 3D view, each from its own side; in background too, for saved files."""
+def frame(objects: Iterable[Any], only: Any | None = None) -> None:
+    """Frame objects in every 3D view or in one, from its own side; in background too, for saved files."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
     corners = np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    radius = float(np.linalg.norm(corners - middle, axis=1).max())
-    for area in areas():
+    radius = ROOM * float(np.linalg.norm(corners - middle, axis=1).max())
+    for area in areas() if only is None else (only,):
+        region = next(region for region in area.regions if region.type == "WINDOW")
+        # The narrower side; unknown in background.
+        share = min(region.height / region.width, 1.0) if min(region.height, region.width) > 1 else LOWER
         space = area.spaces.active
         view = space.region_3d
         view.view_location = middle
-        # Half the angle of the view is that of its width; it is lower than wide.
-        view.view_distance = radius / (LOWER * SENSOR_MM / (2.0 * space.lens))
+        # Half the angle of the view is that of its width.
+        view.view_distance = radius / (share * SENSOR_MM / (2.0 * space.lens))
         space.clip_start = min(space.clip_start, view.view_distance / 100.0)
         space.clip_end = max(space.clip_end, 10.0 * view.view_distance)
 
@@ -55,9 +60,7 @@ def frame_selected(context: Any) -> None:
     area = context.area if context.area and context.area.type == "VIEW_3D" else None
     area = area or next((a for a in context.screen.areas if a.type == "VIEW_3D"), None)
     if area is not None:
-        region = next(r for r in area.regions if r.type == "WINDOW")
-        with context.temp_override(area=area, region=region):
-            bpy.ops.view3d.view_selected()
+        frame(context.selected_objects, area)
 
 
 def redraw() -> None:
