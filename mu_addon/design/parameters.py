@@ -361,6 +361,14 @@ class Material:
         "Young's modulus E_sens of a virtual inclusion",
         "assumed: the paper says bulk-like and prints none; that of the membrane",
     )
+    elongation_at_break: float = quantity(
+        1.6,
+        "",
+        0.01,
+        20.0,
+        "elongation at break of the resin",
+        "assumed: the paper prints none; the datasheet of Elastic 50A as PMC10406103 reprints it",
+    )
 
     @property
     def lattice_modulus_MPa(self) -> float:

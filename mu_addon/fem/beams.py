@@ -31,6 +31,8 @@ SHEAR_FACTOR = 0.9
 _SMALL_ANGLE = 1e-2
 _SMALL_TURN = 0.1
 _EYE = np.eye(3)
+# The offset along a section's first axis goes with the turn about the second, and the other way round.
+_COUPLES = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 @attrs.frozen(eq=False)
@@ -86,6 +88,15 @@ class Beams:
     def strains(self, x: Array) -> Array:
         """Shears (2), stretch, curvatures (2) and twist in 1/mm, (e, 6), along and about the frame's axes."""
         return _State.of(self, x).strains
+
+    def end_loads(self, x: Array) -> tuple[Array, Array]:
+        """Axial forces (e,) in N, and both ends' bending moments (e, 2, 2) in N mm about the section's axes.
+
+        x (e, 12): the unknowns. The moment changes along an element as its shear force says.
+        """
+        stress = self._law(self.strains(x))[1] / self.length[:, None]
+        lever = 0.5 * self.length[:, None] * (stress[:, :2] @ _COUPLES)
+        return stress[:, 2], np.stack([stress[:, 3:5] + lever, stress[:, 3:5] - lever], axis=1)
 
     def _law(self, strains: Array) -> tuple[Array, Array, Array]:
         own = _law(strains, self.length, self.sections)
@@ -196,10 +207,8 @@ def _law(strains: Array, length: Array, s: Sections) -> tuple[Array, Array, Arra
     factor = np.stack([(1 + 2 / stretch**3) / (3 * stretch), -(1 / stretch**2 + 8 / stretch**5) / 3 * held])
     factor = np.vstack([factor, [(2 / stretch**3 + 40 / stretch**6) / 3 * held]])
     twisting = np.stack([1 / stretch, -held / stretch**2, 2 * held / stretch**3])
-    # The offset along the first axis goes with the turn about the second, and the other way round.
-    couples = np.array([[0.0, 1.0], [-1.0, 0.0]])
-    by_shear = s.offset[:, None] * shear + s.mixed[:, None] * turn @ couples.T
-    by_turn = s.turn[:, None] * turn + s.mixed[:, None] * shear @ couples
+    by_shear = s.offset[:, None] * shear + s.mixed[:, None] * turn @ _COUPLES.T
+    by_turn = s.turn[:, None] * turn + s.mixed[:, None] * shear @ _COUPLES
     bending = 0.5 * (np.einsum("ei,ei->e", by_shear, shear) + np.einsum("ei,ei->e", by_turn, turn))
     torsion = 0.5 * length * s.torsion * twist**2
     energy = length * s.axial * value + factor[0] * bending + twisting[0] * torsion
@@ -212,7 +221,7 @@ def _law(strains: Array, length: Array, s: Sections) -> tuple[Array, Array, Arra
     for k in range(2):
         moduli[:, k, k], moduli[:, 3 + k, 3 + k] = square * s.offset, square * s.turn
         for other in range(2):
-            moduli[:, k, 3 + other] = moduli[:, 3 + other, k] = square * s.mixed * couples[k, other]
+            moduli[:, k, 3 + other] = moduli[:, 3 + other, k] = square * s.mixed * _COUPLES[k, other]
     moduli[:, 2, 2] = length * s.axial * axial[2] + factor[2] * bending + twisting[2] * torsion
     moduli[:, 2, [0, 1, 3, 4]] = moduli[:, [0, 1, 3, 4], 2] = factor[1][:, None] * bent
     moduli[:, 5, 5] = twisting[0] * length * s.torsion

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import attrs
@@ -144,9 +144,33 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
     indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
     """
     octant = Octant(mesh, materials, box)
-    values, K = octant.tangent(np.zeros_like(mesh.nodes))
     C = np.zeros((6, 6))
     limit = np.zeros((6, 6))
+    for rows, affine, force, u, work in _responses(octant):
+        C[np.ix_(rows, rows)] = u.T @ work / octant.volume
+        limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
+    found = Elasticity((C + C.T) / 2, octant.relative_density)
+    _require_possible(found, octant, (limit + limit.T) / 2)
+    return found
+
+
+def strained(mesh: Mesh, materials: Materials) -> Array:
+    """Displacements (6, n, 3) in mm of a mesh, as `effective_tensor` takes it, under unit mean strains.
+
+    In Voigt's order, of engineering shears. Raises MeshingError where a piece is loose.
+    """
+    found = np.zeros((6, mesh.nodes.size))
+    for rows, _, _, u, _ in _responses(Octant(mesh, materials)):
+        found[list(rows)] = u.T
+    return found.reshape(6, -1, 3)
+
+
+def _responses(octant: Octant) -> Iterator[tuple[range, Array, Array, Array, Array]]:
+    """Rows of Voigt's order, and of each the affine motion, its forces, the motion and its forces, by column.
+
+    Motions (3 n, k) in mm of a unit mean strain, forces in N.
+    """
+    values, K = octant.tangent(np.zeros_like(octant.mesh.nodes))
     unit = np.eye(3)
     cases = [(octant.stretching, range(3), [np.outer(e, e) for e in unit])]
     for row, (a, b) in enumerate(SHEARS):
@@ -157,11 +181,7 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
         require_factor(part, values)
         force = K @ affine
         u = affine - part.solve(force)
-        C[np.ix_(rows, rows)] = u.T @ (K @ u) / octant.volume
-        limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
-    found = Elasticity((C + C.T) / 2, octant.relative_density)
-    _require_possible(found, octant, (limit + limit.T) / 2)
-    return found
+        yield rows, affine, force, u, K @ u
 
 
 def _require_possible(found: Elasticity, octant: Octant, limit: Array) -> None:

@@ -157,7 +157,7 @@ class Material:
         return rows
 
     def in_unit(self, unit: Unit) -> Unit:
-        """The unit with the moduli (kPa), law and memory of this material in its wall, else unchanged.
+        """The unit with the moduli (kPa), law, memory and elongation of this material, else unchanged.
 
         Raises InputError for another law than neo-Hooke or Yeoh, and where the law is unstable.
         """
@@ -176,6 +176,8 @@ class Material:
         material = attrs.evolve(
             unit.material, membrane_modulus_kPa=in_kPa(self.modulus_MPa), membrane_poisson=self.poisson
         )
+        if "elongation" in self.values:
+            material = attrs.evolve(material, elongation_at_break=self.values["elongation"].value / 100.0)
         return attrs.evolve(unit, material=material, wall=wall)
 
     def materials(self, count: int, factor: Any = 1.0) -> Materials:

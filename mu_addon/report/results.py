@@ -100,8 +100,10 @@ STRETCH_COLUMNS = (
     "y_mm",
     "z_mm",
     "exceeded_by_1_percent_of_volume",
+    "of_elongation_percent",
 )
-"""Columns of stretch.csv: the largest principal stretch of each part, and its position at rest."""
+"""Columns of stretch.csv: the largest principal stretch of each part, its position at rest, and the share of
+the resin's elongation at break that 1 % of the part's volume exceeds."""
 
 
 SELF_CONTACT_COLUMNS = (

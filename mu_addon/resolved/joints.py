@@ -18,8 +18,9 @@ import numpy as np
 from ..design.dimensions import Dimensions
 from ..design.lattices import LatticeKind
 from ..fem.beams import SHEAR_FACTOR
+from ..fem.elements import reference_gradients
 from ..fem.materials import Materials
-from ..homogenize.elasticity import effective_tensor
+from ..homogenize.elasticity import effective_tensor, strained
 from .strut import strut_mesh
 
 Array = np.ndarray[Any, Any]
@@ -78,6 +79,55 @@ def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
 
 
 @attrs.frozen
+class LocalFactors:
+    """Strain in a joint over that of its struts by beam theory where they leave it, stretched and bent.
+
+    A printed joint has sharp edges, where no mesh converges: the strain that 1 % of its volume exceeds.
+    error: relative, of their sum in a lattice that is sheared, whose struts are both.
+    """
+
+    stretched: float
+    bent: float
+    error: float
+
+
+def local_factors(d: Dimensions) -> LocalFactors:
+    """The local factors of joints of half diagonals, by their solid cell without grading; kept.
+
+    Of an equal strain along all axes, which stretches struts, and of opposite ones along two, which bends
+    them.
+    """
+    return _local_factors(
+        d.kind, round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
+    )
+
+
+@lru_cache(maxsize=8)
+def _local_factors(kind: LatticeKind, junction: float, midspan: float) -> LocalFactors:
+    strut, zones = _Strut(kind, junction, midspan), _zones(kind, junction, midspan)
+    mesh = strut_mesh(strut, RINGS, LAYERS)
+    count = len(mesh.tets)
+    unit = strained(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
+    along = mesh.nodes[mesh.tets[:, :4]].mean(axis=1) @ np.ones(3) / math.sqrt(3.0)
+    joint = (along < junction) | (along > strut.length - junction)
+    reference = reference_gradients(mesh.nodes, mesh.tets[joint])
+
+    def local(u: Array) -> float:
+        slope = np.einsum("eai,eqaj->eqij", u[mesh.tets[joint]], reference.gradients)
+        strain = np.linalg.eigvalsh((slope + np.swapaxes(slope, -1, -2)) / 2)[..., 2].ravel()
+        order = np.argsort(-strain)
+        volume = np.cumsum(reference.volumes.ravel()[order])
+        return float(strain[order][np.searchsorted(volume, 0.01 * volume[-1])])
+
+    pulled, across = strut.end_strains(zones)
+    # Offsets of a strut's ends: its length, and across it; of the shear a third and the rest of both.
+    stretched = local(unit[:3].sum(axis=0)) / (pulled * strut.length)
+    bent = local(unit[0] - unit[1]) / (across * strut.length * math.sqrt(2.0 / 3.0))
+    both = stretched * pulled * strut.length / 3.0 + bent * across * strut.length / math.sqrt(18.0)
+    return LocalFactors(stretched, bent, both / local(unit[3]) - 1.0)
+
+
+@attrs.frozen
 class _Strut:
     """A half diagonal of a cell of 1 mm, of a resin of 1 MPa."""
 
@@ -100,6 +150,19 @@ class _Strut:
             s,
             self.kind.radius(s / self.length, self.junction_diameter / 2, self.midspan_diameter / 2),
             span * w / 2,
+        )
+
+    def end_strains(self, zones: Zones) -> tuple[float, float]:
+        """Strains in 1/mm where a strut leaves its joints, of offsets along and across it of ends that do not
+        turn."""
+        stretch, bend = (zone * self.junction_diameter for zone in (zones.stretch, zones.bend))
+        places = np.array([stretch, bend]) / self.length
+        first, second = self.kind.radius(
+            places, self.junction_diameter / 2, self.midspan_diameter / 2
+        ).tolist()
+        lever = self.length / 2 - bend
+        return self.along(stretch) / (math.pi * first**2), 4 * lever * self.across(bend) / (
+            math.pi * second**3
         )
 
     def along(self, zone: float) -> float:

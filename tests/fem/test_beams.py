@@ -146,3 +146,20 @@ def test_a_tapered_cantilever_is_exact_with_one_element():
     sheared = 1 / (0.9 * 3.0 / 2.6 * area)
     expected = 1e-7 * w * ((10 - s) ** 2 / (3.0 * inertia) + sheared).sum()
     assert x[-1, 0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("way", [[0, 0, 10.0], [3.0, -4.0, 5.0]])
+def test_end_loads_of_a_tapered_cantilever_are_those_of_statics(way):
+    way = np.array(way)
+    length, axis = np.linalg.norm(way), way / np.linalg.norm(way)
+    # Integrals of some taper, thicker at its clamped end.
+    flexible = np.array([[4.0, 9.0, 30.0, 20.0, 300.0, 4.0]])
+    beams = Beams(
+        way[None], frames_along(way[None]), sections_of(np.array([length]), flexible, np.array([2.0]), 0.45)
+    )
+    across, pull = 1e-5 * np.cross(axis, [1.0, 2.0, 3.0]), 2e-5
+    x = bent(beams, np.r_[across + pull * axis, np.zeros(3)], 1)
+    axial, moments = beams.end_loads(x.reshape(1, -1))
+    assert axial == pytest.approx([pull], rel=5e-3)
+    assert np.linalg.norm(moments[0, 0]) == pytest.approx(length * np.linalg.norm(across), rel=1e-3)
+    assert np.linalg.norm(moments[0, 1]) < 1e-3 * np.linalg.norm(moments[0, 0])

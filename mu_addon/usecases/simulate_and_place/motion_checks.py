@@ -67,6 +67,14 @@ def doubts_of_motion(job: Job, mesh: Mesh, states: Sequence[State], summary: dic
     yield from _snaps(job, states)
     if job.lattice is not None:
         yield from _beyond_the_fit(job.lattice, mesh, states, summary)
+    most = summary.get("nearest_to_break", {})
+    if most.get("percent", 0.0) > 100.0:
+        x, y, z = most["place_mm"]
+        yield (
+            f"The {most['part']} near ({x:g}, {y:g}, {z:g}) mm would tear: at {most['pressure_kPa']:g} kPa "
+            f"the stretch takes {most['percent']:.3g} % of the resin's elongation at break, "
+            f"{100 * job.unit.material.elongation_at_break:g} %. Lower the pressure or thicken that part."
+        )
 
 
 def _walls_cross(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...design.body import covering
 from ...fem.bending_angle import TipSection
 from ...fem.state import State
 from ...fem.stress import peak_stretch
@@ -15,6 +16,7 @@ from ...files import write_csv
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
 from ...report.vtk import write_trajectory
+from ...resolved.joint_stretch import joint_stretch
 
 if TYPE_CHECKING:
     from ...fem.model import Model
@@ -74,18 +76,39 @@ def write_motion(folder: Path, job: Job, mesh: Mesh, states: Sequence[State]) ->
     return angles
 
 
-def write_stretch(folder: Path, mesh: Mesh, states: Sequence[State]) -> list[Row]:
-    """Write the largest stretches of wall and lattice in every state, and where; return the rows."""
+def write_stretch(folder: Path, job: Job, model: Model, states: Sequence[State]) -> list[Row]:
+    """Write the largest stretches of wall, struts and joints in every state, and where; return the rows.
+
+    A homogenised lattice has no share of the resin's elongation, nor joints.
+    """
+    mesh, elongation = model.mesh, job.unit.material.elongation_at_break
+    d = job.unit.printed if job.body is None else covering(job.unit.printed, job.body)
     rows: list[Row] = []
-    struts = "struts" if mesh.resolved else "homogenised lattice"
     for state in states:
-        for part, region in (("wall", MEMBRANE), (struts, LATTICE)):
-            peak = peak_stretch(mesh, state.u, region)
+        found = {"wall": peak_stretch(mesh, state.u, MEMBRANE)}
+        found["struts" if mesh.resolved else "homogenised lattice"] = peak_stretch(mesh, state.u, LATTICE)
+        joints = joint_stretch(model, job.materials(mesh), d, state.u) if len(mesh.beams) else None
+        if joints is not None:
+            found["joints"] = joints
+        for part, peak in found.items():
             place = (f"{x:.2f}" for x in peak.place_mm)
-            values = (f"{peak.largest:.4f}", *place, f"{peak.exceeded:.4f}")
+            of_resin = part == "wall" or mesh.resolved
+            share = f"{100.0 * (peak.exceeded - 1.0) / elongation:.3g}" if of_resin else ""
+            values = (f"{peak.largest:.4f}", *place, f"{peak.exceeded:.4f}", share)
             rows.append((f"{state.pressure_kPa:.6g}", part, *values))
     write_csv(folder / "stretch.csv", list(STRETCH_COLUMNS), rows)
     return rows
+
+
+def nearest_to_break(rows: Sequence[Row]) -> dict[str, Any]:
+    """Pressure, part, place and share in per cent of the elongation at break, of the largest share in rows of
+    `write_stretch`; empty without any."""
+    shares = [(float(row[-1]), row) for row in rows if row[-1]]
+    if not shares:
+        return {}
+    share, row = max(shares, key=lambda one: one[0])
+    place = [float(x) for x in row[3:6]]
+    return {"pressure_kPa": float(row[0]), "part": row[1], "place_mm": place, "percent": share}
 
 
 def write_self_contact(folder: Path, model: Model, states: Sequence[State]) -> tuple[list[Row], list[Array]]:

@@ -329,12 +329,20 @@ def _stretch(r: ReportData) -> str:
     html = "<h3>Stretch</h3>"
     if r.stretched is not None:
         html += _painted(r.stretched, 1.0, "largest principal stretch")
-    columns = ["largest stretch", "x [mm]", "y [mm]", "z [mm]", "1 % of volume exceeds"]
+    most = max((row for row in r.stretch if row[-1]), key=lambda row: float(row[-1]), default=None)
+    if most is not None:
+        html += (
+            f"<p>Nearest to tearing: the {most[1]} at {signed(most[0])} kPa, near "
+            f"({', '.join(map(signed, most[3:6]))}) mm, at {most[-1]} % of the resin's elongation at "
+            "break.</p>"
+        )
+    columns = ["largest stretch", "x [mm]", "y [mm]", "z [mm]", "1 % exceeds", "of elongation at break [%]"]
     head = [("pressure [kPa]", "n"), ("part", ""), *((name, "n") for name in columns)]
     rows = [([signed(row[0]), row[1], *map(signed, row[2:])], False) for row in r.stretch]
     return html + table(
-        "Largest principal stretch of each part without a sensor, and where it is at rest. Compare it with "
-        "the resin's elongation at break; the largest value depends on the mesh where a strut meets a wall.",
+        "Largest principal stretch of each part without a sensor, and where it is at rest; what 1 % of the "
+        "part's volume, or of the joints, exceeds, and its share of the elongation at break. The largest "
+        "value depends on the mesh where a strut meets a wall. Joints: by the loads on their struts' ends.",
         head,
         rows,
     )

@@ -44,7 +44,7 @@ FILES = {
     "mesh.vtu": "analysis mesh with regions and moduli",
     "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
     "angle.csv": "bending angle of every converged state",
-    "stretch.csv": "largest principal stretch of wall and lattice in every state, and where",
+    "stretch.csv": "largest stretch of wall, struts and joints in every state, and how near to break",
     "self_contact.csv": "force, gap and largest pressure of the unit's contact with itself in every state",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
     "deviation.csv": "deviation and rank of every path and rule",

@@ -37,7 +37,14 @@ from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_files import write_model_a
-from .motion_tables import Row, in_order, write_motion, write_self_contact, write_stretch
+from .motion_tables import (
+    Row,
+    in_order,
+    nearest_to_break,
+    write_motion,
+    write_self_contact,
+    write_stretch,
+)
 from .ranking import Ranking, extremes, mesh_change_mm, solve_candidates
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
@@ -254,7 +261,8 @@ class Study:
         if self.contact is not None:
             write_csv(folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
             summary["contact"] = self.contact.summary()
-        self.stretch = write_stretch(folder, mesh, states)
+        self.stretch = write_stretch(folder, job, model, states)
+        summary["nearest_to_break"] = nearest_to_break(self.stretch)
         self.self_contact, touching_kPa = write_self_contact(folder, model, states)
         if job.self_friction and model.self_contact is not None:
             # Of the whole unit, as the forces are.
