@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.parameters import HIGHEST_POISSON
 from ..errors import InputError
 from .coupon import Array, Coupon, binned, incompressible
 from .forms import Form
@@ -16,8 +17,8 @@ from .regression import Problem, best_exponents
 from .settings import WEIGHTS
 from .stability import Stability, check_stability, whole_ranges
 
-# Coupons do not determine the bulk modulus; this ratio is used for a nearly incompressible law.
-POISSON = 0.499
+# Coupons do not determine the bulk modulus; this ratio, the highest that a unit takes, sets it.
+POISSON = HIGHEST_POISSON
 # A law fails a mode whose stresses it misses by more than this share, norm over norm.
 TOLERANCE = 0.10
 # Relative weights never ask for more than this share of a coupon's largest stress.

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ..design.assets import asset_file, asset_names
+from ..design.parameters import HIGHEST_POISSON
 from ..design.quantity import in_kPa
 from ..design.toml_text import nearest, parse, place
 from ..design.wall import Wall, require_used
@@ -21,6 +22,7 @@ from ..files import write_text
 from ..reading import file_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
+from .forms import with_bulk
 from .stability import Stability, check_stability, whole_ranges
 
 if TYPE_CHECKING:
@@ -159,7 +161,8 @@ class Material:
     def in_unit(self, unit: Unit) -> Unit:
         """The unit with the moduli (kPa), law, memory and elongation of this material, else unchanged.
 
-        Raises InputError for another law than neo-Hooke or Yeoh, and where the law is unstable.
+        Raises InputError for another law than neo-Hooke or Yeoh, a Poisson's ratio above HIGHEST_POISSON, and
+        where the law is unstable.
         """
         if self.law not in (laws.NeoHooke, laws.Yeoh):
             raise InputError(
@@ -168,13 +171,23 @@ class Material:
                 "fit Yeoh's law: fit-material --laws yeoh",
             )
         self.require_stable()
+        # Twelve digits of a ratio survive the way over kappa.
+        poisson = round(self.poisson, 12)
+        if poisson > HIGHEST_POISSON:
+            # Its four digits must not lead above the bound.
+            most = with_bulk(self.law, self.parameters, HIGHEST_POISSON - 1e-5)[self.law.bulk]
+            raise InputError(
+                f"{self.name} has Poisson's ratio {poisson:.6g}, a wall takes {HIGHEST_POISSON:g} at most",
+                "[law] parameters",
+                f"write kappa_MPa = {most:.4g}, or {HIGHEST_POISSON:g} in [poisson]",
+            )
         wall = self.wall
         if self.law is laws.Yeoh:
             c1, c2, c3, _ = self.parameters.tolist()
             law = "yeoh" if wall.law == "neo-hooke" else wall.law
             wall = attrs.evolve(wall, law=law, c2_over_c1=c2 / c1, c3_over_c1=c3 / c1)
         material = attrs.evolve(
-            unit.material, membrane_modulus_kPa=in_kPa(self.modulus_MPa), membrane_poisson=self.poisson
+            unit.material, membrane_modulus_kPa=in_kPa(self.modulus_MPa), membrane_poisson=poisson
         )
         if "elongation" in self.values:
             material = attrs.evolve(material, elongation_at_break=self.values["elongation"].value / 100.0)

@@ -1,19 +1,33 @@
 """A wall with a law of its own: limits of what it remembers, through a study's own job."""
 
 import json
+import re
+from pathlib import Path
 
 import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.parameters import Chambers, Unit, from_toml, read_unit, to_toml, write_unit
+from mu_addon.design.parameters import (
+    HIGHEST_POISSON,
+    Chambers,
+    Unit,
+    from_toml,
+    read_unit,
+    to_toml,
+    write_unit,
+)
 from mu_addon.design.wall import Wall
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
+from mu_addon.materials.coupon import Coupon
+from mu_addon.materials.fit import POISSON, fit_coupons
+from mu_addon.materials.forms import FORMS
 from mu_addon.materials.library import load_material, material_text, parse_material
+from mu_addon.measured import read_folder
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
@@ -23,6 +37,7 @@ from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.study import Study
 
+ROOT = Path(__file__).parents[2]
 BASE = Unit(chambers=Chambers(count=3))
 MESH = MeshSettings(order=1, refine=0.4)
 STAGES = ("design", "simulate")
@@ -249,3 +264,29 @@ def test_a_resin_of_the_library_makes_a_wall():
     )
     with pytest.raises(InputError, match="cannot have the Mooney-Rivlin law"):
         parse_material(ogden).in_unit(BASE)
+
+
+def fitted_text(name):
+    """A material file of a law fitted to Treloar's rubber."""
+    coupons = [Coupon.of(e) for e in read_folder(ROOT / "tests" / "data" / "treloar").experiments]
+    fit = fit_coupons(FORMS[name], coupons)
+    mine = attrs.evolve(parse_material(YEOH), law=fit.form.law, parameters=fit.parameters)
+    return material_text(mine)
+
+
+@pytest.mark.parametrize("name", ["neo-hooke", "yeoh"])
+def test_a_law_fitted_to_coupons_goes_into_a_wall(name):
+    resin = parse_material(fitted_text(name))
+    unit = resin.in_unit(BASE)
+    assert unit.material.membrane_poisson == POISSON
+    assert unit.material.membrane_modulus_kPa == pytest.approx(1e3 * resin.modulus_MPa)
+    assert from_toml(to_toml(unit)) == unit
+
+
+def test_a_law_too_stiff_in_volume_is_refused_with_the_bulk_modulus_that_is_taken():
+    stiff = YEOH.replace("kappa_MPa = 10.0", "kappa_MPa = 1000.0")
+    with pytest.raises(InputError, match=r"wall takes 0\.499 at most") as caught:
+        parse_material(stiff).in_unit(BASE)
+    given = re.search(r"kappa_MPa = [\d.]+", caught.value.remedy)[0]
+    unit = parse_material(YEOH.replace("kappa_MPa = 10.0", given)).in_unit(BASE)
+    assert unit.material.membrane_poisson == pytest.approx(HIGHEST_POISSON, abs=2e-5)
