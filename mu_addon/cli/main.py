@@ -123,9 +123,11 @@ def main(arguments: list[str]) -> int:
 
     # Imported late, so that --help answers at once.
     from ..run.context import run_to_end
+    from ..run.heartbeat import to_watcher
     from ..run.progress import Progress, printable
+    from ..run.supervisor import say
 
-    progress = Progress([sink_of(options)])
+    progress = Progress([sink_of(options), to_watcher(say)])
     with run_to_end(progress) as context:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)

@@ -6,11 +6,16 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import MuError
 from ..run.supervisor import CRASHED, Crash, supervised
+
+if TYPE_CHECKING:
+    from ..run.heartbeat import Heartbeat
+    from ..run.progress import Sink
 
 _UNWATCHED = ("presets", "ports", "stream", "record", "replay")
 """Commands without a solver: a recording writes its data to disk before anything else."""
@@ -31,12 +36,36 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
     at_once = not line or line[0] in _UNWATCHED or line[0].startswith("-") or {"-h", "--help"} & {*line}
     # Blender has threads, whose locks a fork would copy as they are.
     if not at_once and "bpy" not in sys.modules:
-        return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input)
+        return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input, _heartbeat(line).hear)
     if ends_with_input:
         from ..run.processes import end_with_input
 
         end_with_input()
     return work()
+
+
+def _heartbeat(line: Sequence[str]) -> Heartbeat:
+    """What shows that a silent worker of a command line goes on; the line is parsed where that is needed."""
+    from ..run.heartbeat import Heartbeat
+
+    @cache
+    def options() -> Any:
+        from .main import parser
+
+        return parser().parse_args(list(line))
+
+    @cache
+    def sink() -> Sink:
+        from .main import sink_of
+
+        return sink_of(options())
+
+    def between(words: str) -> None:
+        if not getattr(options(), "json", False) and not options().quiet:
+            sys.stderr.write(f"{words}\n")
+            sys.stderr.flush()
+
+    return Heartbeat(lambda message: sink()(message), between)
 
 
 def tell_crash(line: Sequence[str], crash: Crash) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import faulthandler
 import os
+import select
 import signal
 import sys
 import threading
@@ -30,6 +31,8 @@ GRACE_S = {signal.SIGTERM: 1.0, signal.SIGINT: 2.5}
 library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _watcher: list[int] = []
+_said_to: list[int] = []
+"""File descriptor for what a worker says to its watcher."""
 _stack_to: list[int] = []
 """File descriptor for Python's stack of a crashing worker: the end of the pipe to its watcher."""
 
@@ -50,13 +53,17 @@ class Crash(NamedTuple):
 
 
 def supervised(
-    work: Callable[[], int], tell: Callable[[Crash], object], ends_with_input: bool = False
+    work: Callable[[], int],
+    tell: Callable[[Crash], object],
+    ends_with_input: bool = False,
+    hear: Callable[[bytes], object] | None = None,
 ) -> int:
     """Run `work` in a fork of this process; return its exit status, or `CRASHED` if it gave none.
 
     A worker that does not end within `GRACE_S` of Ctrl-C or SIGTERM is killed: status 128 + that signal.
     tell: called in this process, after an unreported end. ends_with_input: end both once standard input
-    closes. Without fork (Windows), or if the system refuses one, `work` runs in this process.
+    closes. hear: gets what the worker will `say`, and b"" after each second without a word. Without fork
+    (Windows), or if the system refuses one, `work` runs in this process.
     """
     if not hasattr(os, "fork"):
         return _alone(work, ends_with_input)
@@ -64,8 +71,8 @@ def supervised(
         stream.flush()
     # Linux closes what a process that ends has open from the highest number down. The group has to be told
     # before the worker is gone, through which it is told.
-    ends = *os.pipe(), *os.pipe(), *os.pipe()
-    alive, keep_alive, group_alive, keep_group, status_read, status_write = ends
+    ends = *os.pipe(), *os.pipe(), *os.pipe(), *os.pipe()
+    alive, keep_alive, group_alive, keep_group, status_read, status_write, said_read, said_write = ends
     passed_on = {getattr(signal, name) for name in _PASSED_ON}
     # Until both have their own handlers, neither may receive a signal.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
@@ -77,12 +84,12 @@ def supervised(
             os.close(end)
         return _alone(work, ends_with_input)
     if not worker:
-        for end in (keep_group, keep_alive, status_read):
+        for end in (keep_group, keep_alive, status_read, said_read):
             os.close(end)
-        _become_worker(group_alive, alive, status_write)
+        _become_worker(group_alive, alive, status_write, said_write)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         return _report_status(work, status_write)
-    for end in (group_alive, alive, status_write):
+    for end in (group_alive, alive, status_write, said_write):
         os.close(end)
     asked: list[int] = []
     before = _pass_on_signals(worker, asked)
@@ -90,7 +97,7 @@ def supervised(
     if ends_with_input:
         end_with_input()
     try:
-        _, ended, usage = os.wait4(worker, 0)
+        ended, usage = _wait_for(worker, said_read, hear)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         os.set_blocking(status_read, False)
         report = b""
@@ -100,8 +107,25 @@ def supervised(
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        for end in (keep_group, keep_alive, status_read):
+        for end in (keep_group, keep_alive, status_read, said_read):
             os.close(end)
+
+
+def _wait_for(worker: int, said: int, hear: Callable[[bytes], object] | None) -> tuple[int, Any]:
+    """Wait until a worker has ended, and hear what it says meanwhile; its wait status and usage."""
+    while True:
+        if hear is not None:
+            ready, _, _ = select.select([said], [], [], 1.0)
+            words = os.read(said, 1 << 16) if ready else b""
+            if ready and not words:
+                # Nobody is left who could speak.
+                hear = None
+            else:
+                hear(words)
+        # Processes of its own may keep the pipe open.
+        number, ended, usage = os.wait4(worker, 0 if hear is None else os.WNOHANG)
+        if number:
+            return ended, usage
 
 
 def _alone(work: Callable[[], int], ends_with_input: bool) -> int:
@@ -138,7 +162,7 @@ def _outcome(report: bytes, ended: int, usage: Any, asked: int, tell: Callable[[
     return 128 + asked if asked else CRASHED
 
 
-def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
+def _become_worker(group_alive: int, alive: int, status_write: int, said_write: int) -> None:
     # A group of its own: what a terminal sends comes once, from who watches.
     os.setpgid(0, 0)
     # A terminal may stop whoever writes from another group than its own.
@@ -146,7 +170,17 @@ def _become_worker(group_alive: int, alive: int, status_write: int) -> None:
     _watcher[:] = [os.getppid()]
     _end_with(group_alive, alive)
     _stack_to[:] = [status_write]
+    # Words are dropped rather than waited for: who watches may be paused.
+    os.set_blocking(said_write, False)
+    _said_to[:] = [said_write]
     write_stack_at_crash()
+
+
+def say(words: bytes) -> None:
+    """Tell the process that watches this one, its `hear`, something; no effect without one."""
+    for descriptor in _said_to:
+        with suppress(OSError):
+            os.write(descriptor, words)
 
 
 def watcher() -> int:
