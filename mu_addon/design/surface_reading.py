@@ -174,6 +174,8 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         header = head[: head.index(b"end_header")]
         if re.search(rb"element vertex +0\s", header):
             raise ValueError("it has no points")
+        if re.search(rb"(?m)^element .*\n(comment.*\n)*(element |\Z)", header):
+            raise ValueError("an element of its header has no properties")
         if header.count(b"property list") > 1:
             return _ply_of_lists(content)
         mesh = read_buffer(io.BytesIO(content))

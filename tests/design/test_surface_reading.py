@@ -108,6 +108,12 @@ def test_every_dialect_brings_the_same_column(name):
         ("a.stl", stl(CORNERS)[:-60], "corner"),
         ("a.stl", "triangles of mine", "no STL"),
         ("a.ply", ply().decode()[:-20], "truncated or malformed"),
+        ("a.ply", ply().decode().replace("element face", "element edge 2\nelement face"), "no properties"),
+        (
+            "a.ply",
+            ply().decode().replace("end_header", "element edge 2\ncomment x\nend_header"),
+            "no properties",
+        ),
     ],
 )
 def test_what_is_damaged_is_refused_and_not_half_read(name, text, words):
