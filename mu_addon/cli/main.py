@@ -125,9 +125,9 @@ def main(arguments: list[str]) -> int:
     from ..run.context import run_to_end
     from ..run.heartbeat import to_watcher
     from ..run.progress import Progress, printable
-    from ..run.supervisor import say
+    from ..run.supervisor import send
 
-    progress = Progress([sink_of(options), to_watcher(say)])
+    progress = Progress([sink_of(options), to_watcher(send)])
     with run_to_end(progress) as context:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)

@@ -22,8 +22,8 @@ _LEFT = ("seconds_left", "whole_seconds_left")
 _KEPT = ("type", "stage", "state", "fraction", "seconds", *_LEFT, "whole", "why")
 
 
-def to_watcher(say: Callable[[bytes], object], clock: Callable[[], float] = time.monotonic) -> Sink:
-    """A sink that tells who watches what runs, by `say`; running fractions at most twice a second."""
+def to_watcher(send: Callable[[bytes], object], clock: Callable[[], float] = time.monotonic) -> Sink:
+    """A sink that tells who watches what runs, by `send`; running fractions at most twice a second."""
     last = -1.0
 
     def sink(message: Message) -> None:
@@ -33,7 +33,7 @@ def to_watcher(say: Callable[[bytes], object], clock: Callable[[], float] = time
                 return
             last = clock()
         kept = {key: message[key] for key in _KEPT if key in message}
-        say(json.dumps(plain(kept)).encode() + b"\n")
+        send(json.dumps(plain(kept)).encode() + b"\n")
 
     return sink
 
@@ -63,7 +63,9 @@ class Heartbeat:
                     message = json.loads(line)
                     if message["type"] == "progress":
                         self._message, self._at = message, now
-            self._shown = now
+                    # A terminal shows running fractions every few seconds only.
+                    if message.get("state") != "run" or now - self._shown >= BEAT_S:
+                        self._shown = now
         elif now - self._shown >= PATIENCE_S:
             self._shown = now
             with suppress(OSError):

@@ -31,7 +31,7 @@ GRACE_S = {signal.SIGTERM: 1.0, signal.SIGINT: 2.5}
 library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _watcher: list[int] = []
-_said_to: list[int] = []
+_messages_to: list[int] = []
 """File descriptor for what a worker says to its watcher."""
 _stack_to: list[int] = []
 """File descriptor for Python's stack of a crashing worker: the end of the pipe to its watcher."""
@@ -62,7 +62,7 @@ def supervised(
 
     A worker that does not end within `GRACE_S` of Ctrl-C or SIGTERM is killed: status 128 + that signal.
     tell: called in this process, after an unreported end. ends_with_input: end both once standard input
-    closes. hear: gets what the worker will `say`, and b"" after each second without a word. Without fork
+    closes. hear: gets what the worker will `send`, and b"" after each second without a word. Without fork
     (Windows), or if the system refuses one, `work` runs in this process.
     """
     if not hasattr(os, "fork"):
@@ -72,7 +72,7 @@ def supervised(
     # Linux closes what a process that ends has open from the highest number down. The group has to be told
     # before the worker is gone, through which it is told.
     ends = *os.pipe(), *os.pipe(), *os.pipe(), *os.pipe()
-    alive, keep_alive, group_alive, keep_group, status_read, status_write, said_read, said_write = ends
+    alive, keep_alive, group_alive, keep_group, status_read, status_write, message_read, message_write = ends
     passed_on = {getattr(signal, name) for name in _PASSED_ON}
     # Until both have their own handlers, neither may receive a signal.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, passed_on)
@@ -84,12 +84,12 @@ def supervised(
             os.close(end)
         return _alone(work, ends_with_input)
     if not worker:
-        for end in (keep_group, keep_alive, status_read, said_read):
+        for end in (keep_group, keep_alive, status_read, message_read):
             os.close(end)
-        _become_worker(group_alive, alive, status_write, said_write)
+        _become_worker(group_alive, alive, status_write, message_write)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         return _report_status(work, status_write)
-    for end in (group_alive, alive, status_write, said_write):
+    for end in (group_alive, alive, status_write, message_write):
         os.close(end)
     asked: list[int] = []
     before = _pass_on_signals(worker, asked)
@@ -97,7 +97,7 @@ def supervised(
     if ends_with_input:
         end_with_input()
     try:
-        ended, usage = _wait_for(worker, said_read, hear)
+        ended, usage = _wait_for(worker, message_read, hear)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         os.set_blocking(status_read, False)
         report = b""
@@ -107,16 +107,16 @@ def supervised(
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        for end in (keep_group, keep_alive, status_read, said_read):
+        for end in (keep_group, keep_alive, status_read, message_read):
             os.close(end)
 
 
-def _wait_for(worker: int, said: int, hear: Callable[[bytes], object] | None) -> tuple[int, Any]:
+def _wait_for(worker: int, messages: int, hear: Callable[[bytes], object] | None) -> tuple[int, Any]:
     """Wait until a worker has ended, and hear what it says meanwhile; its wait status and usage."""
     while True:
         if hear is not None:
-            ready, _, _ = select.select([said], [], [], 1.0)
-            words = os.read(said, 1 << 16) if ready else b""
+            ready, _, _ = select.select([messages], [], [], 1.0)
+            words = os.read(messages, 1 << 16) if ready else b""
             if ready and not words:
                 # Nobody is left who could speak.
                 hear = None
@@ -162,7 +162,7 @@ def _outcome(report: bytes, ended: int, usage: Any, asked: int, tell: Callable[[
     return 128 + asked if asked else CRASHED
 
 
-def _become_worker(group_alive: int, alive: int, status_write: int, said_write: int) -> None:
+def _become_worker(group_alive: int, alive: int, status_write: int, message_write: int) -> None:
     # A group of its own: what a terminal sends comes once, from who watches.
     os.setpgid(0, 0)
     # A terminal may stop whoever writes from another group than its own.
@@ -171,14 +171,14 @@ def _become_worker(group_alive: int, alive: int, status_write: int, said_write: 
     _end_with(group_alive, alive)
     _stack_to[:] = [status_write]
     # Words are dropped rather than waited for: who watches may be paused.
-    os.set_blocking(said_write, False)
-    _said_to[:] = [said_write]
+    os.set_blocking(message_write, False)
+    _messages_to[:] = [message_write]
     write_stack_at_crash()
 
 
-def say(words: bytes) -> None:
+def send(words: bytes) -> None:
     """Tell the process that watches this one, its `hear`, something; no effect without one."""
-    for descriptor in _said_to:
+    for descriptor in _messages_to:
         with suppress(OSError):
             os.write(descriptor, words)
 

@@ -71,10 +71,10 @@ def test_the_last_step_is_repeated_with_its_time_gone_on(clock):
 def test_words_come_in_pieces_of_any_size_and_nonsense_is_left_out(clock):
     shown = []
     heart = Heartbeat(shown.append, shown.append, clock)
-    said = []
-    progress = Progress([to_watcher(said.append, clock)], clock)
+    lines = []
+    progress = Progress([to_watcher(lines.append, clock)], clock)
     with progress.stage("mesh"):
-        for byte in b"".join([b"no message\n", *said]):
+        for byte in b"".join([b"no message\n", *lines]):
             heart.hear(bytes([byte]))
         clock.now += PATIENCE_S
         heart.hear(b"")
