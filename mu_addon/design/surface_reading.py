@@ -21,9 +21,15 @@ _CAD = "in the CAD program export the solid as STL, in mm, with a chord error of
 _BLENDER = "open it in Blender and export the part as STL"
 _OTHERS = (
     (
+        b"; ",
+        (".gcode", ".gco", ".bgcode", ".ufp", ".sl1", ".sl1s", ".ctb", ".cbddlp", ".photon", ".pwmx", ".goo"),
+        "a job for a printer, sliced",
+        "give the part that was sliced, as STL",
+    ),
+    (
         b"PK\x03\x04",
         (".3mf", ".amf"),
-        "an archive, as a 3MF",
+        "an archive, as a 3MF, or an AMF",
         "open it in a slicer and export the part as STL",
     ),
     (b"ISO-10303-21", (".step", ".stp"), "a STEP file", _CAD),
