@@ -16,6 +16,7 @@ SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
 # Who reads without a limit, and why that is no file from elsewhere.
 UNLIMITED = {
     "mu_addon/reading.py": "sets the limits",
+    "mu_addon/run/heartbeat.py": "what the worker it watches says, over a pipe",
     "mu_addon/blender/printing/panel.py": "a property of the scene",
     "mu_addon/blender/printing/state.py": "the STL written for a check the moment before",
     "mu_addon/blender/shared/operators.py": "a text that the user opens in Blender",
