@@ -373,6 +373,14 @@ class Material:
     )
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters that a file states: a default elongation keeps the hash of units from before it."""
+        every = [d.name for d in describe(Material)]
+        if self.elongation_at_break == attrs.fields(Material).elongation_at_break.default:
+            every.remove("elongation_at_break")
+        return tuple(every)
+
+    @property
     def lattice_modulus_MPa(self) -> float:
         """Effective Young's modulus of the lattice in MPa."""
         return in_MPa(self.lattice_modulus_kPa)
@@ -543,7 +551,8 @@ def assumed(unit: Unit) -> list[Assumption]:
 def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
     """Section, description and value of every parameter in use, in the order of the unit's file.
 
-    Parameters of the wall that its law does not use are left out, and those of a grading that change nothing.
+    Those that a section's `names` leaves out are not: of a wall those that its law does not use, of a grading
+    those that change nothing, of a material a default that came later.
     """
     for section in SECTIONS:
         values = getattr(unit, _attribute(section))

@@ -106,6 +106,17 @@ STRETCH_COLUMNS = (
 the resin's elongation at break that 1 % of the part's volume exceeds."""
 
 
+def nearest_to_break(rows: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """Pressure, part, place and share in per cent of the elongation at break, of the largest share in rows of
+    STRETCH_COLUMNS; empty without any."""
+    shares = [(float(row[-1]), row) for row in rows if row[-1]]
+    if not shares:
+        return {}
+    share, row = max(shares, key=lambda one: one[0])
+    place = [float(x) for x in row[3:6]]
+    return {"pressure_kPa": float(row[0]), "part": row[1], "place_mm": place, "percent": share}
+
+
 SELF_CONTACT_COLUMNS = (
     "pressure_kPa",
     "force_N",
@@ -273,6 +284,7 @@ class ReportData:
     light: Signals | None = None
     contact: ContactHistory | None = None
     stretch: Sequence[tuple[Any, ...]] = ()  # rows of STRETCH_COLUMNS
+    elongation_at_break: float = 0.0  # of the resin, as a ratio
     stretched: PaintedStates | None = None
     self_contact: Sequence[tuple[str, ...]] = ()  # rows of SELF_CONTACT_COLUMNS
     self_friction: Mapping[str, float] | None = None  # coefficient, and lost_mJ over the protocol

@@ -7,11 +7,11 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.results import nearest_to_break
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.motion_checks import doubts_of_motion
-from mu_addon.usecases.simulate_and_place.motion_tables import nearest_to_break
 from mu_addon.usecases.simulate_and_place.study import Study
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)

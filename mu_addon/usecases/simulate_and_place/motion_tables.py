@@ -82,7 +82,7 @@ def write_stretch(folder: Path, job: Job, model: Model, states: Sequence[State])
     A homogenised lattice has no share of the resin's elongation, nor joints.
     """
     mesh, elongation = model.mesh, job.unit.material.elongation_at_break
-    d = job.unit.printed if job.body is None else covering(job.unit.printed, job.body)
+    d = covering(job.unit.printed, job.body)
     rows: list[Row] = []
     for state in states:
         found = {"wall": peak_stretch(mesh, state.u, MEMBRANE)}
@@ -98,17 +98,6 @@ def write_stretch(folder: Path, job: Job, model: Model, states: Sequence[State])
             rows.append((f"{state.pressure_kPa:.6g}", part, *values))
     write_csv(folder / "stretch.csv", list(STRETCH_COLUMNS), rows)
     return rows
-
-
-def nearest_to_break(rows: Sequence[Row]) -> dict[str, Any]:
-    """Pressure, part, place and share in per cent of the elongation at break, of the largest share in rows of
-    `write_stretch`; empty without any."""
-    shares = [(float(row[-1]), row) for row in rows if row[-1]]
-    if not shares:
-        return {}
-    share, row = max(shares, key=lambda one: one[0])
-    place = [float(x) for x in row[3:6]]
-    return {"pressure_kPa": float(row[0]), "part": row[1], "place_mm": place, "percent": share}
 
 
 def write_self_contact(folder: Path, model: Model, states: Sequence[State]) -> tuple[list[Row], list[Array]]:

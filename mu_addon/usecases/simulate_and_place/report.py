@@ -17,7 +17,7 @@ from ...files import write_text
 from ...report import charts as plots
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
-from ...report.results import PaintedStates, ReportData, RuleResult
+from ...report.results import PaintedStates, ReportData, RuleResult, nearest_to_break
 from ...run.progress import spell
 from .light_charts import front_chart, response_chart
 
@@ -329,13 +329,13 @@ def _stretch(r: ReportData) -> str:
     html = "<h3>Stretch</h3>"
     if r.stretched is not None:
         html += _painted(r.stretched, 1.0, "largest principal stretch")
-    most = max((row for row in r.stretch if row[-1]), key=lambda row: float(row[-1]), default=None)
-    if most is not None:
-        html += (
-            f"<p>Nearest to tearing: the {most[1]} at {signed(most[0])} kPa, near "
-            f"({', '.join(map(signed, most[3:6]))}) mm, at {most[-1]} % of the resin's elongation at "
-            "break.</p>"
+    if most := nearest_to_break(r.stretch):
+        place = ", ".join(f"{x:.2f}" for x in most["place_mm"])
+        words = (
+            f"Nearest to tearing: the {most['part']} at {most['pressure_kPa']:g} kPa, near ({place}) mm, at "
+            f"{most['percent']:.3g} % of the resin's elongation at break, {100 * r.elongation_at_break:g} %."
         )
+        html += f"<p>{signed(words)}</p>"
     columns = ["largest stretch", "x [mm]", "y [mm]", "z [mm]", "1 % exceeds", "of elongation at break [%]"]
     head = [("pressure [kPa]", "n"), ("part", ""), *((name, "n") for name in columns)]
     rows = [([signed(row[0]), row[1], *map(signed, row[2:])], False) for row in r.stretch]

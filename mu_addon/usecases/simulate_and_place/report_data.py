@@ -122,6 +122,7 @@ def report_data(
         light=study.light,
         contact=study.contact,
         stretch=tuple(study.stretch),
+        elongation_at_break=job.unit.material.elongation_at_break,
         stretched=_painted(study, "largest_stretch", 1.0, 0.01, "stretch"),
         self_contact=tuple(study.self_contact),
         self_friction=study.context.summary.get("self_friction"),

@@ -22,7 +22,7 @@ from ...meshing.mesh import Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...reading import file_bytes, parse_json
-from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals
+from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
 from ...report.vtk import write_mesh
 from ...resolved.lattice import strut_volume_mm3
 from ...run.cache import Cache
@@ -37,14 +37,7 @@ from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_files import write_model_a
-from .motion_tables import (
-    Row,
-    in_order,
-    nearest_to_break,
-    write_motion,
-    write_self_contact,
-    write_stretch,
-)
+from .motion_tables import Row, in_order, write_motion, write_self_contact, write_stretch
 from .ranking import Ranking, extremes, mesh_change_mm, solve_candidates
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
