@@ -305,8 +305,13 @@ def require_path_inside(body: Body, unit: Unit, window: Window) -> None:
         )
 
 
-def covering(d: Dimensions, body: Body) -> Dimensions:
-    """Dimensions with enough cells in the envelope to contain the body, to which the lattice is then cut."""
+def covering(d: Dimensions, body: Body | None) -> Dimensions:
+    """Dimensions with enough cells in the envelope to contain the body, to which the lattice is then cut.
+
+    Without a body those given.
+    """
+    if body is None:
+        return d
     low, high = body.bounds
     half_x = _cells(max(-low[0], high[0]), d.cell)
     return attrs.evolve(

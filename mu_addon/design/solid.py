@@ -87,10 +87,9 @@ def build_solid(
     if quality not in QUALITY:
         raise InputError(f"there is no quality {quality!r}", "quality", f"choose one of {', '.join(QUALITY)}")
     d, facets = unit.dimensions, QUALITY[quality]
-    if body is not None:
-        if isinstance(path, Window):
-            require_path_inside(body, unit, path)
-        d = covering(d, body)
+    if body is not None and isinstance(path, Window):
+        require_path_inside(body, unit, path)
+    d = covering(d, body)
     offset = _drawn_offset(d, take_off)
     xy, z = (0.0, 0.0) if offset is None else (float(offset[0]), float(offset[2]))
     n = facets.around_axis

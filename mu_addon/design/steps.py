@@ -266,7 +266,7 @@ def _membranes(given: StepInputs, profile: Array, cavity: Array | None) -> Secti
 
 def _cells(given: StepInputs, profile: Array) -> Graph:
     d = given.unit.dimensions
-    return graph_of(d if given.body is None else covering(d, given.body))
+    return graph_of(covering(d, given.body))
 
 
 def _trim(given: StepInputs, profile: Array, graph: Graph | None) -> TrimmedStruts | None:
@@ -327,7 +327,7 @@ def _wells(given: StepInputs, path: Path | None) -> Bar | None:
     if path is None:
         return None
     d = given.unit.dimensions
-    return waveguide(given.unit, path.window, d if given.body is None else covering(d, given.body))
+    return waveguide(given.unit, path.window, covering(d, given.body))
 
 
 def _without_wells(given: StepInputs, path: Path | None) -> Bar | None:

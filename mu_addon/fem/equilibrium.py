@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -19,8 +19,10 @@ from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
 from .pattern import Pattern
-from .self_contact import SelfContact
 from .state import State, extrapolate, rest
+
+if TYPE_CHECKING:
+    from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
 

@@ -121,14 +121,18 @@ def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
         largest = np.where(share < 0.5, 0.0, largest)
     element, point = np.unravel_index(largest.argmax(), largest.shape)
     shape = shape_functions(tet_quadrature(mesh.order)[0], mesh.order)[point]
-    order = np.argsort(-largest, axis=None)
-    above = np.cumsum(volumes.ravel()[order])
-    rank = np.searchsorted(above, 0.01 * above[-1])
     return PeakStretch(
         float(largest.max()),
         shape @ mesh.nodes[mesh.tets[elements[element]]],
-        float(largest.ravel()[order[rank]]),
+        exceeded(largest, volumes),
     )
+
+
+def exceeded(values: Array, volumes: Array) -> float:
+    """The value that 1 % of a volume exceeds, of values and volumes at points, of one shape."""
+    order = np.argsort(-values, axis=None)
+    above = np.cumsum(volumes.ravel()[order])
+    return float(values.ravel()[order[np.searchsorted(above, 0.01 * above[-1])]])
 
 
 class NodalMean:

@@ -1,4 +1,4 @@
-"""Stretch in joints of struts that are beams, from the loads on their ends and the joint's local factor."""
+"""Stretch in joints of struts that are beams, from their ends' loads and the joint's strain concentration."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.stress import PeakStretch
 from ..meshing.mesh import LATTICE, Array
-from .joints import local_factors, zones_of
+from .joints import concentration_factors, zones_of
 
 # Distance from a joint in cells within which a beam's end is at it.
 _AT = 1e-6
@@ -20,14 +20,15 @@ def joint_stretch(model: Model, materials: Materials, d: Dimensions, u: Array) -
     """The largest stretch in a joint under displacements u (n, 3) in mm; None where no beam ends in a joint.
 
     d: dimensions of the lattice's box. Of each strut's end, of small strain: 1 + Ka N/(E A) + Kb M r/(E I)
-    with its `local_factors`, where the strut leaves the joint's rigid zone. exceeded: by 1 % of the ends.
+    with its `concentration_factors`, where the strut leaves the joint's rigid zone. exceeded: by 1 % of the
+    ends.
     """
     from scipy.spatial import cKDTree
 
     mesh, beams = model.mesh, model.beams_of(materials)
     if beams is None:
         return None
-    lattice, factors = lattice_of(d), local_factors(d)
+    lattice, factors = lattice_of(d), concentration_factors(d)
     ends = mesh.beams[:, 0::2]
     away, joint = cKDTree(lattice.nodes).query(mesh.nodes[ends])
     beam, side = np.nonzero(away < _AT * d.cell)

@@ -20,8 +20,10 @@ from ..design.lattices import LatticeKind
 from ..fem.beams import SHEAR_FACTOR
 from ..fem.elements import reference_gradients
 from ..fem.materials import Materials
+from ..fem.stress import exceeded
 from ..homogenize.elasticity import effective_tensor, strained
-from .strut import strut_mesh
+from ..meshing.mesh import Mesh
+from .strut import radius_of, strut_mesh
 
 Array = np.ndarray[Any, Any]
 
@@ -56,9 +58,12 @@ class Zones:
 
 def zones_of(d: Dimensions) -> Zones:
     """The zones of a lattice of half diagonals, by its solid cell without grading; kept for the process."""
-    # Lengths in cells: a unit's scale changes nothing.
-    ratios = round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
-    return _zones(d.kind, *ratios)
+    return _zones(*_shape(d))
+
+
+def _shape(d: Dimensions) -> tuple[LatticeKind, float, float]:
+    """Kind and diameters in cells: a unit's scale changes nothing."""
+    return d.kind, round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
 
 
 @lru_cache(maxsize=32)
@@ -66,9 +71,7 @@ def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
     from scipy.optimize import brentq
 
     strut = _Strut(kind, junction, midspan)
-    mesh = strut_mesh(strut, RINGS, LAYERS)
-    count = len(mesh.tets)
-    solid = effective_tensor(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
+    solid = effective_tensor(*strut.octant())
     half = 0.5
     across = half * (solid.C11 - solid.C12)
     along = 3 * (half * solid.C44 - across / 6)
@@ -79,10 +82,11 @@ def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
 
 
 @attrs.frozen
-class LocalFactors:
-    """Strain in a joint over that of its struts by beam theory where they leave it, stretched and bent.
+class ConcentrationFactors:
+    """Strain concentration factors: strain in a joint over its struts', by beam theory where they leave it.
 
-    A printed joint has sharp edges, where no mesh converges: the strain that 1 % of its volume exceeds.
+    stretched, bent: of struts that are one of both. A printed joint has sharp edges, where no mesh converges:
+    the strain that 1 % of its volume exceeds.
     error: relative, of their sum in a lattice that is sheared, whose struts are both.
     """
 
@@ -91,40 +95,35 @@ class LocalFactors:
     error: float
 
 
-def local_factors(d: Dimensions) -> LocalFactors:
-    """The local factors of joints of half diagonals, by their solid cell without grading; kept.
+def concentration_factors(d: Dimensions) -> ConcentrationFactors:
+    """The factors of joints of half diagonals, by their solid cell without grading; kept for the process.
 
     Of an equal strain along all axes, which stretches struts, and of opposite ones along two, which bends
     them.
     """
-    return _local_factors(
-        d.kind, round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
-    )
+    return _concentration_factors(*_shape(d))
 
 
 @lru_cache(maxsize=8)
-def _local_factors(kind: LatticeKind, junction: float, midspan: float) -> LocalFactors:
+def _concentration_factors(kind: LatticeKind, junction: float, midspan: float) -> ConcentrationFactors:
     strut, zones = _Strut(kind, junction, midspan), _zones(kind, junction, midspan)
-    mesh = strut_mesh(strut, RINGS, LAYERS)
-    count = len(mesh.tets)
-    unit = strained(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
+    mesh, materials = strut.octant()
+    unit = strained(mesh, materials)
     along = mesh.nodes[mesh.tets[:, :4]].mean(axis=1) @ np.ones(3) / math.sqrt(3.0)
     joint = (along < junction) | (along > strut.length - junction)
     reference = reference_gradients(mesh.nodes, mesh.tets[joint])
 
     def local(u: Array) -> float:
         slope = np.einsum("eai,eqaj->eqij", u[mesh.tets[joint]], reference.gradients)
-        strain = np.linalg.eigvalsh((slope + np.swapaxes(slope, -1, -2)) / 2)[..., 2].ravel()
-        order = np.argsort(-strain)
-        volume = np.cumsum(reference.volumes.ravel()[order])
-        return float(strain[order][np.searchsorted(volume, 0.01 * volume[-1])])
+        strain = np.linalg.eigvalsh((slope + np.swapaxes(slope, -1, -2)) / 2)[..., 2]
+        return exceeded(strain, reference.volumes)
 
     pulled, across = strut.end_strains(zones)
     # Offsets of a strut's ends: its length, and across it; of the shear a third and the rest of both.
     stretched = local(unit[:3].sum(axis=0)) / (pulled * strut.length)
     bent = local(unit[0] - unit[1]) / (across * strut.length * math.sqrt(2.0 / 3.0))
     both = stretched * pulled * strut.length / 3.0 + bent * across * strut.length / math.sqrt(18.0)
-    return LocalFactors(stretched, bent, both / local(unit[3]) - 1.0)
+    return ConcentrationFactors(stretched, bent, both / local(unit[3]) - 1.0)
 
 
 @attrs.frozen
@@ -141,29 +140,26 @@ class _Strut:
         """Length from the cell's corner to its centre."""
         return math.sqrt(3.0) / 2
 
+    def octant(self) -> tuple[Mesh, Materials]:
+        """The solid octant of the cell, and its resin."""
+        mesh = strut_mesh(self, RINGS, LAYERS)
+        count = len(mesh.tets)
+        return mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON))
+
     def _sections(self, zone: float) -> tuple[Array, Array, Array]:
         """Positions, radii and weights along the part between rigid zones."""
         x, w = np.polynomial.legendre.leggauss(64)
         span = self.length - 2 * zone
         s = zone + span * (1 + x) / 2
-        return (
-            s,
-            self.kind.radius(s / self.length, self.junction_diameter / 2, self.midspan_diameter / 2),
-            span * w / 2,
-        )
+        return s, radius_of(self)(s / self.length), span * w / 2
 
     def end_strains(self, zones: Zones) -> tuple[float, float]:
         """Strains in 1/mm where a strut leaves its joints, of offsets along and across it of ends that do not
         turn."""
         stretch, bend = (zone * self.junction_diameter for zone in (zones.stretch, zones.bend))
-        places = np.array([stretch, bend]) / self.length
-        first, second = self.kind.radius(
-            places, self.junction_diameter / 2, self.midspan_diameter / 2
-        ).tolist()
-        lever = self.length / 2 - bend
-        return self.along(stretch) / (math.pi * first**2), 4 * lever * self.across(bend) / (
-            math.pi * second**3
-        )
+        first, second = radius_of(self)(np.array([stretch, bend]) / self.length).tolist()
+        moment = (self.length / 2 - bend) * self.across(bend)
+        return self.along(stretch) / (math.pi * first**2), 4 * moment / (math.pi * second**3)
 
     def along(self, zone: float) -> float:
         """Axial stiffness in N/mm."""

@@ -53,8 +53,7 @@ def struts(
     with `rings` elements to half a strut's diameter, and the folder `cache` keeps it. body: a closed surface
     that cuts the lattice in place of its box. The mesh has `filled`, and no element that is all cut away.
     """
-    if body is not None:
-        d = covering(d, body)
+    d = covering(d, body)
     if d.grading is not None and not is_half_diagonal(d):
         raise InputError(
             f"graded struts of lattice {d.kind.name!r} are not meshed: only swept half diagonals can be",
@@ -87,7 +86,7 @@ def strut_volume_mm3(unit: Unit, body: Body | None = None) -> float:
     """Volume in mm3 of a unit's struts outside its actuator, of the drawn solid by manifold3d."""
     from manifold3d import Manifold, OpType
 
-    d = unit.printed if body is None else covering(unit.printed, body)
+    d = covering(unit.printed, body)
     facets = QUALITY["export"]
     solid = lattice_solid(d, lattice_of(d), facets)
     if body is not None:

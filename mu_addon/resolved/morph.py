@@ -59,7 +59,7 @@ class PrintedMorph:
         turns = np.unique(mesh.beams[:, 1::2])
         # Rotation vectors of beams are the last nodes, and follow the others.
         self._struts = mesh.nodes[count : len(mesh.nodes) - len(turns)]
-        covered = self._covering(a)
+        covered = covering(a, body)
         self._graph = graph_of(covered)
         self._lattice = with_struts(self._graph, covered)
         self._swept = SweptNodes(self._lattice, self._struts) if is_half_diagonal(a) else None
@@ -112,7 +112,7 @@ class PrintedMorph:
     def _with_struts(self, wall: Array, d: Dimensions) -> tuple[Array, Array]:
         """Nodes (n, 3) in mm of a wall (w, 3) and the struts of other dimensions, and the flexibility (e, 6)
         of beams; raises InputError."""
-        mesh, other = self.mesh, with_struts(self._graph, self._covering(d))
+        mesh, other = self.mesh, with_struts(self._graph, covering(d, self._body))
         struts = self._struts_of(d, other)
         nodes = np.vstack([wall, struts])
         if self._layers is None or self._beams is None:
@@ -134,9 +134,6 @@ class PrintedMorph:
                 "choose body-centred or body-centred-straight",
             )
         return self._struts
-
-    def _covering(self, d: Dimensions) -> Dimensions:
-        return d if self._body is None else covering(d, self._body)
 
     def _cut_elements(self, d: Dimensions) -> tuple[Array, Array]:
         """Elements (k,) that the wall's profile cuts, and a mask (k, p) of their points outside a body."""

@@ -111,7 +111,7 @@ def mesh_printed(
             'choose order 2, or fidelity "homogenised"',
         )
     d = unit.printed
-    own = d if body is None else covering(d, body)
+    own = covering(d, body)
     # The wall's law is that of struts, too, and beams have no memory.
     beams = s.fidelity != SOLID and is_half_diagonal(d) and not unit.wall.has_memory
     sizes = (sizes or Sizes()).refined(s.refine)

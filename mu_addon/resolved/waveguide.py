@@ -33,7 +33,7 @@ def bar_of(unit: Unit, path: Window | ArrayLike, body: Body | None = None) -> Ba
     body: a closed surface that cuts the lattice in place of its box. Raises InputError for a path that no
     waveguide fits, and for struts that it would thicken in a lattice that is not swept (`strut_mesh`).
     """
-    d = _dimensions(unit, body)
+    d = covering(unit.printed, body)
     bar = waveguide(unit, path, d)
     if not is_half_diagonal(d) and is_thickening(d, bar):
         raise InputError(
@@ -61,7 +61,7 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
             "path, --fraction",
             "mesh the whole unit, or choose a window of anchors",
         )
-    d = _dimensions(unit, body)
+    d = covering(unit.printed, body)
     found, wall_ties = _thickened(mesh, bar, d, body)
     struts = found.region == LATTICE
     outside: list[Depth] = [partial(outside_bar, bar), *(partial(outside_seat, seat) for seat in bar.seats)]
@@ -114,10 +114,6 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     )
     check_positive(whole)
     return whole
-
-
-def _dimensions(unit: Unit, body: Body | None) -> Dimensions:
-    return unit.printed if body is None else covering(unit.printed, body)
 
 
 def _thickened(mesh: Mesh, bar: Bar, d: Dimensions, body: Body | None) -> tuple[Mesh, Ties]:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..files import plain
-from .progress import BEAT_S, Message, Sink, spell
+from .progress import BEAT_S, Message, Sink, seldom, spell
 
 PATIENCE_S = BEAT_S + 1.5
 """Seconds without a message after which the watcher repeats the last: a worker's own beats come before."""
@@ -24,18 +24,12 @@ _KEPT = ("type", "stage", "state", "fraction", "seconds", *_LEFT, "whole", "why"
 
 def to_watcher(send: Callable[[bytes], object], clock: Callable[[], float] = time.monotonic) -> Sink:
     """A sink that tells who watches what runs, by `send`; running fractions at most twice a second."""
-    last = -1.0
 
     def sink(message: Message) -> None:
-        nonlocal last
-        if message.get("state") == "run":
-            if clock() - last < 0.5:
-                return
-            last = clock()
         kept = {key: message[key] for key in _KEPT if key in message}
         send(json.dumps(plain(kept)).encode() + b"\n")
 
-    return sink
+    return seldom(sink, 0.5, clock)
 
 
 class Heartbeat:

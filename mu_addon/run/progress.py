@@ -348,18 +348,27 @@ def spell(seconds: float) -> str:
 
 def json_lines(stream: TextIO = sys.stdout, clock: Clock = time.perf_counter) -> Sink:
     """A sink for programs: every message as one line of JSON, running fractions at most five a second."""
-    last = -1.0
 
     def sink(message: Message) -> None:
-        nonlocal last
-        if message.get("state") == "run":
-            if clock() - last < 0.2:
-                return
-            last = clock()
         stream.write(_json_line(message))
         stream.flush()
 
-    return sink
+    return seldom(sink, 0.2, clock)
+
+
+def seldom(sink: Sink, every_s: float, clock: Clock) -> Sink:
+    """The sink, with running fractions no more often than every `every_s` seconds."""
+    last = -every_s
+
+    def thinned(message: Message) -> None:
+        nonlocal last
+        if message.get("state") == "run":
+            if clock() - last < every_s:
+                return
+            last = clock()
+        sink(message)
+
+    return thinned
 
 
 def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
@@ -367,16 +376,8 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
 
     Raises OutputError where the file cannot be written, at once and later.
     """
-    last = -5.0
 
     def sink(message: Message) -> None:
-        nonlocal last
-        if message.get("beat"):
-            return
-        if message.get("state") == "run":
-            if clock() - last < 5.0:
-                return
-            last = clock()
         stamped = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), **plain(message)}
         try:
             with path.open("ab", buffering=0) as stream:
@@ -393,4 +394,5 @@ def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
                     append_lines(stream, b"\n")
     except OSError as error:
         raise output_error(error, path) from error
-    return sink
+    thinned = seldom(sink, 5.0, clock)
+    return lambda message: None if message.get("beat") else thinned(message)

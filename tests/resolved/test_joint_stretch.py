@@ -12,6 +12,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.joint_stretch import joint_stretch
+from mu_addon.resolved.joints import concentration_factors
 from mu_addon.resolved.unit import mesh_printed
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
@@ -54,6 +55,11 @@ def test_joints_stretch_as_those_of_the_solid_cell(body, strain, of_cell, within
     found = joint_stretch(*body, UNIT.printed, strained(*body, SMALL * strain))
     assert (found.exceeded - 1.0) / SMALL == pytest.approx(of_cell, rel=within)
     assert cKDTree(lattice_of(UNIT.printed).nodes).query(found.place_mm)[0] < 1e-6
+
+
+def test_a_sheared_lattice_tells_the_error_of_both_factors_together():
+    factors = concentration_factors(UNIT.printed)
+    assert factors.error == pytest.approx(-0.162, abs=0.005)
 
 
 def test_compression_alone_tears_nothing(body):

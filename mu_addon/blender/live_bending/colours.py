@@ -26,7 +26,7 @@ def ends_of(fields: dict[str, dict[str, Any]], field: str) -> tuple[float, float
 
 def plain(part: Any, region: str) -> None:
     """Give a part the colours of the design."""
-    _wear(part, materials.material(_LOOKS[region]))
+    materials.wear(part.data, materials.material(_LOOKS[region]))
     left = part.data.color_attributes.get(field_colours.COLOUR)
     if left is not None:
         part.data.color_attributes.remove(left)
@@ -40,18 +40,10 @@ def coloured(root: Any, part: Any, field: str, values: Any, ends: tuple[float, f
         found = field_colours.material_of(root).copy()
         found.name = name
     field_colours.set_range(found, field, ends)
-    _wear(part, found)
+    materials.wear(part.data, found)
     attribute = part.data.attributes.get(field) or part.data.attributes.new(field, "FLOAT", "POINT")
     attribute.data.foreach_set("value", np.ascontiguousarray(values, np.float32))
     field_colours.write_colours(root, part.data, values, ends)
-
-
-def _wear(part: Any, material: Any) -> None:
-    slots = part.data.materials
-    if not slots:
-        slots.append(material)
-    elif slots[0] != material:
-        slots[0] = material
 
 
 def show(on: bool) -> None:

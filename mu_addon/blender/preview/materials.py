@@ -60,6 +60,15 @@ def shining(found):
     return found
 
 
+def wear(mesh, material) -> None:
+    """Give a mesh a material in its first slot."""
+    slots = mesh.materials
+    if not slots:
+        slots.append(material)
+    elif slots[0] != material:
+        slots[0] = material
+
+
 def assign(mesh, *names: str) -> None:
     """Give a mesh these materials in its slots, in order, if it has none yet."""
     if not mesh.materials:

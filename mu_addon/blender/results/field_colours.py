@@ -197,12 +197,7 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
     found = material_of(root)
     set_range(found, settings.field, (settings.low, settings.high))
     for part, carries in parts:
-        wanted = found if carries else materials.material(_PLAIN)
-        slots = part.data.materials
-        if not slots:
-            slots.append(wanted)
-        elif slots[0] != wanted:
-            slots[0] = wanted
+        materials.wear(part.data, found if carries else materials.material(_PLAIN))
 
 
 def set_range(material: Any, field: str, ends: tuple[float, float]) -> None:

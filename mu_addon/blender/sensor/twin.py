@@ -143,11 +143,7 @@ def _colour(root: Any, state: str) -> None:
     """Colours of a state; written only where they change."""
     for part in parts(root):
         name = _COLOURS.get(state) or _LOOKS[state][part[TWIN]]
-        slots = part.data.materials
-        if not slots:
-            slots.append(materials.material(name))
-        elif slots[0] is None or slots[0].name != name:
-            slots[0] = materials.material(name)
+        materials.wear(part.data, materials.material(name))
 
 
 @persistent
