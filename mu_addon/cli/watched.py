@@ -36,7 +36,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
     at_once = not line or line[0] in _UNWATCHED or line[0].startswith("-") or {"-h", "--help"} & {*line}
     # Blender has threads, whose locks a fork would copy as they are.
     if not at_once and "bpy" not in sys.modules:
-        return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input, _heartbeat(line).hear)
+        return supervised(work, lambda crash: tell_crash(line, crash), ends_with_input, _heartbeat(line))
     if ends_with_input:
         from ..run.processes import end_with_input
 
@@ -44,9 +44,17 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
     return work()
 
 
-def _heartbeat(line: Sequence[str]) -> Heartbeat:
-    """What shows that a silent worker of a command line goes on; the line is parsed where that is needed."""
-    from ..run.heartbeat import Heartbeat
+def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
+    """What hears the worker of a command line, and shows that it goes on where it is silent.
+
+    Loaded once there is something to hear: the worker starts first, and says which package is missing.
+    """
+
+    @cache
+    def heartbeat() -> Heartbeat:
+        from ..run.heartbeat import Heartbeat
+
+        return Heartbeat(lambda message: sink()(message), between)
 
     @cache
     def options() -> Any:
@@ -65,7 +73,11 @@ def _heartbeat(line: Sequence[str]) -> Heartbeat:
             sys.stderr.write(f"{words}\n")
             sys.stderr.flush()
 
-    return Heartbeat(lambda message: sink()(message), between)
+    def hear(words: bytes) -> None:
+        with suppress(ModuleNotFoundError):
+            heartbeat().hear(words)
+
+    return hear
 
 
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
