@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ..design.quantity import in_kPa
+from ..errors import ConvergenceError
 from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
@@ -68,3 +69,17 @@ def rest(mesh: Mesh) -> State:
     A body with weight has no such state; use `Equilibrium.at_zero_pressure`.
     """
     return State(0.0, np.zeros_like(mesh.nodes))
+
+
+def as_far_as_found(solve: Callable[[Callable[[State], None]], object]) -> list[State]:
+    """States of a solution up to the first that it does not find; ConvergenceError if it finds none.
+
+    solve: raises ConvergenceError, and calls the function it is given with each state before that.
+    """
+    found: list[State] = []
+    try:
+        solve(found.append)
+    except ConvergenceError:
+        if not found:
+            raise
+    return found

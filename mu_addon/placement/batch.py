@@ -13,7 +13,7 @@ from ..fem.laws import NeoHooke
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import CONTACT_NEWTON, NewtonSettings
-from ..fem.state import State
+from ..fem.state import State, as_far_as_found
 from ..fem.time_stepping import simulate_in_time
 
 Array = np.ndarray[Any, Any]
@@ -47,20 +47,23 @@ class CandidateBatch:
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Monitored points (s, p, 3) in mm of one sensor's unit along its whole path through some pressures.
 
-        pressures_MPa (s,): visited in order from the state without pressure. Raises ConvergenceError.
+        pressures_MPa (s,): visited in order from the state without pressure, as far as there is an
+        equilibrium; ConvergenceError if at none of them.
         """
-        equilibrium = self._batched_newton.alone(number)
-        return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
+        one = self._batched_newton.alone(number)
+        start = one.at_zero_pressure()
+        return self.points(as_far_as_found(lambda keep: one.path(pressures_MPa, start, keep)))
 
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Monitored points (k, p, 3) in mm of one sensor's unit at k instants, in the order of time.
 
         time_s (k,) ascending, pressure_kPa (k,). For models with history: friction on obstacles, or a law
-        with history. Raises InputError where time runs backward, and ConvergenceError.
+        with history. As far as there is an equilibrium; raises ConvergenceError if at no instant, and
+        InputError where time runs backward.
         """
-        equilibrium = self._batched_newton.alone(number)
-        equilibrium.settings = CONTACT_NEWTON
-        return self.points(simulate_in_time(equilibrium, time_s, pressure_kPa).states)
+        one = self._batched_newton.alone(number)
+        one.settings = CONTACT_NEWTON
+        return self.points(as_far_as_found(lambda keep: simulate_in_time(one, time_s, pressure_kPa, keep)))
 
     def at(self, state: State) -> Array:
         """Monitored points (sensors, p, 3) in mm of every sensor's unit, at a state of Model A.

@@ -13,6 +13,7 @@ Array = np.ndarray[Any, Any]
 def centreline(points: Array, stations: int) -> Array:
     """Positions (k, j, 3) in mm at j uniform normalised arc lengths of polylines (k, N, 3) in mm.
 
+    NaN at times of NaN.
     Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to [0, 1], the usual
     stand-in for arc length before the curve is known.
 
@@ -23,8 +24,10 @@ def centreline(points: Array, stations: int) -> Array:
     from scipy.interpolate import CubicSpline
 
     at = np.linspace(0.0, 1.0, stations)
-    curves = np.empty((len(points), stations, 3))
+    curves = np.full((len(points), stations, 3), np.nan)
     for m, polyline in enumerate(points):
+        if np.isnan(polyline).any():
+            continue
         chord = np.linalg.norm(np.diff(polyline, axis=0), axis=1)
         length = np.concatenate([[0.0], np.cumsum(chord)])
         spline = CubicSpline(length / length[-1], polyline)
@@ -45,8 +48,8 @@ class Deviation:
     """Distance Delta (k, j) in mm between two centrelines at k times and j stations, and its means in mm.
 
     over_time (k,): mean over length; over_length (j,): mean over time; J_hat: mean of all; J_cont: root
-    mean square by trapezoidal integration. Source: the paper's ||r_alpha - r_A|| and its discrete and
-    continuous objectives.
+    mean square by trapezoidal integration. Times that are not compared are NaN and in no mean. Source: the
+    paper's ||r_alpha - r_A|| and its discrete and continuous objectives.
     """
 
     delta: Array
@@ -70,13 +73,15 @@ def deviation_of(delta: Array) -> Deviation:
     """Marginal means and objectives in mm of distances Delta (k, j) in mm at k times and j stations."""
     from scipy.integrate import trapezoid
 
-    k, j = delta.shape
-    square = trapezoid(trapezoid(delta**2, np.linspace(0, 1, j), axis=1), np.linspace(0, 1, k))
+    over_time = delta.mean(axis=1)
+    compared = delta[np.isfinite(over_time)]
+    k, j = compared.shape
+    square = trapezoid(trapezoid(compared**2, np.linspace(0, 1, j), axis=1), np.linspace(0, 1, k))
     return Deviation(
         delta=delta,
-        over_time=delta.mean(axis=1),
-        over_length=delta.mean(axis=0),
-        J_hat=float(delta.mean()),
+        over_time=over_time,
+        over_length=compared.mean(axis=0),
+        J_hat=float(compared.mean()),
         J_cont=float(np.sqrt(square)),
     )
 

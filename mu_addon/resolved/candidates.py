@@ -18,7 +18,7 @@ from ..fem.equilibrium import Equilibrium
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
-from ..fem.state import State
+from ..fem.state import State, as_far_as_found
 from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh, part
 from .start import eased, numbers_of, started
@@ -80,18 +80,20 @@ class PrintedWaveguides:
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm of one candidate along its whole path through pressures (s,), from rest.
 
-        Raises ConvergenceError.
+        As far as it has an equilibrium; ConvergenceError if at none of them.
         """
-        equilibrium = self._equilibrium(number)
-        return self.points(equilibrium.path(pressures_MPa, equilibrium.at_zero_pressure()))
+        one = self._equilibrium(number)
+        start = one.at_zero_pressure()
+        return self.points(as_far_as_found(lambda keep: one.path(pressures_MPa, start, keep)))
 
     def simulated_in_time(self, number: int, time_s: Array, pressure_kPa: Array) -> Array:
         """Anchors (k, p, 3) in mm of one candidate at k instants, each from the one before.
 
-        time_s (k,), pressure_kPa (k,): as `simulate_in_time` takes them. Raises ConvergenceError.
+        time_s (k,), pressure_kPa (k,): as `simulate_in_time` takes them. As far as it has an equilibrium;
+        ConvergenceError if at none of them.
         """
-        motion = simulate_in_time(self._equilibrium(number), time_s, pressure_kPa)
-        return self.points(motion.states)
+        one = self._equilibrium(number)
+        return self.points(as_far_as_found(lambda keep: simulate_in_time(one, time_s, pressure_kPa, keep)))
 
     def points(self, states: Sequence[State]) -> Array:
         """Anchors (s, p, 3) in mm moved by some states."""

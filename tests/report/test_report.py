@@ -196,3 +196,14 @@ def test_cannot_be_written(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
         write_html(tmp_path / "file" / "report.html", brief())
+
+
+def test_instants_that_are_not_compared_stay_empty():
+    """A path without equilibrium at the lowest pressures takes these instants from all maps, and no figure."""
+    found = results()
+    name, rule = next(iter(found.rules.items()))
+    delta = rule.delta.copy()
+    delta[:, 3:9] = np.nan
+    html = report_html(results(rules={name: attrs.evolve(rule, delta=delta)}))
+    assert "Empty rows are not compared." in html
+    assert not re.search(r"\bnan\b", html, re.IGNORECASE)

@@ -18,6 +18,7 @@ import numpy as np
 from ...design.anchors import anchor_points, windows
 from ...design.assets import asset_root
 from ...design.gripper import Gripper
+from ...errors import ConvergenceError
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import Probe, probe
 from ...fem.materials import Materials
@@ -182,7 +183,11 @@ def _printed(
 
     def alone(name: str) -> Array:
         if name != "model_a":
-            return units.simulated_in_time(names.index(name), *_samples())
+            moved = units.simulated_in_time(names.index(name), *_samples())
+            if len(moved) < TIMES:
+                kPa = _samples()[1][len(moved)]
+                raise ConvergenceError(f"no equilibrium with waveguide {name} at {kPa:.4g} kPa")
+            return moved
         base = Equilibrium(model_of(mesh), materials, newton, explains=False)
         return units.points(simulate_in_time(base, *_samples()).states)
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, as_completed
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
 
+from ...errors import ConvergenceError
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
@@ -165,6 +167,13 @@ def _work_in_time(job: int, time_s: Array, pressure_kPa: Array) -> Array:
     return _evaluator.simulated_in_time(job, time_s, pressure_kPa)
 
 
+def _found_or_why(solve: Callable[[], list[Moved]]) -> list[Moved] | ConvergenceError:
+    try:
+        return solve()
+    except ConvergenceError as error:
+        return error
+
+
 class CandidatePool:
     """Processes that solve a setting's jobs at states of Model A; started on demand, until closed."""
 
@@ -181,8 +190,17 @@ class CandidatePool:
             self._submitted[name] = self._pool.submit(_work, way, part)
         return self._submitted[name]
 
+    def leave_out(self, pressure_MPa: float) -> None:
+        """Drop submitted tasks at a pressure that no process has begun."""
+        for (pressure, _), done in self._submitted.items():
+            if pressure == pressure_MPa:
+                done.cancel()
+
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
-        """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,)."""
+        """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,).
+
+        Of each job as far as it has an equilibrium; ConvergenceError for one without any.
+        """
         if self.workers == 1:
             self._alone = self._alone or evaluator_of(self.setting, threads=1)
             return [self._alone.alone(*task) for task in tasks]
@@ -192,7 +210,10 @@ class CandidatePool:
     def simulated_in_time(
         self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array
     ) -> Iterator[tuple[int, Array]]:
-        """Number of each finished job, and the anchors (k, p, 3) in mm it moves at k instants."""
+        """Number of each finished job, and the anchors (k, p, 3) in mm it moves at k instants.
+
+        Fewer where it has no equilibrium at a later one.
+        """
         if self.workers == 1:
             for job in jobs:
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
@@ -202,23 +223,24 @@ class CandidatePool:
         for done in as_completed(waiting):
             yield waiting[done], self._pool.result(done)
 
-    def solve(self, tasks: Sequence[tuple[Sequence[State], int]]) -> Iterator[tuple[int, list[Moved]]]:
-        """Number of each finished task, and the results of its part's jobs.
+    def solve(
+        self, tasks: Sequence[tuple[Sequence[State], int]]
+    ) -> Iterator[tuple[int, list[Moved] | ConvergenceError]]:
+        """Number of each finished task, and the results of its part's jobs, or why there are none.
 
         A task: Model A's states on one side of rest, in order of pressure, and a part. Its jobs are solved at
-        the last of these, and possibly at all of them on the way. The same for any `workers`. Raises the
-        first ConvergenceError of any.
+        the last of these, and possibly at all of them on the way. The same for any `workers`.
         """
         if self.workers == 1:
             for number, (way, part) in enumerate(tasks):
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield number, self._alone(way, part)
+                yield number, _found_or_why(partial(self._alone, way, part))
             return
         for task in tasks:
             self.submit(*task)
         numbers = {self._submitted[way[-1].pressure_MPa, part]: n for n, (way, part) in enumerate(tasks)}
         for done in as_completed(numbers):
-            yield numbers[done], self._pool.result(done)
+            yield numbers[done], _found_or_why(partial(self._pool.result, done))
 
     def close(self) -> None:
         """End the processes at once, without waiting for results that nobody reads."""

@@ -7,13 +7,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from ...design.anchors import anchor_points
 from ...design.quantity import in_kPa, in_MPa
-from ...errors import MuError
+from ...errors import ConvergenceError, MuError
 from ...fem.kinematics import probe
 from ...fem.state import State
 from ...fem.trajectory import Trajectory
@@ -32,13 +32,24 @@ SAMPLING_ERROR = 0.02
 # printed struts that snap and touch one by one, to this share of what the candidate deviates by.
 PATH_DIFFERENCE_MM = 1e-5
 PATH_DIFFERENCE_SHARE = 0.02
+LOWER = "lower the pressure, thicken the wall or stiffen the material"
+"""Remedy where candidates have no equilibrium."""
+
+
+class _NotReachedError(Exception):
+    """A candidate without equilibrium: its pressure in MPa, its path, and the solver's reason."""
+
+    def __init__(self, pressure_MPa: float, path: str, why: str) -> None:
+        super().__init__(why)
+        self.pressure_MPa, self.path, self.why = pressure_MPa, path, why
 
 
 class CandidateSolver:
     """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
 
     Solutions are kept in the cache. Close it, also when Model A failed. whole: rule whose candidates'
-    displacements of the whole mesh are also kept, for display.
+    displacements of the whole mesh are also kept, for display. A pressure that one candidate does not reach,
+    and those beyond it, are compared for none: `not_reached` says which, and why.
     """
 
     def __init__(
@@ -85,6 +96,7 @@ class CandidateSolver:
         self.solved_kPa: list[float] = []
         self.error = 0.0
         self.path_difference_mm = 0.0
+        self.not_reached: list[str] = []
         self._path_allowed_mm = PATH_DIFFERENCE_MM
 
     @property
@@ -139,17 +151,58 @@ class CandidateSolver:
     def evaluations(
         self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
     ) -> list[Evaluation]:
-        """Evaluation of every job against Model A's whole trajectory. Raises ConvergenceError.
+        """Evaluation of every job against Model A's trajectory, at the pressures that all of them reach.
 
         verify: also follow one of them along its whole path from rest, and all of them if that ends
-        elsewhere.
+        elsewhere. Raises ConvergenceError where no pressure is left to compare.
         """
         distinct = np.array([s.pressure_MPa for s in trajectory.solved])
-        order = self._rounds(distinct)
-        loaded = sum(map(len, order))
-        weight = np.bincount(trajectory.index, minlength=len(distinct))
         monitor = probe(self._mesh, self._anchors)
         still = np.array([self._anchors + monitor.displacement(s.u) for s in trajectory.solved])
+        compared = np.ones(len(distinct), bool)
+        while True:
+            try:
+                known = self._differences(trajectory, compared, still, on_progress, verify)
+                break
+            except _NotReachedError as missed:
+                self._leave_out(missed, distinct, compared)
+        self.solved_kPa = sorted(in_kPa(float(distinct[n])) for n in known)
+        difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
+        difference[~compared] = np.nan
+        baseline = trajectory.of_time(still)
+        moved = baseline[:, None] + trajectory.of_time(difference)
+        return [
+            evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
+            for i, (candidate, rule) in enumerate(self._jobs)
+        ]
+
+    def _leave_out(self, missed: _NotReachedError, distinct: Array, compared: Array) -> None:
+        """Compare no longer, of distinct pressures (s,) in MPa, the one missed and those beyond it."""
+        pressure = missed.pressure_MPa
+        self.not_reached.append(f"at {in_kPa(pressure):.6g} kPa and beyond ({missed.path}: {missed.why})")
+        self._sweeper.leave_out(pressure)
+        beyond = np.abs(distinct) >= abs(pressure) * (1 - 1e-12)
+        compared[beyond & (distinct * np.sign(pressure) > 0)] = False
+        if not pressure or not distinct[compared].any():
+            raise ConvergenceError(f"no pressure is reached by all paths: {missed.why}", missed.path, LOWER)
+
+    def _differences(
+        self,
+        trajectory: Trajectory,
+        compared: Array,
+        still: Array,
+        on_progress: Callable[[float], None],
+        verify: bool,
+    ) -> dict[int, Array]:
+        """Anchors (jobs, p, 3) in mm against Model A's at some of the pressures compared (s,), by number.
+
+        Those that suffice for the rest. Raises _NotReachedError.
+        """
+        distinct = np.array([s.pressure_MPa for s in trajectory.solved])
+        numbered = np.flatnonzero(compared)
+        order = [[int(numbered[i]) for i in pair] for pair in self._rounds(distinct[compared])]
+        loaded = sum(map(len, order))
+        weight = np.bincount(trajectory.index, minlength=len(distinct)) * compared
         known: dict[int, Array] = {}
         for pair in order:
             for numbers in self._together(distinct, pair):
@@ -164,15 +217,8 @@ class CandidateSolver:
             if self.error <= SAMPLING_ERROR:
                 break
         if verify and known and not self._follows_its_path(distinct, known, still):
-            known = self._along_paths(distinct, still, known)
-        self.solved_kPa = sorted(in_kPa(float(distinct[n])) for n in known)
-        difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
-        baseline = trajectory.of_time(still)
-        moved = baseline[:, None] + trajectory.of_time(difference)
-        return [
-            evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
-            for i, (candidate, rule) in enumerate(self._jobs)
-        ]
+            return self._along_paths(distinct, still, compared, known)
+        return known
 
     def _together(self, distinct: Array, pair: list[int]) -> list[list[int]]:
         """Numbers of pressures in the groups that are solved one after the other.
@@ -200,6 +246,8 @@ class CandidateSolver:
         number = numbers[int(state)]
         way = _outward(distinct, distinct[number])
         (moved,) = self._sweeper.alone([(int(job), distinct[way])])
+        if len(moved) < len(way):
+            self._missed(distinct[way[len(moved)]], int(job))
         self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
         if self._mesh.resolved:
             self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
@@ -207,12 +255,20 @@ class CandidateSolver:
         self._cache.put("path", self._key, found)
         return self.independent_of_path
 
-    def _along_paths(self, distinct: Array, still: Array, before: dict[int, Array]) -> dict[int, Array]:
-        """Differences (jobs, p, 3) in mm at every pressure but 0, each job along its whole path.
+    def _missed(self, pressure_MPa: float, job: int) -> NoReturn:
+        """Say that a job, followed from rest, does not reach a pressure."""
+        why = f"no equilibrium at {in_kPa(pressure_MPa):.4g} kPa on its path from rest"
+        raise _NotReachedError(float(pressure_MPa), self._jobs[job][0].name, why)
+
+    def _along_paths(
+        self, distinct: Array, still: Array, compared: Array, before: dict[int, Array]
+    ) -> dict[int, Array]:
+        """Differences (jobs, p, 3) in mm at all pressures compared but 0, each job along its whole path.
 
         At 0, where weight alone acts and every path begins, they keep their earlier values.
         """
-        sides = [_outward(distinct, p) for p in (distinct.min(), distinct.max())]
+        reached = np.where(compared, distinct, 0.0)
+        sides = [_outward(reached, p) for p in (reached.min(), reached.max())]
         sides = [side for side in sides if len(side)]
         tasks = [(job, distinct[side]) for job in range(len(self._jobs)) for side in sides]
         moved = iter(self._sweeper.alone(tasks))
@@ -220,7 +276,10 @@ class CandidateSolver:
         known |= {n: values for n, values in before.items() if not distinct[n]}
         for job in range(len(self._jobs)):
             for side in sides:
-                for n, points in zip(side.tolist(), next(moved), strict=True):
+                found = next(moved)
+                if len(found) < len(side):
+                    self._missed(distinct[side[len(found)]], job)
+                for n, points in zip(side.tolist(), found, strict=True):
                     known[n][job] = points - still[n]
         return known
 
@@ -229,7 +288,7 @@ class CandidateSolver:
     ) -> dict[int, Array]:
         """Anchors (jobs, p, 3) in mm moved by every job at some states, by number; cached part by part.
 
-        on_progress: called with the finished share.
+        on_progress: called with the finished share. Raises _NotReachedError.
         """
         setting = self._sweeper.setting
         points = np.empty((len(numbers), len(self._jobs), *self._anchors.shape))
@@ -250,6 +309,10 @@ class CandidateSolver:
         on_progress(done / total)
         for task, found in self._sweeper.solve(tasks):
             row, part = missing[task]
+            if isinstance(found, ConvergenceError):
+                paths = {self._jobs[job][0].name for job in setting.parts[part]}
+                path = paths.pop() if len(paths) == 1 else "one of the paths"
+                raise _NotReachedError(trajectory.solved[numbers[row]].pressure_MPa, path, found.what)
             self._keep(ways[row], part, found)
             points[row, list(setting.parts[part])] = found[-1].anchors
             done += 1

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ...design.anchors import anchor_points
+from ...errors import ConvergenceError
 from ...fem.kinematics import probe
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...run.cache import Cache, key
 from .candidate_pool import CandidatePool, CandidateProblem
+from .candidate_states import LOWER
 from .contact_history import PRESSURE_AND_HALVINGS, DEPTH_mm
 from .job import Job
 
@@ -28,8 +30,10 @@ def evaluations(
     trajectory: Trajectory,
     jobs: list[tuple[Candidate, str]],
     on_progress: Callable[[float], None],
-) -> list[Evaluation]:
+) -> tuple[list[Evaluation], list[str]]:
     """Evaluation of every candidate, each under an inclusion rule, against Model A's motion.
+
+    It compares the instants until the first that a candidate does not reach; also says which those are.
 
     None of the shortcuts of `candidate_states` holds where a state depends on those before it:
     every candidate is solved through all instants, and kept in the cache. Raises ConvergenceError.
@@ -68,9 +72,20 @@ def evaluations(
             cache.put("march", names[n], {"moved_mm": found})
             moved[n] = found
             on_progress(len(moved) / len(jobs))
+    count = min(map(len, moved.values()))
+    not_reached = []
+    if count < len(time):
+        first = next(jobs[n][0].name for n in range(len(jobs)) if len(moved[n]) == count)
+        not_reached = [f"from {time[count]:.6g} s on ({first}: no equilibrium at {pressure[count]:.4g} kPa)"]
+        if not pressure[:count].any():
+            raise ConvergenceError(f"not all paths are compared {not_reached[0]}", first, LOWER)
     monitor = probe(mesh, points)
     still = trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.solved]))
-    return [
-        evaluation(mesh, candidate, rule, radius, moved[n], still, job.stations)
+    every = np.full((len(jobs), *still.shape), np.nan)
+    for n in moved:
+        every[n, :count] = moved[n][:count]
+    compared = [
+        evaluation(mesh, candidate, rule, radius, every[n], still, job.stations)
         for n, (candidate, rule) in enumerate(jobs)
     ]
+    return compared, not_reached

@@ -141,7 +141,8 @@ class Motion:
     def displacement(self, name: str) -> Array:
         """Displacements (s, n, 3) in mm of Model A or of a path's unit, at Model A's states.
 
-        A path's are polynomials in the pressure between the states that were solved, as its deviation is.
+        A path's are polynomials in the pressure between the states that were solved, as its deviation is;
+        beyond them it keeps the last difference.
         Raises InputError where there is no such motion.
         """
         return self.sides(name)[0]
@@ -178,7 +179,9 @@ class Motion:
         """A path's differences at all of Model A's states, or None if its file has none of that name."""
         if key not in found:
             return None
-        weights = polynomials(found["state_kPa"], self.state_kPa).astype(np.float32)
+        known = found["state_kPa"]
+        inside = np.clip(self.state_kPa, min(known.min(), 0.0), max(known.max(), 0.0))
+        weights = polynomials(known, inside).astype(np.float32)
         return np.asarray(np.tensordot(weights, found[key], axes=1))
 
     def carried(self, name: str, embedding: Embedding) -> Array:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from ...errors import ConvergenceError
 from ...files import write_csv, write_npz
 from ...placement.candidates import Candidate, Evaluation
 from ...placement.deviation import rank
@@ -34,6 +35,11 @@ class Ranking:
 
     evaluations: dict[tuple[str, str], Evaluation] = attrs.field(factory=dict)
     uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
+
+    @property
+    def compared(self) -> Array:
+        """True for each instant (k,) at which all paths are compared."""
+        return np.isfinite([e.deviation.over_time for e in self.evaluations.values()]).all(axis=0)
 
     def tied(self, rule: str, chosen: str) -> list[str]:
         """Paths whose J_hat differs from the chosen one's by less than the mesh uncertainty."""
@@ -95,8 +101,8 @@ def solve_candidates(
     study, which is the same or the half of it. Raises ConvergenceError.
     """
     if job.in_time:
-        found = evaluations(job, cache, mesh, trajectory, jobs, on_progress)
-        return found, {"along_paths": True}
+        found, not_reached = evaluations(job, cache, mesh, trajectory, jobs, on_progress)
+        return found, {"along_paths": True, "not_reached": not_reached}
     whole = job.headline_rule if shown else ""
     solver = under_way or CandidateSolver(job, cache, mesh, jobs, trajectory.pressure_kPa, whole)
     with closing(solver):
@@ -108,6 +114,7 @@ def solve_candidates(
         "relative_error_between": solver.error,
         "path_difference_mm": solver.path_difference_mm,
         "independent_of_path": solver.independent_of_path,
+        "not_reached": solver.not_reached,
     }
 
 
@@ -117,15 +124,19 @@ def mesh_change_mm(
     """Largest change of any path's J_hat in mm on a coarser mesh, by rule.
 
     instants: those of the fine mesh that the coarse one was solved at; the relative change of the deviation
-    there stands for that of J_hat.
+    there stands for that of J_hat. Raises ConvergenceError if none of them is compared on both.
     """
     change = dict.fromkeys(job.rules, 0.0)
     for found in coarse:
         deviation = fine[found.name, found.rule].deviation
-        same = deviation.delta[list(instants)].mean()
+        both = np.array([deviation.delta[list(instants)], found.deviation.delta])
+        there, coarser = both[:, np.isfinite(both).all(axis=(0, 2))].reshape(2, -1)
+        if not len(there):
+            raise ConvergenceError("no pressure is compared on both meshes")
+        same = there.mean()
         # A sensor as soft as the lattice disturbs nothing, on any mesh.
         scale = deviation.J_hat / same if same else 0.0
-        change[found.rule] = max(change[found.rule], abs(found.deviation.J_hat - same) * scale)
+        change[found.rule] = max(change[found.rule], abs(coarser.mean() - same) * scale)
     return change
 
 

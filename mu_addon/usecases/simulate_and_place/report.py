@@ -420,12 +420,12 @@ def _contact(r: ReportData) -> str:
 def _heatmaps(r: ReportData) -> str:
     html = ""
     for name, rule in r.rules.items():
-        top = float(np.max(rule.delta))
+        top = float(np.nanmax(rule.delta))
         maps = "".join(
             figure(
                 plots.heatmap(rule.delta[i], top, path.name == rule.chosen),
                 f"{_name(path.name)}: {rule.j_hat[i]:.3f} mm",
-                f"Deviation of {path.name} over length and time, at most {np.max(rule.delta[i]):.2f} mm.",
+                f"Deviation of {path.name} over length and time, at most {np.nanmax(rule.delta[i]):.2f} mm.",
                 "best" if path.name == rule.chosen else "",
             )
             for i, path in enumerate(r.paths)
@@ -434,10 +434,11 @@ def _heatmaps(r: ReportData) -> str:
         html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
     if not html:
         return ""
+    empty = any(np.isnan(rule.delta).any() for rule in r.rules.values())
     return (
         "<p>One map per path. Horizontal: length [%], from inlet to tip. Vertical: time [%] of the pressure "
         "cycle. All maps of a rule share one colour scale, in the square root of Δ; the chosen path is "
-        "framed.</p>" + html
+        f"framed.{' Empty rows are not compared.' if empty else ''}</p>" + html
     )
 
 
@@ -446,7 +447,7 @@ def _marginals(r: ReportData) -> str:
     for name, rule in r.rules.items():
         html += f"<h3>Rule “{_rule(name)}”</h3><div class='pair'>"
         for values, along, averaged in (
-            (rule.delta.mean(axis=1), "length", "time"),
+            (np.nanmean(rule.delta, axis=1), "length", "time"),
             (rule.delta.mean(axis=2), "time", "length"),
         ):
             html += figure(

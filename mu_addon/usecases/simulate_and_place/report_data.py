@@ -87,7 +87,7 @@ def _panel_pictures(study: Study) -> None:
     write_angle(study.folder, *study.motion_in_order())
     rule = study.job.headline_rule
     found = [e for e in study.ranking.evaluations.values() if e.rule == rule]
-    top = max((float(e.deviation.delta.max()) for e in found), default=0.0)
+    top = max((float(np.nanmax(e.deviation.delta)) for e in found), default=0.0)
     for e in found:
         write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
 

@@ -318,6 +318,8 @@ class Study:
                 f"rest (difference {figures['path_difference_mm']:.2g} mm), so every candidate was solved "
                 "from rest."
             )
+        paths = "Paths" if mesh is self.mesh else "On the coarser mesh, paths"
+        self.warn(*(f"{paths} are not compared {where}." for where in figures["not_reached"]))
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = figures
         return found
 
@@ -328,7 +330,7 @@ class Study:
         """
         job, pressure = self.job, self.job.samples[1]
         coarse = attrs.evolve(job.mesh, refine=job.mesh.refine * COARSER)
-        chosen = extremes(pressure)
+        chosen = extremes(pressure[self.ranking.compared])
         instants = [int(np.flatnonzero(pressure == p)[0]) for p in chosen]
         samples = np.arange(len(chosen), dtype=float), chosen
         if job.in_time:
