@@ -1,13 +1,13 @@
-"""The paper's bending ranges by the resolved and the homogenised unit, for several walls and print offsets.
+"""The paper's bending ranges by the printed body, for shapes that the paper does not print.
 
-    python -m benchmarks.resolved.paper_bending FOLDER [--walls 0.5 0.6 0.7 0.9] [--offsets 0 0.12 0.17]
-        [--presets mu-1.0x] [--refine 0.7] [--models resolved homogenised] [--sides suction pressure]
+    python -m benchmarks.resolved.paper_bending FOLDER [--shapes "neck 20 mm" ...] [--presets mu-1.0x]
+        [--refine 0.5] [--models resolved homogenised] [--pressures -10 20 50]
 
-A wall is nominal, in mm at scale 1; an offset moves every surface of the print outward by as many mm, in the
-plane and along the build axis alike. The resolved unit with walls and struts that touch (`self_contact`), the
-homogenised one with the lattice's modulus that the paper measured at that scale. Both sides of a range are
-runs of their own, suction and pressure, each in a folder below FOLDER: a run that was stopped goes on there.
-Angles are those of the tip's plane in degrees, seconds of processor time.
+Each shape changes the preset in what the paper leaves open, within the design's rules; lengths at scale 1.
+The printed body has walls and struts that touch (`self_contact`), the homogenised unit the lattice's modulus
+that the paper measured at that scale. Suction and pressure are runs of their own, each in a folder below
+FOLDER: a run that was stopped goes on there. Angles are those of the tip's plane in degrees, seconds of
+processor time.
 
 The paper's ranges over -20 to 50 kPa: -50 to 45, -65 to 50 and -65 to 55 degrees at 0.75x, 1.0x and 1.5x.
 """
@@ -17,68 +17,67 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import Any
 
-import attrs
-
-from mu_addon.design.parameters import Unit, load_preset
+from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.meshing.settings import FIDELITIES, RESOLVED, MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job
 
 from .running import angles_deg, outward, print_heading, print_row, run_study
 
-SIDES = {"suction": (-5.0, -10.0, -15.0, -20.0), "pressure": (10.0, 20.0, 35.0, 50.0)}
-
-
-def printed_unit(preset: str, wall_mm: float, offset_mm: float) -> Unit:
-    """The preset with a wall in mm at scale 1, printed with an offset in mm."""
-    unit = load_preset(preset)
-    return attrs.evolve(
-        unit,
-        chambers=attrs.evolve(unit.chambers, wall_mm=wall_mm),
-        print=attrs.evolve(unit.print, offset_xy_mm=offset_mm, offset_z_mm=offset_mm),
-    )
+SHAPES: dict[str, dict[str, Any]] = {
+    "as preset": {},
+    "wall 0.6 mm": {"wall_mm": 0.6},
+    "wall 0.5 mm": {"wall_mm": 0.5},
+    "neck 10 mm": {"neck_diameter_mm": 10.0},
+    "neck 16 mm": {"neck_diameter_mm": 16.0},
+    "bladder's share 0.4": {"bladder_share": 0.4},
+    "bladder's share 0.8": {"bladder_share": 0.8},
+    "5 cells across x": {"cells_x": 5},
+    "3 cells on +y": {"cells_y_plus": 3},
+    "tip cap 2.5 mm": {"tip_cap_mm": 2.5},
+    "mid-span 1.6 mm": {"midspan_diameter_mm": 1.6},
+    "overcure 0.12 mm": {"offset_xy_mm": 0.12, "offset_z_mm": 0.12},
+    "resin 1.2 MPa": {"membrane_modulus_kPa": 1200.0},
+}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--presets", nargs="*", default=["mu-1.0x"])
-    parser.add_argument("--walls", type=float, nargs="*", default=[0.5, 0.6, 0.7, 0.9])
-    parser.add_argument("--offsets", type=float, nargs="*", default=[0.0, 0.12, 0.17])
-    parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=FIDELITIES)
-    parser.add_argument("--sides", nargs="*", choices=SIDES, default=list(SIDES))
-    parser.add_argument("--refine", type=float, default=0.7)
+    parser.add_argument("--shapes", nargs="*", choices=SHAPES, default=list(SHAPES))
+    parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=[RESOLVED])
+    parser.add_argument("--pressures", type=float, nargs="*", default=[-10.0, 20.0, 50.0])
+    parser.add_argument("--refine", type=float, default=0.5)
     options = parser.parse_args()
-    print_heading(["preset", "wall mm", "offset mm", "model", "kPa", "deg", "s"])
+    sides = [[p for p in options.pressures if p * sign > 0] for sign in (1, -1)]
+    print_heading(["preset", "shape", "model", "kPa", "deg", "s"])
     for name in options.presets:
-        for offset in options.offsets:
-            for wall in options.walls:
-                for model in options.models:
-                    for side in options.sides:
-                        row = [name, f"{wall:g}", f"{offset:g}", model]
-                        protocol = outward(SIDES[side])
-                        resolved = model == RESOLVED
-                        folder = (
-                            options.folder / f"{name}-{wall:g}-{offset:g}-{model}-{options.refine:g}-{side}"
+        for shape in options.shapes:
+            for model in options.models:
+                for side in filter(None, sides):
+                    row = [name, shape, model]
+                    protocol = outward(side)
+                    folder = f"{name}-{shape}-{model}-{options.refine:g}-{side[0]:g}".replace(" ", "-")
+                    began = time.process_time()
+                    try:
+                        job = Job(
+                            load_preset(name).evolve(**SHAPES[shape]),
+                            protocol,
+                            MeshSettings(fidelity=model, refine=options.refine),
+                            times=len(protocol.pressure_kPa),
+                            stages=("design", "simulate"),
+                            self_contact=model == RESOLVED,
+                            mesh_check=False,
                         )
-                        began = time.process_time()
-                        try:
-                            job = Job(
-                                printed_unit(name, wall, offset),
-                                protocol,
-                                MeshSettings(fidelity=model, refine=options.refine),
-                                times=len(protocol.pressure_kPa),
-                                stages=("design", "simulate"),
-                                self_contact=resolved,
-                                mesh_check=False,
-                            )
-                            angle = angles_deg(run_study(job, folder)[1])
-                        except MuError as why:
-                            print_row([*row, side, why, f"{time.process_time() - began:.0f}"])
-                            continue
-                        shown = [f"{p:g}" for p in SIDES[side]], [f"{angle[p]:.2f}" for p in SIDES[side]]
-                        print_row([*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}"])
+                        angle = angles_deg(run_study(job, options.folder / folder)[1])
+                    except MuError as why:
+                        print_row([*row, why.what, "", f"{time.process_time() - began:.0f}"])
+                        continue
+                    shown = [f"{p:g}" for p in side], [f"{angle[p]:.2f}" for p in side]
+                    print_row([*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}"])
 
 
 if __name__ == "__main__":

@@ -59,6 +59,9 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         for pressure, angle in found.angles:
             if pressure in (found.angles[0][0], found.angles[-1][0]):
                 column.label(text=f"{angle:+.1f}° at {pressure:g} kPa")
+        if most := found.summary.get("nearest_to_break"):
+            percent, part = most["percent"], most["part"]
+            column.label(text=f"{percent:.0f} % of break in {part}, {most['pressure_kPa']:g} kPa")
         for contact in studies.contact_forces(root):
             most = int(contact.force_N.argmax())
             words = (
@@ -102,6 +105,30 @@ def _look_buttons(layout, root, ranked: bool) -> None:
     row.use_property_split = False
     text = "Ranking on the Lattice" if ranked else "Candidates on the Lattice"
     row.prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
+
+
+class MU_PT_warnings(UnitPanel, bpy.types.Panel):
+    """What makes the shown results doubtful"""
+
+    bl_idname = "MU_PT_warnings"
+    bl_label = "Warnings"
+    bl_parent_id = "MU_PT_results"
+    bl_options: ClassVar[set[str]] = set()
+    bl_order = 0
+
+    @classmethod
+    def poll(cls, context):
+        root = unit_object.active_root(context)
+        found = None if root is None else studies.findings(root)
+        return found is not None and bool(found.summary.get("warnings"))
+
+    def draw_header(self, context):
+        """Draw the mark, also while the panel is closed."""
+        self.layout.label(text="", icon="ERROR")
+
+    def show(self, layout, context, root):
+        for text in studies.findings(root).summary["warnings"]:
+            wrapped(layout, text, "DOT")
 
 
 class MU_MT_motion(bpy.types.Menu):
@@ -243,7 +270,7 @@ class MU_PT_pictures(_OfMotion, bpy.types.Panel):
             wrapped(layout, "Choose a sensor path to see its deviation", "INFO")
 
 
-CLASSES = (MU_PT_results, MU_MT_motion, MU_PT_motion, MU_PT_field, MU_PT_pictures)
+CLASSES = (MU_PT_results, MU_PT_warnings, MU_MT_motion, MU_PT_motion, MU_PT_field, MU_PT_pictures)
 
 
 register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -164,6 +164,7 @@ class Study:
         for text in texts:
             if text not in self.warnings:
                 self.warnings.append(text)
+                self.context.summary["warnings"] = self.warnings
                 self.progress.warning(text)
 
     # Stages, in the order they need each other.
@@ -290,7 +291,7 @@ class Study:
 
     def _write_ranking(self) -> dict[str, str]:
         found = self.ranking.write(self.folder, self.job, self.candidates)
-        self.context.summary |= found | {"warnings": self.warnings}
+        self.context.summary |= found
         chosen: dict[str, str] = found["chosen"]
         return chosen
 

@@ -3,6 +3,7 @@
 The runs are of known bending, written without a solver.
 """
 
+import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -83,6 +84,20 @@ def test_a_click_on_a_run_moves_nothing_above_it(home):
         calls = [name for name, _, _ in layout.mock_calls]
         above.append(calls[: calls.index("row().template_list")])
     assert above == [["row"]] * 3
+
+
+def test_how_near_to_tearing_and_what_is_doubtful_stand_with_the_results(home):
+    root = started(home)
+    path = studies.findings(root).run.folder / "summary.json"
+    assert not panel.MU_PT_warnings.poll(bpy.context)
+    summary = json.loads(path.read_text(encoding="utf-8"))
+    summary["nearest_to_break"] = {"pressure_kPa": 40.0, "part": "wall", "percent": 17.2}
+    summary["warnings"] = ["Paths are not compared at -20 kPa and beyond (alpha5: no equilibrium)."]
+    path.write_text(json.dumps(summary), encoding="utf-8")
+    runs.refresh()
+    shown = drawn([*PANELS, panel.MU_PT_warnings])
+    assert "17 % of break in wall, 40 kPa" in shown
+    assert "Paths are not compared at -20 kPa" in shown
 
 
 def test_what_is_shown_on_the_unit_follows_the_run(home):
