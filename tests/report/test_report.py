@@ -199,7 +199,7 @@ def test_cannot_be_written(tmp_path):
 
 
 def test_instants_that_are_not_compared_stay_empty():
-    """A path without equilibrium at the lowest pressures takes these instants from all maps, and no figure."""
+    """Where one path has no equilibrium no map has a row, and no figure a NaN."""
     found = results()
     name, rule = next(iter(found.rules.items()))
     delta = rule.delta.copy()
