@@ -6,8 +6,9 @@
 
 A command whose full run takes over two minutes runs coarse, as its row shows. "Told" is the time that the
 command gave at its start, "silent" the longest time without a line on the terminal. "Left" is the largest
-factor between a time left that a line told and the time that was left, of lines more than LEAST_S before the
-end. A share done that fell, and a time left that grew without a reason told, count as faults.
+factor between a time left that a line told and the time that was left, of lines in the run's second half more
+than LEAST_S before the end. A share done that fell, and a time left that grew without a reason told, count as
+faults.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def judged(found: Ran) -> tuple[str, float, str, list[str]]:
             share = int(m[1])
         if m := _LEFT.search(line.text):
             left, true = seconds_of(m[1]), found.seconds - line.at
-            if true > LEAST_S:
+            if true > LEAST_S and line.at > 0.5 * found.seconds:
                 factor = max(factor, left / true, true / max(left, 1.0))
             grew = before is not None and left > 1.02 * (before[1] - (line.at - before[0])) + 2.0
             if grew and "(" not in line.text[m.end() :]:

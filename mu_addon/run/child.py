@@ -17,6 +17,7 @@ from typing import Any
 
 from ..errors import MuError
 from ..files import make_folder, output_error
+from .processes import slowed_by_others
 from .progress_estimate import Plan, ProgressEstimate
 
 PATIENCE_S = 20.0
@@ -48,7 +49,7 @@ class Child:
         """
         self.folder = folder
         self.state = WAITING
-        self.estimate = ProgressEstimate(plan)
+        self.estimate = ProgressEstimate(plan, slowed=slowed_by_others())
         self.progress: dict[str, Any] = {}
         self.warnings: list[str] = []
         self.result: dict[str, Any] | None = None

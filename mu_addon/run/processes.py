@@ -23,6 +23,11 @@ def cores() -> int:
     return min(allowed, MOST_WORKERS)
 
 
+def slowed_by_others() -> float:
+    """How many times slower the machine's other work makes a new process, by the load of the last minute."""
+    return max(os.getloadavg()[0] / cores(), 1.0) if hasattr(os, "getloadavg") else 1.0
+
+
 def end_with_parent() -> None:
     """End this process as soon as its parent has ended, also a killed one."""
     threading.Thread(target=_wait_for_parent, daemon=True).start()

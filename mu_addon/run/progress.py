@@ -2,7 +2,8 @@
 
 A `Progress` makes messages, plain dictionaries with a `type`, and hands each to its sinks:
 
-- plan: the stages that are expected, as [name, seconds], and the seconds of all
+- plan: the stages that are expected, as [name, seconds], the seconds of all, and how many times slower other
+  work of the machine makes them
 - progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
   of a run within this one its name before the stage, and part (0..1) and part_seconds_left of that run,
   and detail where there is something to say of what was just done, at its end of what the stage made; where
@@ -29,7 +30,8 @@ from typing import Any, TextIO
 
 from ..errors import MuError
 from ..files import append_lines, output_error, plain
-from .progress_estimate import Plan, ProgressEstimate, own_left
+from .processes import slowed_by_others
+from .progress_estimate import Pace, Plan, ProgressEstimate
 
 Message = dict[str, Any]
 Sink = Callable[[Message], None]
@@ -54,7 +56,8 @@ class Progress:
         self._start = 0.0
         self._expected: float | None = None
         self._fraction: float | None = None
-        self._updated_s = self._emitted_s = clock()
+        self._pace = Pace()
+        self._emitted_s = clock()
         self._made = ""
         self._one_at_a_time = threading.RLock()
         self.estimate = ProgressEstimate((), clock)
@@ -62,8 +65,10 @@ class Progress:
     def plan(self, stages: Plan) -> None:
         """Report the expected stages of the run, with their seconds; no effect without any."""
         if stages:
-            self.estimate = ProgressEstimate(stages, self._clock)
-            self.emit({"type": "plan", "stages": [*map(list, stages)], "seconds": sum(s for _, s in stages)})
+            slowed = slowed_by_others()
+            self.estimate = ProgressEstimate(stages, self._clock, slowed)
+            seconds = sum(s for _, s in stages)
+            self.emit({"type": "plan", "stages": [*map(list, stages)], "seconds": seconds, "slowed": slowed})
 
     @contextmanager
     def beating(self, every_s: float = BEAT_S) -> Iterator[None]:
@@ -100,7 +105,7 @@ class Progress:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
         with self._one_at_a_time:
             self._stage, self._start, self._expected = name, self._clock(), expected_s
-            self._fraction, self._updated_s = None, self._start
+            self._fraction, self._pace = None, Pace()
         try:
             self._emit_progress("start", self._fraction)
             yield
@@ -124,7 +129,7 @@ class Progress:
         with self._one_at_a_time:
             if self._stage:
                 self._fraction = max(min(max(float(fraction), 0.0), 1.0), self._fraction or 0.0)
-                self._updated_s = self._clock()
+                self._pace.tell(self._clock() - self._start, self._fraction)
                 self._emit_progress("run", self._fraction, detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
@@ -173,13 +178,17 @@ class Progress:
         with self._one_at_a_time:
             self._emitted_s = now = self._clock()
             elapsed = now - self._start
+            left = self._pace.left(elapsed)
+            if not fraction and self._expected is not None and self._expected > elapsed:
+                # One that is overdue by its plan has no known end.
+                left = self._expected - elapsed
             message: Message = {
                 "type": "progress",
                 "stage": self._stage,
                 "state": state,
                 "fraction": fraction,
                 "seconds": elapsed,
-                "seconds_left": own_left(elapsed, now - self._updated_s, fraction, self._expected),
+                "seconds_left": 0.0 if state == "end" else left,
                 **({"detail": detail} if detail else {}),
                 **({"beat": True} if beat else {}),
             }
@@ -194,6 +203,11 @@ class Progress:
             if self.estimate.why:
                 message["why"] = self.estimate.why
         self.emit(message)
+
+
+def within(on_progress: Callable[..., None], low: float, high: float) -> Callable[..., None]:
+    """A part's `on_progress`, whose shares are between `low` and `high` of the whole's."""
+    return lambda share, *words: on_progress(low + share * (high - low), *words)
 
 
 def terminal(stream: TextIO = sys.stderr, clock: Clock = time.perf_counter) -> Sink:
@@ -249,8 +263,9 @@ class _Lines:
 
     def __call__(self, message: Message) -> None:
         if message["type"] == "plan":
+            busy = f"; other work slows it {slowed:.0f} times" if (slowed := message["slowed"]) >= 1.5 else ""
             count = len(message["stages"])
-            self.write(f"about {spell(message['seconds'])} on two cores, {count} stages\n")
+            self.write(f"about {spell(message['seconds'])} on two cores, {count} stages{busy}\n")
         elif message["type"] == "progress":
             self.progress(message)
         elif message["type"] in ("warning", "error"):

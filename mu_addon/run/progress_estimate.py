@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ Plan = Sequence[tuple[str, float]]
 LONGER = 1.2
 """Factor by which an estimate must grow before it is reported, with the reason; else the old one counts down.
 """
-SLACK_S = 5.0
+SLACK_S = 2.0
 MOST_BY_CLOCK = 0.95
 """Largest share of a stage taken as done by the clock alone, as it has not ended."""
 SURE = 0.1
@@ -20,18 +21,41 @@ OVERDUE = 0.2
 """Remaining share of its time assumed for a stage beyond its plan, as nothing says that it ends now."""
 UNPLANNED_S = 20.0
 """Seconds assumed for a stage that no plan has."""
+AT_ONCE_S = 1.0
+"""A share told within this time of a stage's start was in the cache, and says nothing of the rest's pace."""
+RECENT = 1.0 / 3.0
+"""Share of a stage's time that is left out of its pace: its first steps may be other work than its last."""
+SKIPPED = 0.1
+"""A stage that took less than this share of its plan was in the cache, and says nothing of the pace."""
+PACES = 0.2, 20.0
+"""Least and largest ratio of a run's time to its plan that is believed."""
 
 
-def own_left(elapsed: float, since: float, fraction: float | None, expected: float | None) -> float | None:
-    """Seconds left of a stage, by the share done if known, else by its plan; None without either.
+class Pace:
+    """Pace of a stage by the shares done that it told: that of the later part of its time."""
 
-    since: seconds since the share was known, from which it counts down. A stage overdue by its share is
-    assumed to take a fifth of its time still; one overdue by its plan has no known end.
-    """
-    if fraction:
-        rest = (1.0 - fraction) / fraction
-        return max((elapsed - since) * rest - since, min(0.2, rest / 2.0) * elapsed)
-    return expected - elapsed if expected is not None and expected > elapsed else None
+    def __init__(self) -> None:
+        self._told = deque([(0.0, 0.0)])
+
+    def tell(self, elapsed: float, share: float) -> None:
+        """Process a share (0..1) known `elapsed` s after the stage's start."""
+        told = self._told
+        if elapsed < AT_ONCE_S:
+            told.clear()
+        told.append((elapsed, share))
+        while len(told) > 2 and told[1][0] <= RECENT * elapsed:
+            told.popleft()
+
+    def left(self, elapsed: float) -> float | None:
+        """Seconds left `elapsed` s after the stage's start, less those since the last share; None if unknown.
+
+        A stage that is overdue by that is assumed to take a fifth of its time still.
+        """
+        (began, before), (at, share) = self._told[0], self._told[-1]
+        if share <= before:
+            return None
+        rest = (1.0 - share) * (at - began) / (share - before)
+        return max(rest - (elapsed - at), min(0.2 * elapsed, rest / 2.0))
 
 
 class ProgressEstimate:
@@ -39,16 +63,21 @@ class ProgressEstimate:
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
     why: why the time left grew, while it is more than before, or "". Without a plan there are only the stages
-    so far, and only the present stage's time left.
+    so far, and only the present stage's time left. slowed: factor on the plan's seconds by other work, until
+    the run's own pace is known.
     """
 
-    def __init__(self, plan: Plan = (), clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, plan: Plan = (), clock: Callable[[], float] = time.monotonic, slowed: float = 1.0
+    ) -> None:
         self._clock = clock
+        self._slowed = slowed
         self._expected = dict(plan)
         self._planned = bool(plan)
         self._taken: dict[str, float] = {}
         self._stage = ""
-        self._share = 0.0
+        self._share = self._kept = 0.0
+        self._told_itself = False
         self._spent = 0.0
         self._own_left: float | None = None
         self._left: float | None = None
@@ -84,11 +113,15 @@ class ProgressEstimate:
             added = stage
             self._add(stage)
         # Skipped stages were in the cache, or not asked for.
-        self._stage = stage
+        if stage != self._stage:
+            self._stage, self._kept = stage, 0.0
         seconds, left = message.get("seconds"), message.get("seconds_left")
         self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0
         self._own_left = float(left) if isinstance(left, int | float) else None
         self._share = float(share) if isinstance(share, int | float) else 0.0
+        self._told_itself = self._share > 0.0
+        if self._spent < AT_ONCE_S:
+            self._kept = self._share
         if self._planned and self._share < SURE:
             # At the pace of what is done, as the stages to come, else it would jump where one begins.
             expected = self._expected[stage] * self._pace()
@@ -104,7 +137,7 @@ class ProgressEstimate:
                 self._own_left = weight * self._own_left + (1.0 - weight) * by_plan
         if message.get("state") == "end":
             self._taken[stage] = self._spent
-            self._share, self._own_left = 1.0, 0.0
+            self._share, self._own_left, self._told_itself = 1.0, 0.0, False
         self._estimate(added)
 
     def _tell_part(self, stage: str, message: Mapping[str, Any]) -> None:
@@ -116,9 +149,10 @@ class ProgressEstimate:
         if stage != self._stage:
             if self._stage:
                 self._taken.setdefault(self._stage, now - self._began)
-            self._stage, self._began = stage, now
+            self._stage, self._began, self._kept = stage, now, 0.0
         self._spent = now - self._began
         share, left = (message.get(key) for key in ("part", "part_seconds_left"))
+        self._told_itself = isinstance(share, int | float)
         if isinstance(share, int | float):
             self._share, self._own_left = float(share), float(left) if isinstance(left, int | float) else None
         else:
@@ -144,7 +178,7 @@ class ProgressEstimate:
         self.fraction = max(self.fraction, min(done / whole if whole else 0.0, 0.999))
         own = self._own_left
         if own is None:
-            own = max((1.0 - self._share) * self._expected[self._stage], 0.0)
+            own = max((1.0 - self._share) * self._expected[self._stage] * self._pace(), 0.0)
         rest = sum(self._expected[name] for name in names[here + 1 :]) * self._pace()
         if self._planned:
             self._set_left(own + rest, added)
@@ -152,16 +186,21 @@ class ProgressEstimate:
             self._set_left(own, "")
 
     def _pace(self) -> float:
-        """Ratio of finished stages' time to the plan, within plausible bounds.
+        """Ratio of what has run to its plan, within plausible bounds.
 
         Four seconds say little of ten minutes: less than SURE of the whole is weighted by its share of that.
         """
-        expected = sum(self._expected[name] for name in self._taken)
+        ran = [(s, self._expected[name]) for name, s in self._taken.items()]
+        share = self._share - self._kept
+        if self._told_itself and share >= SURE:
+            ran.append((self._spent, share * self._expected[self._stage]))
+        ran = [(s, expected) for s, expected in ran if s >= SKIPPED * expected]
+        expected = sum(e for _, e in ran)
         if expected <= 1.0:
-            return 1.0
-        factor = min(max(sum(self._taken.values()) / expected, 0.2), 5.0)
+            return self._slowed
+        factor = min(max(sum(s for s, _ in ran) / expected, PACES[0]), PACES[1])
         weight = min(expected / (SURE * sum(self._expected.values())), 1.0)
-        return 1.0 + weight * (factor - 1.0)
+        return self._slowed + weight * (factor - self._slowed)
 
     def _set_left(self, left: float, added: str) -> None:
         """Set the time left: it shrinks, or grows by so much that the reason is reported."""

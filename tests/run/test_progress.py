@@ -192,6 +192,12 @@ def test_half_a_line_of_a_killed_process_does_not_take_the_next_one_with_it(tmp_
     assert json.loads(lines[2])["what"] == "next"
 
 
+@pytest.fixture
+def quiet_machine(monkeypatch):
+    monkeypatch.setattr("mu_addon.run.progress.slowed_by_others", lambda: 1.0)
+
+
+@pytest.mark.usefixtures("quiet_machine")
 def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
     stream, messages = io.StringIO(), []
     progress = Progress([terminal(stream, clock), messages.append], clock)
@@ -217,10 +223,10 @@ def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
         "  0 %  mesh ...",
         " 10 %  mesh: done in 10 s",
         " 10 %  Model A ...",
-        " 37 %  Model A: for 20 s, 50 s left",
-        " 63 %  Model A: for 40 s, 30 s left",
-        " 63 %  Model A: for 1 min 00 s, 40 s left (Model A takes longer than expected)",
-        " 63 %  Model A: for 1 min 40 s, 1 min 00 s left (Model A takes longer than expected)",
+        " 37 %  Model A: for 20 s, 48 s left",
+        " 63 %  Model A: for 40 s, 28 s left",
+        " 63 %  Model A: for 1 min 00 s, 51 s left (Model A takes longer than expected)",
+        " 63 %  Model A: for 1 min 40 s, 1 min 37 s left (Model A takes longer than expected)",
         " 90 %  Model A: done in 1 min 40 s",
         " 90 %  report ...",
         "100 %  report: done in 10 s",

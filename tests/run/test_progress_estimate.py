@@ -1,9 +1,10 @@
 """The whole of a run: a fraction that grows, a time left that shrinks or says why not."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.run.progress_estimate import ProgressEstimate
+from mu_addon.run.progress_estimate import Pace, ProgressEstimate
 
 PLAN = (("mesh", 10.0), ("Model A", 60.0), ("report", 10.0))
 
@@ -52,10 +53,10 @@ def test_a_longer_time_says_why_and_a_little_longer_one_is_not_told():
     assert run.seconds_left == 63.0
     assert run.why == ""
     run.tell(message("Model A", 0.11, 30.0, 240.0))
-    assert run.seconds_left == 250.0
+    assert 240.0 < run.seconds_left < 300.0
     assert run.why == "Model A takes longer than expected"
-    run.tell(message("Model A", 0.5, 60.0, 60.0))
-    assert run.seconds_left == 70.0
+    run.tell(message("Model A", 0.5, 45.0, 45.0))
+    assert run.seconds_left == 60.0, "the report at Model A's pace, too"
     assert run.why == ""
     run.tell(message("mesh check", None, 0.0))
     assert run.count == 4
@@ -193,4 +194,40 @@ def test_a_slow_first_step_does_not_frighten():
     assert run.seconds_left < 150.0
     clock.now = 120.0
     run.tell(message("specimen", 0.25, 120.0, 360.0))
-    assert run.seconds_left == 370.0
+    assert run.seconds_left == pytest.approx(360.0 + 10.0 * 120.0 / (0.25 * 110.0)), "at the specimen's pace"
+
+
+def test_a_stage_goes_on_at_the_pace_of_its_later_part():
+    """Candidates of which the cache had half at once said that a second was left, for four minutes."""
+    pace = Pace()
+    assert pace.left(0.0) is None
+    pace.tell(0.2, 0.5)
+    assert pace.left(10.0) is None, "what was in the cache says nothing of the rest"
+    pace.tell(20.0, 0.6)
+    assert pace.left(25.0) == pytest.approx(0.4 / 0.1 * 19.8 - 5.0)
+    # The first tenth took longer: it compiles.
+    pace = Pace()
+    for at, share in ((30.0, 0.1), (42.0, 0.2), (54.0, 0.3), (66.0, 0.4), (78.0, 0.5), (90.0, 0.6)):
+        pace.tell(at, share)
+    assert pace.left(90.0) == pytest.approx(48.0)
+
+
+def test_what_the_cache_had_says_nothing_of_the_pace():
+    """Of a run that goes on, stages that ended at once made a fifth of the time that the rest took."""
+    run, clock = estimate((("Model A", 60.0), ("candidates", 100.0), ("report", 10.0)))
+    clock.now = 0.5
+    run.tell(message("Model A", 1.0, 0.5, state="end"))
+    run.tell(message("candidates", None, 0.0, state="start"))
+    assert run.seconds_left == 110.0
+    run.tell(message("candidates", 0.5, 0.1))
+    assert run.seconds_left == 60.0
+
+
+def test_a_busy_machine_is_as_slow_as_its_load_until_the_run_knows_its_own_pace():
+    clock = Clock()
+    run = ProgressEstimate(PLAN, clock, slowed=4.0)
+    run.tell(message("mesh", None, 0.0, state="start"))
+    assert run.seconds_left == 320.0
+    clock.now = 10.0
+    run.tell(message("mesh", 1.0, 10.0, state="end"))
+    assert run.seconds_left == 70.0, "it was quiet again"

@@ -75,7 +75,7 @@ def swept(folder, mesh, solved_on, trajectory, jobs):
     sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
     evaluations = sweep.evaluations(trajectory, lambda _: None)
     sweep.close()
-    keep_motion(JOB, folder, mesh, solved_on, trajectory, sweep, jobs)
+    keep_motion(JOB, folder, mesh, solved_on, trajectory, sweep, jobs, lambda share: None)
     return sweep, evaluations
 
 

@@ -21,7 +21,9 @@ from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...placement.sampling import between, relative_error, solution_order
 from ...run.cache import Cache, key
+from ...run.progress import within
 from .candidate_pool import CandidatePool, CandidateProblem, Moved
+from .expected import work
 from .job import Job
 
 Array = np.ndarray[Any, Any]
@@ -32,6 +34,8 @@ SAMPLING_ERROR = 0.02
 # printed struts that snap and touch one by one, to this share of what the candidate deviates by.
 PATH_DIFFERENCE_MM = 1e-5
 PATH_DIFFERENCE_SHARE = 0.02
+BEFORE_VERIFYING = 0.8
+"""Share done before one candidate is followed along its whole path."""
 LOWER = "lower the pressure, thicken the wall or stiffen the material"
 """Remedy where candidates have no equilibrium."""
 
@@ -204,10 +208,13 @@ class CandidateSolver:
         loaded = sum(map(len, order))
         weight = np.bincount(trajectory.index, minlength=len(distinct)) * compared
         known: dict[int, Array] = {}
+        # Each round may be the last, and takes half of what is left; the path from rest comes after.
+        done, of_rounds = 0.0, BEFORE_VERIFYING if verify else 1.0
         for pair in order:
+            part = (of_rounds - done) / 2.0 / len(pair)
             for numbers in self._together(distinct, pair):
-                share = partial(_in_share, on_progress, len(known) / loaded, len(numbers) / loaded)
-                found = self._solved(trajectory, numbers, share)
+                begun, done = done, done + part * len(numbers)
+                found = self._solved(trajectory, numbers, within(on_progress, begun, done))
                 known |= {number: points - still[number] for number, points in found.items()}
             self.error = 0.0
             if len(known) < loaded:
@@ -302,8 +309,9 @@ class CandidateSolver:
                     missing.append((row, part))
                 else:
                     points[row, list(setting.parts[part])] = kept["moved_mm"]
-        total = len(numbers) * len(self._parts)
-        done = total - len(missing)
+        weights = [max(work(self._job, [trajectory.solved[n].pressure_kPa]), 1.0) for n in numbers]
+        total = sum(weights) * len(self._parts)
+        done = total - sum(weights[row] for row, _ in missing)
         ways = {row: _way(trajectory.solved, trajectory.solved[numbers[row]]) for row, _ in missing}
         tasks = [(ways[row], part) for row, part in missing]
         on_progress(done / total)
@@ -315,7 +323,7 @@ class CandidateSolver:
                 raise _NotReachedError(trajectory.solved[numbers[row]].pressure_MPa, path, found.what)
             self._keep(ways[row], part, found)
             points[row, list(setting.parts[part])] = found[-1].anchors
-            done += 1
+            done += weights[row]
             on_progress(done / total)
         return dict(zip(numbers, points, strict=True))
 
@@ -347,10 +355,6 @@ def _way(states: Sequence[State], to: State) -> tuple[State, ...]:
     """States between rest and one of them, in order of pressure, and that one last."""
     pressures = np.array([state.pressure_MPa for state in states])
     return (*(states[n] for n in _outward(pressures, to.pressure_MPa)[:-1]), to)
-
-
-def _in_share(on_progress: Callable[[float], None], done: float, share: float, of_share: float) -> None:
-    on_progress(done + share * of_share)
 
 
 def _outward(distinct: Array, target: float) -> Array:

@@ -11,19 +11,33 @@ if TYPE_CHECKING:
     from ...run.progress_estimate import Plan
     from .job import Job
 
+BEST = "solid with the best path"
+"""Stage of the printable unit with the path that a ranking chose."""
 FULL_S = {
-    "solid": 4.0, "mesh": 4.0, "Model A": 100.0, "candidates": 200.0, "mesh check": 100.0, "map": 5.0,
-    "light": 20.0, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
-    "motion of the best path": 60.0, "report": 30.0,
+    "solid": 1.5, "mesh": 1.5, "Model A": 32.0, "candidates": 15.0, "mesh check": 20.0, "map": 8.0,
+    "light": 10.0, BEST: 1.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
+    "motion of the best path": 60.0, "report": 17.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
-PACE = {"full": 1.0, "resolved": 20.0, "quick": 6.0}
-"""Factor on the seconds of a study's equilibria by its detail."""
-MODEL_A_S = {"resolved": 350.0, "quick": 100.0}
-"""Seconds of Model A alone, where measured: the printed body's candidates were not."""
+BY_DETAIL_S = {
+    "full": {},
+    "resolved": {
+        "mesh": 10.0,
+        "Model A": 350.0,
+        "candidates": 4000.0,
+        "mesh check": 1500.0,
+        "check of the best paths": 4000.0,
+    },
+    "quick": {"Model A": 100.0, "candidates": 1200.0, "mesh check": 600.0, "check of the best paths": 1200.0},
+}
+"""Seconds of stages by a study's detail, where they differ from `FULL_S`."""
+LEAST_S = {"Model A": 3.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
+"""Seconds that a stage takes on any mesh, of those that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-TOUCHING = 7.0
-"""Factor on the seconds of a state under suction where the printed body's walls touch."""
+SOLVING = {"Model A": {"full": 0.8, "resolved": 0.88}, "candidates": {"full": 0.45, "resolved": 0.97}}
+"""Share of a stage's time until its last equilibrium."""
+TOUCHING = 6.0
+"""Factor on the seconds of a state at -20 kPa where the printed body's walls touch; by the square of that."""
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.
 _SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
@@ -57,22 +71,20 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
     names = ["solid", *(["mesh", "Model A"] if simulate else [])]
     if place:
         names += ["candidates", *(["mesh check"] if mesh_check else []), "map", "light"]
-        names += [name for name in FULL_S if "path" in name] if graph else []
+        names += [name for name in FULL_S if "path" in name and name != BEST] if graph else []
+        names.append(BEST)
     return [*names, "report"]
 
 
 def work(job: Job, pressures_kPa: Iterable[float]) -> float:
     """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
-    suction = TOUCHING if job.mesh.resolved and job.self_contact else 1.0
-    return sum(suction if p < 0 else 1.0 for p in pressures_kPa if p)
+    touches = job.mesh.resolved and job.self_contact
+    return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
 
 
 def seconds_of(name: str, detail: str) -> float:
-    """Seconds of a stage on two cores by the study's detail, a key of `PACE`; the rest as in `FULL_S`."""
-    stage = name.partition(" with ")[0]
-    if stage == "Model A" and detail in MODEL_A_S:
-        return MODEL_A_S[detail]
-    return FULL_S[stage] * (PACE[detail] if stage in SOLVED else 1.0)
+    """Seconds of a stage on two cores by the study's detail, a key of `BY_DETAIL_S`."""
+    return BY_DETAIL_S[detail].get(name) or FULL_S[BEST if name.startswith("solid with ") else name]
 
 
 def plan_of(job: Job) -> Plan:
@@ -89,4 +101,9 @@ def plan_of(job: Job) -> Plan:
     shipped = work(job, _SHIPPED)
     by = BY_WALL if job.mesh.resolved and job.mesh.refine < 1.0 else BY_REFINEMENT
     factor = job.mesh.refine**by * max(states, 1) / shipped * (LINEAR if job.mesh.order == 1 else 1.0)
-    return [(name, seconds_of(name, detail) * (factor if name in SOLVED else 1.0)) for name in names]
+
+    def seconds(name: str) -> float:
+        scaled = factor if name in LEAST_S or name in SOLVED else 1.0
+        return max(LEAST_S.get(name, 0.0), scaled * seconds_of(name, detail))
+
+    return [(name, seconds(name)) for name in names]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,10 +31,12 @@ def keep_motion(
     trajectory: Trajectory,
     solver: CandidateSolver,
     jobs: list[tuple[Candidate, str]],
+    on_progress: Callable[[float], None],
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
 
-    own: the study's mesh; mesh: the same, or that of the whole body of which it is a half.
+    own: the study's mesh; mesh: the same, or that of the whole body of which it is a half. on_progress:
+    called with the finished share.
     """
     unit, rule = job.unit, job.headline_rule
     image = images(own, mesh)
@@ -43,7 +46,7 @@ def keep_motion(
     candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
     by_pressure = {state.pressure_kPa: state.u for state in trajectory.solved}
     without: dict[str, Array] = {}
-    for name, pressure_kPa, difference_mm in solver.whole(trajectory):
+    for number, (name, pressure_kPa, difference_mm) in enumerate(solver.whole(trajectory)):
         still = [by_pressure[p] for p in pressure_kPa]
         without = without or looked.of_states(still, materials)
         stiff = materials
@@ -60,6 +63,7 @@ def keep_motion(
                 fields[key], further[IMAGE + key] = values[:, :count], values[:, count:]
             difference_mm = difference_mm[:, : len(own.nodes)]
         write_path(folder, name, pressure_kPa, difference_mm, **fields, **further)
+        on_progress((number + 1) / len(candidates))
 
 
 def images(half: Mesh, mesh: Mesh) -> Array | None:

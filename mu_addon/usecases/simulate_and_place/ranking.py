@@ -14,6 +14,7 @@ from ...errors import ConvergenceError
 from ...files import write_csv, write_npz
 from ...placement.candidates import Candidate, Evaluation
 from ...placement.deviation import rank
+from ...run.progress import within
 from .candidate_states import CandidateSolver
 from .candidates_in_time import evaluations
 from .path_motion import keep_motion
@@ -90,6 +91,7 @@ def solve_candidates(
     trajectory: Trajectory,
     jobs: list[tuple[Candidate, str]],
     on_progress: Callable[[float], None],
+    solving: float = 1.0,
     under_way: CandidateSolver | None = None,
     verify: bool = False,
     shown: tuple[Path, Mesh] | None = None,
@@ -98,7 +100,8 @@ def solve_candidates(
 
     under_way: a solver that was given Model A's states as they were found; verify: see
     `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
-    study, which is the same or the half of it. Raises ConvergenceError.
+    study, which is the same or the half of it, which takes what `solving`, a share, leaves. Raises
+    ConvergenceError.
     """
     if job.in_time:
         found, not_reached = evaluations(job, cache, mesh, trajectory, jobs, on_progress)
@@ -106,9 +109,9 @@ def solve_candidates(
     whole = job.headline_rule if shown else ""
     solver = under_way or CandidateSolver(job, cache, mesh, jobs, trajectory.pressure_kPa, whole)
     with closing(solver):
-        found = solver.evaluations(trajectory, on_progress, verify)
+        found = solver.evaluations(trajectory, within(on_progress, 0.0, solving), verify)
         if shown:
-            keep_motion(job, *shown, mesh, trajectory, solver, jobs)
+            keep_motion(job, *shown, mesh, trajectory, solver, jobs, within(on_progress, solving, 1.0))
     return found, {
         "pressures_solved_kPa": solver.solved_kPa,
         "relative_error_between": solver.error,

@@ -68,13 +68,15 @@ def write_report(study: Study, stopped: str = "") -> None:
 
     if study.has_more and (study.folder / "report.html").is_file():
         return
-    with study.progress.stage("report", expected_s=15.0):
+    with study.progress.stage("report"):
         versions = package_versions()
         view, pictures = _pictures(study)
         if pictures:
             write_bytes(study.folder / "unit.png", pictures[0].png)
         _panel_pictures(study)
+        study.progress.update(0.75)
         data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
+        study.progress.update(0.9)
         write_html(study.folder / "report.html", data)
 
 
@@ -281,6 +283,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             "Bellows of six chambers inside a lattice of struts, cut along the plane of bending.",
         )
     ]
+    study.progress.update(0.2)
     if study.trajectory is not None and study.mesh is not None:
         states = sorted(study.trajectory.solved, key=lambda s: s.pressure_MPa)
         shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
@@ -291,7 +294,10 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             words = f"{state.pressure_kPa:g} kPa: {angle:.1f}°"
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts, beside=study.job.obstacles)
-    return side_view(parts, study.anchors, path, radius), pictures
+    study.progress.update(0.45)
+    view = side_view(parts, study.anchors, path, radius)
+    study.progress.update(0.65)
+    return view, pictures
 
 
 def _painted(study: Study, field: str, low: float, least: float, word: str) -> PaintedStates | None:

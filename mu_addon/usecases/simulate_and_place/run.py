@@ -8,7 +8,7 @@ from typing import Any
 from ...design.anchors import window
 from ...run.context import RunContext
 from ...run.usecase import UseCase
-from .expected import plan_of
+from .expected import BEST, plan_of
 from .graph_search import chains_within, search_graph, sensitivity_map
 from .job import Job, read_job
 from .light import signals
@@ -54,7 +54,7 @@ def run_stages(study: Study) -> None:
             signals(study, job.optics)
         if job.paths == "graph":
             search_graph(study)
-        study.design(window(job.unit, chosen[job.headline_rule]))
+        study.design(window(job.unit, chosen[job.headline_rule]), BEST)
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:

@@ -28,11 +28,11 @@ from ...resolved.lattice import strut_volume_mm3
 from ...run.cache import Cache
 from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space
-from ...run.progress import Progress
+from ...run.progress import Progress, within
 from ...run.versions import package_versions
 from .analysis_mesh import analysis_mesh
 from .candidate_states import CandidateSolver
-from .expected import expected_bytes, expected_nodes
+from .expected import SOLVING, expected_bytes, expected_nodes
 from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
@@ -169,10 +169,10 @@ class Study:
 
     # Stages, in the order they need each other.
 
-    def design(self, window: Window | None = None) -> Solid:
+    def design(self, window: Window | None = None, stage: str = "") -> Solid:
         """Printable solid, its STL and the lattice nodes; with a window, the unit with that waveguide."""
         name = "unit.stl" if window is None else f"unit_{window.name}.stl"
-        with self.progress.stage("solid" if window is None else f"solid with {window.name}", 3.0):
+        with self.progress.stage(stage or (f"solid with {window.name}" if window else "solid")):
             solid = build_solid(self.job.unit, window, self.job.quality, self.job.body)
             write_stl(solid, self.folder / name)
             write_nodes(self.job.unit, self.folder / "anchors.txt")
@@ -203,7 +203,7 @@ class Study:
         candidates_beside: let other processes solve the candidates as soon as a state is there.
         """
         assert self.mesh is not None
-        job, samples = self.job, self.job.samples
+        job, samples, states = self.job, self.job.samples, self._solving("Model A")
         with self.progress.stage("Model A"):
             model = job.model(self.mesh)
             if candidates_beside and job.workers > 1 and not job.in_time:
@@ -211,7 +211,7 @@ class Study:
                 self._ahead = CandidateSolver(job, self.cache, self.mesh, jobs, samples[1], job.headline_rule)
             try:
                 self.trajectory, self.contact = solve_model_a(
-                    job, self.cache, model, samples, self.progress.update, self._reached
+                    job, self.cache, model, samples, within(self.progress.update, 0.0, states), self._reached
                 )
             except BaseException:
                 if self._ahead is not None:
@@ -230,6 +230,11 @@ class Study:
             "largest_relative_residual": max((s.residual for s in solved), default=0.0),
         }
         return self.trajectory
+
+    def _solving(self, stage: str) -> float:
+        """Share of a stage's time until its last equilibrium; the rest goes into tables, fields and files."""
+        assert self.mesh is not None
+        return SOLVING[stage]["resolved" if self.mesh.resolved else "full"]
 
     def _reached(self, state: State) -> None:
         self.states.append(state)
@@ -303,15 +308,19 @@ class Study:
         under_way: CandidateSolver | None = None,
         verify: bool = False,
         to_look_at: bool = False,
+        done: float = 0.0,
     ) -> list[Evaluation]:
         """Evaluation of every (candidate, rule) on a mesh against its Model A; see `ranking`.
 
-        to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's.
+        to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's. done: share of
+        the stage that is done before.
         """
         assert self.mesh is not None
         shown = (self.folder, self.mesh) if to_look_at else None
+        update = within(self.progress.update, done, 1.0)
+        solving = self._solving("candidates") if shown else 1.0
         found, figures = solve_candidates(
-            self.job, self.cache, mesh, trajectory, jobs, self.progress.update, under_way, verify, shown
+            self.job, self.cache, mesh, trajectory, jobs, update, solving, under_way, verify, shown
         )
         if not figures.pop("independent_of_path", True):
             self.warn(
@@ -341,10 +350,12 @@ class Study:
         if self.mesh is not None and self.mesh.resolved:
             jobs = self.ranking.best(jobs, PATHS_CHECKED)
         with self.progress.stage("mesh check"):
-            mesh = analysis_mesh(job, coarse, self.cache, self.progress.update, self.warn)
+            meshing, moving = 0.04, 0.5
+            update = self.progress.update
+            mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing), self.warn)
             model = job.model(mesh)
-            trajectory, _ = solve_model_a(job, self.cache, model, samples, self.progress.update)
-            found = self.solve_candidates(mesh, trajectory, jobs)
+            trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
+            found = self.solve_candidates(mesh, trajectory, jobs, done=moving)
         fine = self.ranking.evaluations
         self.ranking = Ranking(fine, mesh_change_mm(job, fine, found, instants))
 
