@@ -17,7 +17,10 @@ _JUDGED = 400
 # Lines that a title in quotes may have.
 _MOST_LINES = 5
 _SPACES = re.compile(r"\s{2,}|\t")
-_BRACKET = re.compile(r"\s+(?=[(\[])")
+# Between a title and its unit, not between two units.
+BRACKET = re.compile(r"(?<=[^\s)\]])\s+(?=[(\[])")
+# As loggers write a cell that a spreadsheet shall not change.
+_TEXT_FORMULA = re.compile(r'="+([^"]*)"*')
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
 
@@ -125,7 +128,7 @@ def split(line: str, delimiter: str) -> tuple[str, ...]:
         cells = (
             words
             if 2 * numbers >= len(words) and numbers > 1
-            else _SPACES.split(_BRACKET.sub(" ", line.strip()))
+            else _SPACES.split(BRACKET.sub(" ", line.strip()))
         )
     elif '"' in line:
         try:
@@ -138,6 +141,8 @@ def split(line: str, delimiter: str) -> tuple[str, ...]:
         cells = line.split(delimiter)
     # Line ends in a title are spaces; other spaces keep their kind, which may divide thousands.
     cells = [cell.replace("\r", "").replace("\n", " ").strip().strip('"').strip() for cell in cells]
+    if '="' in line:
+        cells = [_TEXT_FORMULA.sub(r"\1", cell) for cell in cells]
     while cells and not cells[-1]:
         cells.pop()
     return tuple(cells)

@@ -10,8 +10,11 @@ from ..errors import InputError
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # Encodings other than UTF-8, the most usual first: computers of western and central Europe, Cyrillic,
-# Turkish, DOS and Macintosh ones, Chinese, Japanese and Korean.
-_OTHERS = ("cp1252", "cp1250", "cp1251", "cp1254", "cp850", "mac_roman", "gb18030", "cp932", "cp949", "cp866")
+# Turkish, DOS and Macintosh ones, Chinese, Japanese, Korean and Taiwan's.
+_OTHERS = (
+    *("cp1252", "cp1250", "cp1251", "cp1254", "cp850", "mac_roman"),
+    *("gb18030", "cp932", "cp949", "cp866", "cp950"),
+)
 # First bytes of files that are no text or table, and the remedy.
 _BINARY = (
     (b"%PDF", "a PDF", "export the data as CSV"),

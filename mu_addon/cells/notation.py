@@ -41,6 +41,8 @@ _BOTH = {
 }
 _LIKE = re.compile(rf"{_SIGNED}(?:\d+(?:[.,' ]\d{{2,3}})*(?:[.,]\d*)?|[.,]\d+){_EXPONENT}")
 _WITH_UNIT = re.compile(r"([+-]? ?[\d.,' ]*\d[.,]?(?:[eE][+-]?\d+)?) ?([^\d\s.,+-][^\d\s]{0,9})")
+# A negative number as accountants write it; in a row of units "(1)" is none.
+_IN_BRACKETS = re.compile(r"\(([\d.,' ]*\d[.,]\d+)\)")
 # Numbers that float() reads like the pattern of a decimal point.
 _SIMPLE = re.compile(r"[-+0-9.eE\n]*")
 
@@ -62,8 +64,10 @@ class Numbers:
 
 
 def plain_signs(cell: str) -> str:
-    """A cell with ASCII minus signs, spaces and apostrophes."""
-    return cell if cell.isascii() else cell.translate(_SIGNS).strip()
+    """A cell with ASCII minus signs, spaces and apostrophes; "(1.5)" as "-1.5"."""
+    cell = cell if cell.isascii() else cell.translate(_SIGNS).strip()
+    negative = _IN_BRACKETS.fullmatch(cell) if cell.startswith("(") else None
+    return f"-{negative[1]}" if negative else cell
 
 
 def is_like_number(cell: str) -> bool:

@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from ..cells.clock import clock, is_clock
-from ..cells.dialect import Row, split
+from ..cells.dialect import BRACKET, Row, split
 from ..cells.notation import judged, number, unit_behind, without_units
 from ..errors import InputError
 from .columns import Column, column, is_unit, plain
@@ -314,7 +314,7 @@ class _Finding:
                 known = any(column(part).quantity or is_unit(part) for part in parts)
                 if len(parts) == width and all(parts) and known:
                     return attrs.evolve(row, cells=parts)
-            words = re.sub(r"\s+(?=[(\[])", "\u00a0", text).split(" ")
+            words = BRACKET.sub("\u00a0", text).split(" ")
             if len(words) == width and self.sheet.delimiter == "spaces":
                 return attrs.evolve(row, cells=tuple(word.replace("\u00a0", " ") for word in words))
         return attrs.evolve(row, cells=cells)

@@ -143,11 +143,12 @@ _WORDS = tuple(
         ("added_mass", r"added.mass|zusatzmasse"),
         (
             "displacement",
-            r"extension|displacement|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"extension|displacement|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
             r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
             r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
             r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
-            r"перемещение|удлинение|деформация|位移|变形|変位|伸び|변위|신율",
+            r"перемещение|удлинение|деформация|位移|变形|變形|変位|變位|伸び|"
+            r"ストローク|변위|신율",
         ),
         ("strain", r"deformac|deformazione|deformation|деформация"),
         ("position", r"position|crosshead|traverse|traversenweg|横梁"),

@@ -230,7 +230,10 @@ def test_a_title_of_another_quantity_goes_by_its_unit(tmp_path):
         ),
         ("\u65f6\u95f4;\u529b;\u4f4d\u79fb", "gb18030"),
         ("\u6642\u9593;\u8377\u91cd;\u5909\u4f4d", "cp932"),
+        ("\u6642\u9593;\u8a66\u9a13\u529b;\u30b9\u30c8\u30ed\u30fc\u30af", "cp932"),
         ("\uc2dc\uac04;\ud558\uc911;\ubcc0\uc704", "cp949"),
+        ("\u6642\u9593;\u8377\u91cd;\u4f4d\u79fb", "cp950"),
+        ("Time;Load;Disp.", "ascii"),
         ("Czas;Si\u0142a;Przemieszczenie", "cp1250"),
         ("S\u00fcre;Kuvvet;Uzama", "cp1254"),
         ("Tijd;Kracht;Verplaatsing", "ascii"),
@@ -288,6 +291,21 @@ def test_units_behind_every_number_and_values_of_no_unit(tmp_path):
     p, _ = one(tmp_path, text)
     assert p.columns["time_s"][-1] == pytest.approx(0.039)
     assert p.columns["force_N"][-1] == 78.0
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda row: ",".join(f'="{cell}"' for cell in row.split(",")),
+        lambda row: ",".join(f'"=""{cell}"""' for cell in row.split(",")),
+        lambda row: " ".join(f"{cell:>12}" for cell in row.split(",")),
+    ],
+    ids=["formula", "quoted formula", "fixed width"],
+)
+def test_cells_as_programs_fill_them(tmp_path, written):
+    body = [written(row) for row in rows()]
+    p, _ = one(tmp_path, lines(written("Time,Load,Extension"), written("(s),(N),(mm)"), *body))
+    assert [values[-1] for values in p.columns.values()] == pytest.approx([9.9, 49.5, 9.9])
 
 
 def test_commas_between_columns_and_in_numbers_are_refused(tmp_path):
