@@ -44,6 +44,8 @@ _OTHERS = (
     (b"version https://git-lfs", (), "a pointer of Git LFS", "fetch the file itself with git lfs pull"),
     (b"<", (".html", ".xml"), "a web page or XML", "download the file itself, or export the part as STL"),
 )
+_SOLID = re.compile(rb"(\xef\xbb\xbf)?\s*solid\s", re.IGNORECASE)
+_POINT = re.compile(rb"(?:^|[\r\n])[ \t]*v[ \t]+[-+.\d]")
 # Errors by meshio for an invalid PLY file.
 _DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
 
@@ -51,14 +53,14 @@ _DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, Arithme
 def read_surface(content: bytes, name: str, most_triangles: int | None = None) -> tuple[Vertices, Triangles]:
     """Points (n, 3) and triangles (m, 3) of a file's content; polygons are triangulated in their plane.
 
-    name: of the file, whose suffix tells OBJ and PLY; all else is STL, binary or text. most_triangles: refuse
-    an STL file with more before it is parsed. Raises InputError with the line or number at fault.
+    name: of the file, whose suffix tells the type where the content does not. most_triangles: refuse an STL
+    file with more before it is parsed. Raises InputError with the line or number at fault.
     """
     require_mesh(content[:64], name)
-    suffix = PurePath(name).suffix.lower()
-    if suffix == ".obj":
+    kind = _kind(content) or PurePath(name).suffix.lower()
+    if kind == ".obj":
         points, triangles = _obj(_text(content), name)
-    elif suffix == ".ply" or content[:3] == b"ply":
+    elif kind == ".ply":
         points, triangles = _ply(content, name)
     else:
         return _stl(content, name, most_triangles)
@@ -75,6 +77,21 @@ def require_mesh(content: bytes, name: str) -> None:
         raise InputError(f"the file is {what}, no STL, OBJ or PLY", name, remedy)
 
 
+def _kind(content: bytes) -> str:
+    """Suffix of the type that content is, "" where it does not tell."""
+    if _binary_triangles(content) is not None or _SOLID.match(content):
+        return ".stl"
+    if content[:3] == b"ply":
+        return ".ply"
+    return ".obj" if _POINT.search(content[: 1 << 16]) and b"\0" not in content[:80] else ""
+
+
+def _binary_triangles(content: bytes) -> int | None:
+    """Number of triangles of a binary STL, which may end in a few other bytes; None if it is none."""
+    count = int.from_bytes(content[80:84], "little")
+    return count if len(content) >= 84 and 0 <= len(content) - 84 - 50 * count < 50 else None
+
+
 def _text(content: bytes) -> str:
     """Text with any line ends; bytes that are not ASCII, in names, stay as they are."""
     return content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
@@ -85,9 +102,9 @@ def _malformed(name: str, why: str) -> InputError:
 
 
 def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangles]:
-    count = int.from_bytes(content[80:84], "little")
-    binary = len(content) >= 84 and len(content) == 84 + 50 * count
-    if not binary:
+    count = _binary_triangles(content)
+    binary = count is not None
+    if count is None:
         text = _text(content).lower()
         count = sum(1 for _ in _VERTEX.finditer(text)) // 3
     if most is not None and count > most:
@@ -96,7 +113,7 @@ def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangl
             name,
             f"simplify it to {most} at most, or check its parts one by one",
         )
-    return stl_surface(content) if binary else _text_stl(text, name)
+    return stl_surface(content[: 84 + 50 * count]) if binary else _text_stl(text, name)
 
 
 def _text_stl(text: str, name: str) -> tuple[Vertices, Triangles]:

@@ -133,6 +133,7 @@ class Accounts:
         # The first piece may be the rest of a line.
         _, *whole = seen.split(b"\n") if seen.count(b"\n") > 1 else [b"", seen]
         first = self._first_line or next((text for line in whole if (text := text_of(line))), "")
+        self._first_line = first
         quoted = f": the first line is {first[:80]!r}, in which {why_unread(first)}" if first else ""
         return (
             f"the input is text in an unknown format{quoted}",

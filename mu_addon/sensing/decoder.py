@@ -41,6 +41,7 @@ class Decoder:
         # Whether the next piece may lack its beginning.
         self._first = True
         self._bad_in_a_row = 0
+        self._ends_in_cr = False
         self._at = 0.0
         # CSV; labels, a sample that is not whole yet; frames, samples that wait for their channels' names.
         self._csv = CsvColumns()
@@ -70,6 +71,7 @@ class Decoder:
         """Samples in bytes that arrived at host time `at` in s, a group for each run with one layout."""
         self.counters.bytes += len(data)
         self._buffer += data
+        self._mend_line_ends(data)
         self._at = at
         if self.format is None:
             self._detect_format()
@@ -151,6 +153,14 @@ class Decoder:
         if pieces:
             self._buffer = bytearray(rest)
         return [piece + end for piece in pieces]
+
+    def _mend_line_ends(self, data: bytes) -> None:
+        """Take CR for the end of a line once several have come, and neither LF nor the end of a frame."""
+        if b"\n" in data or END in data or self.format == "frames":
+            self._ends_in_cr = False
+        elif self._ends_in_cr or (self._buffer.count(b"\r") >= ENOUGH and b"\n" not in self._buffer):
+            self._ends_in_cr = True
+            self._buffer = self._buffer.replace(b"\r", b"\n")
 
     # The format.
 

@@ -25,6 +25,8 @@ FORMATS = ("frames", *TEXT_READERS)
 # Select Graphic Rendition of ECMA-48, as device logs have it around a line or a label.
 _COLOUR_CODES = re.compile(rb"\x1b\[[0-9;:]*m")
 
+_LATIN_SIGNS = "\u00b0\u00b5\u00ba".encode("latin-1")
+
 
 def format_of(data: bytes, whole: bool, enough: int, last: str | None) -> str | None:
     """One of FORMATS, or None where too few pieces, less than `enough`, can be read as any.
@@ -62,8 +64,12 @@ def without_colour(piece: bytes) -> bytes:
 
 def text_of(piece: bytes) -> str | None:
     """A line as text without colour codes, and without blanks around it, or None if it is none."""
+    piece = without_colour(piece)
     try:
-        line = without_colour(piece).decode().strip()
+        line = piece.decode().strip()
     except UnicodeDecodeError:
-        return None
+        # Signs of units in Latin-1, of a sketch that was saved so.
+        if not piece.translate(None, _LATIN_SIGNS).isascii():
+            return None
+        line = piece.decode("latin-1").strip()
     return line if line.replace("\t", " ").isprintable() else None

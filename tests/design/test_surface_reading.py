@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from mu_addon.design.surface import volume, weld
+from mu_addon.design.surface import stl_bytes, volume, weld
 from mu_addon.design.surface_reading import read_surface
 from mu_addon.errors import InputError
 
@@ -77,6 +77,10 @@ FILES = {
     "mac.stl": stl(CORNERS).replace("\n", "\r"),
     "marked.stl": "\ufeff" + stl(CORNERS),
     "blank.stl": "\n" + stl(CORNERS).replace("endsolid", "\n\nendsolid"),
+    "of another type.obj": stl(CORNERS),
+    "of another type.stl": obj(),
+    "with a tail.stl": stl_bytes(CORNERS.reshape(-1, 3), np.arange(CORNERS.size // 3).reshape(-1, 3))
+    + bytes(7),
     "ascii.ply": ply(),
     "windows.ply": ply().replace(b"\n", b"\r\n"),
     "index.ply": ply(faces="vertex_index"),

@@ -276,6 +276,23 @@ def test_values_with_units_words_and_decimal_commas_are_read(line):
     assert decoder.why_no_sample is None
 
 
+@pytest.mark.parametrize("sent", ["light: 1.5 V\r", "T: 24.0\u00b0C, light: 1.5 V\n"])
+def test_lines_that_end_in_cr_and_signs_in_latin_1_are_read(sent):
+    decoder = Decoder()
+    groups = [group for k in range(60) for group in decoder.feed(sent.encode("latin-1"), 0.02 * k)]
+    groups += decoder.finish(2.0)
+    assert sum(len(group.values) for group in groups) == 59
+    assert groups[-1].values[-1][-1] == 1.5
+
+
+def test_a_line_in_no_known_format_is_complained_about_once():
+    decoder, told = Decoder(), set()
+    for k in range(2000):
+        decoder.feed(f"I ({k}) adc: light is 1.{k:03d}\r\n".encode(), 0.02 * k)
+        told.add(decoder.complaint)
+    assert len(told - {None}) == 1
+
+
 @pytest.mark.parametrize(
     ("line", "why"),
     [
