@@ -127,7 +127,8 @@ def main(arguments: list[str]) -> int:
     from ..run.progress import Progress, printable
     from ..run.supervisor import send
 
-    progress = Progress([sink_of(options), to_watcher(send)])
+    # The watcher first: it would repeat an older share after the one that a terminal shows.
+    progress = Progress([to_watcher(send), sink_of(options)])
     with run_to_end(progress) as context:
         _require_usable(options)
         context.wants_report = getattr(options, "report", True)

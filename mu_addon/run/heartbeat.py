@@ -23,13 +23,21 @@ _KEPT = ("type", "stage", "state", "fraction", "seconds", *_LEFT, "whole", "why"
 
 
 def to_watcher(send: Callable[[bytes], object], clock: Callable[[], float] = time.monotonic) -> Sink:
-    """A sink that tells who watches what runs, by `send`; running fractions at most twice a second."""
+    """A sink that tells who watches what runs, by `send`: twice a second, and each percent of the whole."""
+    percent = -1
 
     def sink(message: Message) -> None:
+        nonlocal percent
         kept = {key: message[key] for key in _KEPT if key in message}
+        now = round(100 * message.get("whole", 0.0))
+        (send_now if now != percent else send_seldom)(kept)
+        percent = now
+
+    def send_now(kept: Message) -> None:
         send(json.dumps(plain(kept)).encode() + b"\n")
 
-    return seldom(sink, 0.5, clock)
+    send_seldom = seldom(send_now, 0.5, clock)
+    return sink
 
 
 class Heartbeat:

@@ -1,5 +1,6 @@
 """A worker that says nothing is said to go on by who watches it."""
 
+import json
 import os
 import subprocess
 import sys
@@ -66,6 +67,17 @@ def test_the_last_step_is_repeated_with_its_time_gone_on(clock):
     clock.now += PATIENCE_S
     heart.hear(b"")
     assert words[-1] == f"after mesh: for {PATIENCE_S:.1f} s"
+
+
+def test_the_watcher_knows_every_percent_that_a_terminal_shows(clock):
+    """It repeated 2 % as 0 %: what had come half a second after another message was kept from it."""
+    heard = []
+    progress = Progress([to_watcher(heard.append, clock)], clock)
+    progress.plan([("mesh", 1.0), ("solve", 99.0)])
+    with progress.stage("solve"):
+        for share in (0.1, 0.101, 0.3):
+            progress.update(share)
+    assert [round(100 * json.loads(line)["whole"]) for line in heard if b"whole" in line] == [1, 11, 11, 31, 100]
 
 
 def test_words_come_in_pieces_of_any_size_and_nonsense_is_left_out(clock):

@@ -283,7 +283,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             "Bellows of six chambers inside a lattice of struts, cut along the plane of bending.",
         )
     ]
-    study.progress.update(0.2)
+    study.progress.update(0.25)
     if study.trajectory is not None and study.mesh is not None:
         states = sorted(study.trajectory.solved, key=lambda s: s.pressure_MPa)
         shown = [states[0], min(states, key=lambda s: abs(s.pressure_MPa)), states[-1]]
@@ -294,7 +294,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
             words = f"{state.pressure_kPa:g} kPa: {angle:.1f}°"
             texts.append((state.u, words, f"The analysis mesh at {words}."))
         pictures += motion(study.mesh, texts, beside=study.job.obstacles)
-    study.progress.update(0.45)
+    study.progress.update(0.5)
     view = side_view(parts, study.anchors, path, radius)
     study.progress.update(0.65)
     return view, pictures
