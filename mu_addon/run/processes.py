@@ -24,8 +24,12 @@ def cores() -> int:
 
 
 def slowed_by_others() -> float:
-    """How many times slower the machine's other work makes a new process, by the load of the last minute."""
-    return max(os.getloadavg()[0] / cores(), 1.0) if hasattr(os, "getloadavg") else 1.0
+    """How many times slower the machine's other work makes a new process, by the load of the last minute.
+
+    Half of what the load says: work that waits for a disk or has a lower priority counts in it, too.
+    """
+    load = os.getloadavg()[0] / cores() if hasattr(os, "getloadavg") else 1.0
+    return max(0.5 + 0.5 * load, 1.0)
 
 
 def end_with_parent() -> None:

@@ -77,7 +77,13 @@ def test_the_watcher_knows_every_percent_that_a_terminal_shows(clock):
     with progress.stage("solve"):
         for share in (0.1, 0.101, 0.3):
             progress.update(share)
-    assert [round(100 * json.loads(line)["whole"]) for line in heard if b"whole" in line] == [1, 11, 11, 31, 100]
+    assert [round(100 * json.loads(line)["whole"]) for line in heard if b"whole" in line] == [
+        1,
+        11,
+        11,
+        31,
+        100,
+    ]
 
 
 def test_words_come_in_pieces_of_any_size_and_nonsense_is_left_out(clock):

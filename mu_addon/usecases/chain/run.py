@@ -5,12 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...chain.settings import REFINE
 from ...run.context import RunContext
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 from .running import Running
+
+JOINT_S = 300.0
+"""Seconds in which a joint is learned on the default mesh at seven pressures."""
 
 
 def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
@@ -47,9 +51,12 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 def plan_of(job: Job) -> Plan:
     """Stages of a chain's run with the expected seconds of each on two cores."""
     # Alike units share a joint.
-    units = range(1, len({one.unit.hash() for one in job.units}) + 1)
-    learned = [(f"{what} of unit {n}", s) for n in units for what, s in (("mesh", 4.0), ("joint", 300.0))]
-    return [*learned, ("chain", 20.0), ("files", 3.0), ("report", 10.0)]
+    spans = {one.unit.hash(): span for one, span in zip(job.units, job.ranges_kPa(), strict=True)}
+    plan = []
+    for n, span in enumerate(spans.values(), 1):
+        joint_s = JOINT_S * (job.mesh.refine / REFINE.default) ** 2 * len(job.joint.pressures(*span)) / 7
+        plan += [(f"mesh of unit {n}", 4.0), (f"joint of unit {n}", max(joint_s, 10.0))]
+    return [*plan, ("chain", 20.0), ("files", 3.0), ("report", 10.0)]
 
 
 USE_CASE = UseCase("chain", LAYOUT, read_job, run_chain, console_summary, plan=plan_of)

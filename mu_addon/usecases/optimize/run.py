@@ -362,7 +362,10 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 def plan_of(job: Job) -> Plan:
     """Stages of an optimisation with the expected seconds of each on two cores."""
     design = job.design
-    return search_plan(design.search.evaluations, design.settings, design.check_refine, design.self_contact)
+    objectives = sum(t.goal is not None for t in design.targets)
+    return search_plan(
+        design.search.evaluations, design.settings, design.check_refine, design.self_contact, objectives
+    )
 
 
 USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary, plan=plan_of)
