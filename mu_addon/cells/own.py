@@ -35,8 +35,11 @@ def own_text(path: Path, most: int = _LONGEST) -> str:
 
 
 def own_lines(text: str) -> list[tuple[int, str]]:
-    """Lines that are not empty, with their numbers, less comments and Excel's line `sep=;`."""
-    numbered = [(n, line) for n, line in enumerate(lines_of(text), 1) if line.strip()]
+    """Lines that are not empty, with their numbers, less comments and Excel's line `sep=;`.
+
+    A spreadsheet's empty row is a line of separators.
+    """
+    numbered = [(n, line) for n, line in enumerate(lines_of(text), 1) if line.strip(' \t;,"')]
     numbered = [(n, line) for n, line in numbered if not line.lstrip().startswith("#")]
     if numbered and re.fullmatch(r'"?sep=.?"?', numbered[0][1].strip()):
         numbered.pop(0)

@@ -23,6 +23,7 @@ _SPELT: dict[str, dict[str, float]] = {
         "ns": 1e-9,
         **dict.fromkeys(("mins", "minute", "minutes"), 60.0),
         **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), 3600.0),
+        **dict.fromkeys(("d", "day", "days"), 86400.0),
         # Times of day of two parts are read as the former.
         **dict.fromkeys(("h:min", "hh:mm"), 1.0),
         **dict.fromkeys(("min:s", "mm:ss"), 1.0 / 60.0),
@@ -124,7 +125,7 @@ _WORDS = tuple(
         ),
         (
             "pressure",
-            r"pressure|\bdruck\b|uberdruck|innendruck|pression|pressione|presion|cisnienie|pressao|\bdruk\b|\btryk|"
+            r"pressure|vacuum|vakuum|\bdruck\b|uberdruck|innendruck|pression|pressione|presion|cisnienie|pressao|\bdruk\b|\btryk|"
             r"paine\b|nyomas|\btlak|basinc|давление|压力|壓力|圧力|압력",
         ),
         (

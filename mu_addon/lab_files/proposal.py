@@ -344,6 +344,8 @@ class _Proposing:
         if one.quantity == "strain":
             return "%" if np.nanmax(np.abs(values), initial=0) > 1.5 else "1"
         if one.quantity == "time":
+            if _DATE.search(plain(one.title)) and ((values > _DAYS[0]) & (values < _DAYS[1])).all():
+                return "d"
             # Boards count milliseconds and microseconds in whole numbers, clocks of computers whole seconds.
             step = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
             whole = bool((values[np.isfinite(values)] % 1 == 0).all())
@@ -703,9 +705,12 @@ class _Proposing:
         return values
 
 
+# A date that a spreadsheet has as a number counts days from 1900: here of 1968 to 2091.
+_DATE = re.compile(r"\bdat(e|um|a)\b|fecha|\u65e5")
+_DAYS = 25_000, 70_000
 # Units that a question offers, the usual one first.
 _OFTEN = {
-    "s": ("s", "ms", "us", "min", "h"),
+    "s": ("s", "ms", "us", "min", "h", "d"),
     "mm": ("mm", "um", "cm", "m", "in"),
     "N": ("N", "kN", "mN", "lbf", "kgf"),
     "kPa": ("MPa", "kPa", "Pa", "bar", "mbar", "psi"),

@@ -35,6 +35,8 @@ def test_a_protocol(tmp_path, encoding):
     read = read_protocol(written(tmp_path, text, encoding))
     assert read.time_s.tolist() == [0.0, 0.5, 1.0]
     assert read.pressure_kPa.tolist() == [0.0, 5.25, -1.5]
+    emptied = written(tmp_path, text.replace("\r\n0,5", "\r\n;\r\n0,5") + ";\r\n", encoding)
+    assert read_protocol(emptied).pressure_kPa.tolist() == [0.0, 5.25, -1.5]
     sep = read_protocol(written(tmp_path, "sep=;\r\n" + european("time_s,pressure_kPa\n0,0\n1,1.234\n")))
     assert sep.pressure_kPa.tolist() == [0.0, 1.234]
 

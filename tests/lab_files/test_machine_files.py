@@ -286,6 +286,16 @@ def test_untitled_columns_are_answered_one_by_one(tmp_path):
     assert [values[-1] for values in p.columns.values()] == pytest.approx([5.9, 118.0, 29.5])
 
 
+@pytest.mark.parametrize(("title", "unit"), [("Date/Time", "d"), ("Time", "s")])
+def test_a_date_that_a_spreadsheet_wrote_as_a_number_is_no_second(tmp_path, title, unit):
+    body = [f"{45000 + 0.1 * i / 86400:.10f},{row.split(',', 1)[1]}" for i, row in enumerate(rows())]
+    text = lines(TITLES.replace("Time (s)", title), *body)
+    ((_, question),) = understood(tmp_path, text).asked
+    assert (question.key, question.proposed) == (f"unit.{title}", unit)
+    p, _ = one(tmp_path, text, COUPON | {question.key: "d"})
+    assert np.ptp(p.columns["time_s"]) == pytest.approx(9.9, abs=1e-4)
+
+
 def test_units_behind_every_number_and_values_of_no_unit(tmp_path):
     text = lines("Time;Load;Extension", *(f"{i} ms;{2 * i} N;0.{i:02d} mm" for i in range(40)))
     p, _ = one(tmp_path, text)
