@@ -542,6 +542,10 @@ class _Proposing:
         """Raise InputError for a time that runs backward; leave out one that stands still, if allowed."""
         if "time_s" not in columns:
             return
+        begins = float(columns["time_s"][0])
+        if begins > _LONGEST_TEST_S:
+            columns["time_s"] = columns["time_s"] - begins
+            self.concluded.append(f"time_s: less its first value, {begins:.10g} s, of a calendar")
         step = np.diff(columns["time_s"])
         lines = self.block.lines[self.keep]
         if (step < 0).any():
@@ -708,6 +712,8 @@ class _Proposing:
 # A date that a spreadsheet has as a number counts days from 1900: here of 1968 to 2091.
 _DATE = re.compile(r"\bdat(e|um|a)\b|fecha|\u65e5")
 _DAYS = 25_000, 70_000
+# Seconds or days since 1970 or 1900 are no time of a test.
+_LONGEST_TEST_S = 1e8
 # Units that a question offers, the usual one first.
 _OFTEN = {
     "s": ("s", "ms", "us", "min", "h", "d"),

@@ -293,7 +293,8 @@ def test_a_date_that_a_spreadsheet_wrote_as_a_number_is_no_second(tmp_path, titl
     ((_, question),) = understood(tmp_path, text).asked
     assert (question.key, question.proposed) == (f"unit.{title}", unit)
     p, _ = one(tmp_path, text, COUPON | {question.key: "d"})
-    assert np.ptp(p.columns["time_s"]) == pytest.approx(9.9, abs=1e-4)
+    assert (p.columns["time_s"][0], p.columns["time_s"][-1]) == pytest.approx((0.0, 9.9), abs=1e-4)
+    assert any("of a calendar" in words for words in p.concluded)
 
 
 def test_units_behind_every_number_and_values_of_no_unit(tmp_path):
