@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..fem.kinematics import Probe, probe
 from ..measured import Experiment
-from ..measured.rest import at_rest
+from ..measured.pose import at_rest
 from ..meshing.mesh import AXES, Mesh, boundary_faces
 
 Array = np.ndarray[Any, Any]

@@ -13,7 +13,7 @@ import numpy as np
 from ..design.parameters import Chambers
 from ..errors import InputError
 from ..measured import Experiment
-from ..measured.rest import at_rest
+from ..measured.pose import at_rest
 from .fit import Fit, Fitter
 from .noise import cycle_s, harmonics
 from .prediction.effective_pressure import play_operator

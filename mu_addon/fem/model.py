@@ -20,14 +20,13 @@ from .beam_fibres import fibres_of, mixtures
 from .beams import Beams, frames_along, sections_of
 from .carried import Carried, Folding
 from .conjugate_gradients import ConjugateGradients
-from .elements import triangle_shapes
+from .elements import Reference, triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
 from .iterative import TwoLevel
 from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
 from .pattern import Pattern, with_entries
-from .reference import Reference
 from .ties import TiedBlocks
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .carried import Carried
+from .elements import Reference
 from .model import Model
-from .reference import Reference
 from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]

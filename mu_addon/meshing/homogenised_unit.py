@@ -6,19 +6,21 @@ import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import attrs
 import numpy as np
 
 from ..design.body import Body, half
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import InputError, MeshingError
-from .curving import relieved
 from .lattice import GmshUnavailable, Sizes, lattice_mesh
 from .membrane import Membrane, Meridian, division, membrane_mesh, stations
 from .mesh import (
     LATTICE,
     MEMBRANE,
+    TET_EDGES,
     Array,
     Mesh,
     bisected,
@@ -28,7 +30,8 @@ from .mesh import (
     oriented,
     second_order,
 )
-from .quality import check_positive, folded_corners
+from .morph import harmonic
+from .quality import GAUSS, check_positive, folded_corners, shapes
 from .revolved import region_at, unit_surfaces
 from .settings import CELL_MM, MeshSettings
 from .surface import Surface, mesh_surface
@@ -39,6 +42,8 @@ MESHERS = ("auto", "gmsh", "pytetwild")
 
 # Corners flatter than this, as a share of the element's largest det J, open to nearly 180 degrees.
 _FLAT = 0.05
+# Corners flatter than this, as a share of the element's largest det J, are relieved.
+_BENT = 0.25
 
 
 class MeshingWarning(UserWarning):
@@ -229,3 +234,39 @@ def _from_surfaces(
     if set(np.unique(mesh.region)) != {MEMBRANE, LATTICE}:
         raise MeshingError("pytetwild lost a region of the unit", "membrane or lattice", "install gmsh")
     return mesh
+
+
+def relieved(mesh: Mesh, bounds: Any) -> Mesh:
+    """The mesh with lattice elements bent along with the membrane, where its curvature would fold one.
+
+    bounds (3, 2): the envelope's box, (low, high) in mm for x, y and z; its faces and the mirror planes keep
+    their nodes in plane, and the membrane keeps all of its own. Meshes of order 1 are returned as they are.
+    """
+    lattice = mesh.region == LATTICE
+    if mesh.order == 1 or folded_corners(mesh)[lattice].min() > _BENT:
+        return mesh
+    tets = mesh.tets[lattice]
+    straight = mesh.nodes.copy()
+    straight[tets[:, 4:]] = straight[tets[:, :4][:, TET_EDGES]].mean(axis=2)
+    of_membrane = np.zeros(len(mesh.nodes), bool)
+    of_membrane[mesh.tets[mesh.region == MEMBRANE]] = True
+    prescribed = of_membrane[:, None] | np.any(
+        [straight == planes for planes in (0.0, *np.transpose(bounds))], axis=0
+    )
+    moved = np.where(of_membrane[:, None], mesh.nodes - straight, 0.0)
+    bent = straight + _harmonic(straight, tets, moved, prescribed)
+    return attrs.evolve(mesh, nodes=np.where(of_membrane[:, None], mesh.nodes, bent))
+
+
+def _harmonic(nodes: Array, tets: Array, moved: Array, prescribed: Array) -> Array:
+    """Displacements (n, 3) in mm, prescribed as `moved` where `prescribed` (n, 3) and harmonic elsewhere.
+
+    tets (m, 10) are straight-sided. The medium is stiffer where elements are small, as in Persson and
+    Peraire, AIAA 2009-949.
+    """
+    _, gradient = shapes(GAUSS, TET_EDGES, 2)
+    x = nodes[tets[:, :4]]
+    slopes = np.einsum("qnr,mrd->mqnd", gradient, np.linalg.inv((x[:, 1:] - x[:, :1]).transpose(0, 2, 1)))
+    # Not weighed by the elements' volumes, so that small ones are the stiff ones.
+    local = np.einsum("mqad,mqbd->mab", slopes, slopes)
+    return harmonic(len(nodes), tets, local, moved, prescribed)

@@ -28,7 +28,7 @@ from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.measured.rest import at_rest
+from mu_addon.measured.pose import at_rest
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic

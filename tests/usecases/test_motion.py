@@ -27,6 +27,7 @@ from mu_addon.placement.whole_body import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
+from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
 from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.motion_files import (
     FIELDS,
@@ -40,7 +41,6 @@ from mu_addon.usecases.simulate_and_place.motion_files import (
     write_sensitivity,
 )
 from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
-from mu_addon.usecases.simulate_and_place.result_pictures import ANGLE, delta_name, write_angle, write_delta
 
 UNIT = load_preset("mu-0.75x")
 PRESSURES = np.array([0.0, -10.0, 0.0, 10.0, 20.0])

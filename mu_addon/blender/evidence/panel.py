@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..import_data.drawing import draw_import
+from ..import_data.importing import draw_import
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import readable

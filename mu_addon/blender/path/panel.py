@@ -10,7 +10,7 @@ from ..shared.panels import UnitPanel, parameters, wrapped
 from ..shared.texts import path_symbol
 from . import ranking
 from .legend import BETTER
-from .operators import selected_candidate
+from .picking import selected_candidate
 
 ORDERS = (
     ("name", "By Name", "As they lie along the unit, on the lattice, too"),

@@ -1,19 +1,51 @@
-"""A click on a candidate path in the 3D view chooses it, like its button in the panel.
+"""Choose the sensor path that the waveguide follows: by its button, or by a click on it in the 3D view.
 
 Blender reports a selection by an update of its dependency graph, in which no operator may be called: a timer
 makes the choice a moment later.
 """
 
-from __future__ import annotations
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.props import StringProperty
 
+from ...design.anchors import window
+from ..shared import updates
+from ..shared.displays import PART
+from ..shared.operators import UnitOperator
 from ..shared.registration import add_handlers, remove_handlers
 from ..unit import object as unit_object
-from .operators import selected_candidate
+from ..unit.drawing import CANDIDATE
+from ..unit.properties import to_unit
+
+
+class MU_OT_path(UnitOperator, bpy.types.Operator):
+    """Lay the waveguide along this path; without a name, along the candidate selected in the viewport"""
+
+    bl_idname = "mu.path"
+    bl_label = "Choose Sensor Path"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` removes the waveguide")
+
+    def act(self, context, root):
+        name = self.name or selected_candidate(context)
+        if name and name != "none":
+            name = window(to_unit(root.mu_unit), name).name
+        with updates.paused():
+            root.mu_unit.path = "" if name == "none" else name
+        unit_object.rebuild(root)
+
+
+def selected_candidate(context) -> str:
+    """Name of the candidate path that is the active object, or ""."""
+    obj = unit_object.active_object(context)
+    part = obj.get(PART, "") if obj else ""
+    return part.removeprefix(CANDIDATE) if part.startswith(CANDIDATE) else ""
+
 
 _last = 0
 """Number of the object that was active at the last check: only another one is a click."""
@@ -73,8 +105,12 @@ _HANDLERS = {
 }
 
 
+_add_class, _remove_class = bpy.utils.register_classes_factory((MU_OT_path,))
+
+
 def register() -> None:
-    """Register handlers that watch the active object."""
+    """Register the operator, and handlers that watch the active object."""
+    _add_class()
     add_handlers(_HANDLERS)
 
 
@@ -83,3 +119,4 @@ def unregister() -> None:
     remove_handlers(_HANDLERS)
     if bpy.app.timers.is_registered(_choose):
         bpy.app.timers.unregister(_choose)
+    _remove_class()

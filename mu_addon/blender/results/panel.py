@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import bpy
 
+from ...usecases.simulate_and_place.charts import ANGLE, delta_name
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
-from ...usecases.simulate_and_place.result_pictures import ANGLE, delta_name
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.texts import path_symbol, sentence
 from ..simulate import study_folder as studies

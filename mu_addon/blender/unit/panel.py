@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..body import panel as body_panel
 from ..evidence import state as evidence
-from ..grading import panel as grading_panel
+from ..grading import state as grading
 from ..gripper import object as gripper_object
 from ..jobs.panel import whole
 from ..live_bending import words as live_words
@@ -27,7 +26,7 @@ from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..simulate.job import SIMULATION
 from ..simulate.panel import start_words
-from . import figures
+from . import drawing, figures
 from . import object as unit_object
 from .broken import broken
 
@@ -181,10 +180,38 @@ class MU_PT_lattice(UnitPanel, bpy.types.Panel):
         parameters(layout, root, "lattice")
         graded = folded_section(layout, root, "grading", "Grading", GRADED)
         if graded:
-            grading_panel.draw(graded, root)
+            _painting(graded, root)
         if envelope is not None:
             wrapped(layout, f"The lattice fills {envelope.name}; counts of cells are not used", "INFO")
-        body_panel.draw(layout, root)
+        _own_body(layout, root)
+
+
+def _own_body(layout, root) -> None:
+    """Buttons to check, use and remove a mesh as the unit's envelope."""
+    header, body = layout.panel("MU_own_body", default_closed=True)
+    header.label(text="Body of Your Own")
+    if body:
+        row = body.row(align=True)
+        row.operator("mu.body_check", icon="VIEWZOOM")
+        row.operator("mu.body_repair", icon="TOOL_SETTINGS")
+        body.operator("mu.body", icon="MESH_MONKEY")
+        if root.mu_unit.envelope is not None or drawing.beside(root, drawing.FLAWS) is not None:
+            body.operator("mu.body_remove", icon="X")
+
+
+PAINTED = "Weight 0.5 leaves struts as they are, 0 halves their diameter, 1 doubles it; both sides alike"
+
+
+def _painting(layout, root) -> None:
+    """Draw buttons to paint, or to apply and discard a painting."""
+    if grading.painted_on(root) is None:
+        layout.operator("mu.paint_struts", icon="WPAINT_HLT")
+        return
+    wrapped(layout, PAINTED, "INFO")
+    row = layout.row(align=True)
+    row.operator("mu.paint_struts_apply", icon="CHECKMARK")
+    row.operator("mu.paint_struts", text="Go On", icon="WPAINT_HLT")
+    row.operator("mu.paint_struts_discard", icon="X")
 
 
 CLASSES = (MU_PT_unit, MU_PT_design, MU_PT_lattice)

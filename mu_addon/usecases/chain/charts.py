@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from ...report.render import Part, fit, png, render
 from ...report.results import Picture
 from ...report.shapes import ball
 from ...report.unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin
-from .running import Running
+
+if TYPE_CHECKING:
+    from .run import Running
 
 Array = np.ndarray[Any, Any]
 

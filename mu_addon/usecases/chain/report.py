@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from html import escape
 
 import numpy as np
@@ -10,7 +12,9 @@ from ...files import write_bytes, write_text
 from ...report.charts import signed
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from . import charts
-from .running import Running
+
+if TYPE_CHECKING:
+    from .run import Running
 
 FILES = {
     "chain.toml": "inputs of this run; unit_N.toml and protocol.csv belong to it",

@@ -18,7 +18,7 @@ from ...graph.evaluation import Finished
 from ...materials.library import load_material
 from ...report.charts import BY_LENGTH, BY_START, QUIET, canvas
 from ...report.html import figure, number, table
-from ..parameter_study.csv_columns import figures
+from ..parameter_study.results import figures
 from .orders import Study
 from .parts import Design
 

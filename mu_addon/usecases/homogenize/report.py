@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from html import escape
 
 import numpy as np
@@ -16,7 +18,9 @@ from ...report.unit_pictures import skin
 from ...run.versions import package_versions
 from . import charts as pictures
 from .charts import Line, kPa
-from .homogenisation import Homogenisation
+
+if TYPE_CHECKING:
+    from .run import Homogenisation
 
 FILES = {
     "homogenize.toml": "inputs of this run",

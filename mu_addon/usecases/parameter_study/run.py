@@ -22,11 +22,10 @@ from ...run.progress import Progress
 from ...run.usecase import UseCase
 from ..simulate_and_place.expected import plan_of
 from .cluster import Work, cluster_at
-from .csv_columns import Row, cell, column_names, figures
-from .found import Found
 from .plan import LAYOUT, PLAN, REPORT, TABLE, Plan, Point, read_plan_of_run
 from .point import Task, run_point, version
 from .report import write_report
+from .results import Found, Row, cell, column_names, figures
 from .settings import ADD, GRID, WORKERS
 
 Array = np.ndarray[Any, Any]

@@ -16,7 +16,7 @@ from ...files import write_csv
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
 from ...report.vtk import write_trajectory
-from ...resolved.joint_stretch import joint_stretch
+from ...resolved.joints import joint_stretch
 
 if TYPE_CHECKING:
     from ...fem.model import Model

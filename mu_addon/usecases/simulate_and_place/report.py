@@ -19,7 +19,7 @@ from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
 from ...report.results import PaintedStates, ReportData, RuleResult, nearest_to_break
 from ...run.progress import spell
-from .light_charts import front_chart, response_chart
+from .charts import front_chart, response_chart
 
 RULE = {
     "volume_fraction": "volume fraction",

@@ -82,7 +82,7 @@ def write_report(study: Study, stopped: str = "") -> None:
 
 def _panel_pictures(study: Study) -> None:
     """Write pictures of the study's answers for panels, beside its motion."""
-    from .result_pictures import write_angle, write_delta
+    from .charts import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
         return

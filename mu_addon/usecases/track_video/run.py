@@ -19,7 +19,7 @@ from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
 from ...measured.kinds import COMMON, KINDS
-from ...measured.rest import AT_REST, SAMPLES
+from ...measured.pose import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried

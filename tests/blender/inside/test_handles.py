@@ -9,7 +9,7 @@ import pytest
 from mathutils import Matrix
 
 from mu_addon.blender.results import runs
-from mu_addon.blender.scene import handles, tool
+from mu_addon.blender.scene import handles
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 
@@ -146,7 +146,7 @@ def test_the_tools_header_shows_the_value_that_it_drags():
     for name in (*SIZES, handles.PRESSURE):
         chosen.what = name
         layout = MagicMock()
-        tool.MU_WT_size.draw_settings(
+        handles.MU_WT_size.draw_settings(
             seen(root), layout, SimpleNamespace(operator_properties=lambda operator: chosen)
         )
         values = [getattr(*call.args) for call in layout.prop.call_args_list]

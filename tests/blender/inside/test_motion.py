@@ -17,7 +17,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import preview_update as live
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import anchor_points
-from mu_addon.usecases.simulate_and_place.result_pictures import write_angle, write_delta
+from mu_addon.usecases.simulate_and_place.charts import write_angle, write_delta
 
 from .acting import add, refused
 from .drawing import drawn

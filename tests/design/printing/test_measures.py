@@ -9,8 +9,8 @@ from mu_addon.design import shapes
 from mu_addon.design.printing import chambers, faces, layers
 from mu_addon.design.printing.check import check
 from mu_addon.design.printing.crossing import MOST_CROSSINGS, crossings, near_pairs
+from mu_addon.design.printing.drainage import necks
 from mu_addon.design.printing.finding import clustered
-from mu_addon.design.printing.neck import necks
 from mu_addon.design.printing.orientation import Build, directions, fits, ranked, tilted
 from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.printing.thickness import cast_rays, samples

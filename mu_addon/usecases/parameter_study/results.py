@@ -1,9 +1,13 @@
-"""A study's summary as columns of the parameter study's table: numbers with the unit in the name."""
+"""Result of a sweep: a row for each point, with a study's figures as columns."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+import attrs
+
+from .plan import Plan
 
 Row = dict[str, Any]
 
@@ -48,3 +52,26 @@ def cell(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return " ".join(map(str, value))
     return value
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """Rows of a sweep, one a point: `number`, `status`, its inputs and figures, or why it failed.
+
+    inputs, outputs: names of the columns varied and computed.
+    """
+
+    plan: Plan
+    rows: tuple[Row, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def done(self) -> list[Row]:
+        """Rows of the points that were solved."""
+        return [row for row in self.rows if row["status"] == "done"]
+
+    @property
+    def failed(self) -> list[Row]:
+        """Rows of the points that were not."""
+        return [row for row in self.rows if row["status"] == "failed"]

@@ -1,17 +1,48 @@
-"""Import of files; missing information is asked for in the panel."""
+"""Import of measured files: properties, operators, and the questions that the panel asks."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 from pathlib import Path
 
 import bpy
-from bpy.props import CollectionProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from ...errors import MuError
 from ...files import make_folder
 from ..shared import viewports
 from ..shared.operators import UnitOperator, open_file
+from ..shared.panels import wrapped
+from ..shared.registration import property_group_factory
 from ..simulate import study_folder as studies
+
+
+def _offered(self, context, typed):
+    """Answers that a question offers."""
+    return [choice for choice in self.choices.split("\n") if typed.casefold() in choice.casefold()]
+
+
+class MU_PG_import_answer(bpy.types.PropertyGroup):
+    """An open question of an import, and its answer."""
+
+    key: StringProperty(options={"HIDDEN"})
+    words: StringProperty(options={"HIDDEN"})
+    choices: StringProperty(options={"HIDDEN"})
+    experiment: StringProperty(options={"HIDDEN"})
+    answered: BoolProperty(options={"HIDDEN"})
+    value: StringProperty(
+        name="Answer",
+        description="Open questions of the file",
+        search=_offered,
+        search_options={"SORT", "SUGGESTION"},
+    )
+
+
+class MU_PG_import(bpy.types.PropertyGroup):
+    """Files being imported into a folder of measured data."""
+
+    files: StringProperty(options={"HIDDEN"})
+    answers: CollectionProperty(type=MU_PG_import_answer, options={"HIDDEN"})
+
 
 FOLDER = "measured"
 """Folder of imported data in the unit's study folder, if no folder of measured data is chosen."""
@@ -137,6 +168,40 @@ def _forget(root):
     viewports.redraw()
 
 
-register, unregister = bpy.utils.register_classes_factory(
+def draw_import(layout, root):
+    """Draw the button that imports files, and the questions of an import in progress."""
+    state = root.mu_import
+    if not state.files:
+        layout.operator("mu.import_files", icon="IMPORT")
+        return
+    box = layout.box()
+    names = [Path(name).name for name in state.files.split("\n")]
+    wrapped(box, f"Import {', '.join(names[:3])}{' ...' if len(names) > 3 else ''}", "IMPORT")
+    for one in state.answers:
+        if not one.answered:
+            wrapped(box, f"{one.experiment}: {one.words}", "QUESTION")
+            box.prop(one, "value", text="", placeholder=one.choices.replace("\n", ", "))
+    box.operator("mu.import_answers", icon="CHECKMARK")
+    row = box.row(align=True)
+    row.operator("mu.import_page", icon="URL")
+    row.operator("mu.import_cancel", text="", icon="X")
+
+
+_add_group, _remove_group = property_group_factory(
+    bpy.types.Object, "mu_import", (MU_PG_import_answer, MU_PG_import)
+)
+_add_classes, _remove_classes = bpy.utils.register_classes_factory(
     (MU_OT_import_files, MU_OT_import_answers, MU_OT_import_cancel, MU_OT_import_page)
 )
+
+
+def register() -> None:
+    """Register properties and operators."""
+    _add_group()
+    _add_classes()
+
+
+def unregister() -> None:
+    """Unregister them."""
+    _remove_classes()
+    _remove_group()
