@@ -38,6 +38,7 @@ def test_a_name_that_only_the_mesh_s_error_decides_is_not_given():
     assert (row["verdict"], row["outcome"]) == ("ambiguous", "in_set")
 
 
+@pytest.mark.nightly("test_a_name_that_only_the_mesh_s_error_decides_is_not_given")
 def test_where_the_mesh_s_error_would_do_in_an_effect_s_place_nothing_more_is_listed_beside_it():
     row = judged({"seed": 2_000_101, "effect": "overcure", "times": 2.0, "unit": "simulated", "most": 6})
     assert row["outcome"] == "in_set"

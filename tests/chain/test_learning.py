@@ -105,7 +105,10 @@ PAIRS = [(20.0, 20.0), (40.0, 0.0)]
         (True, 90.0, Loads(tip_force_N=np.array([0.2, -0.3, 0.5])), 0.1, 0.15),
         (True, 0.0, Loads(down=np.array([0.0, -1.0, 0.0]), tip_mass_g=50.0), 0.15, 0.25),
         # Where the planes between the units may warp, all bends 1.2 % further: 44.3 instead of 43.9 mm.
-        (False, 0.0, Loads(down=np.array([0.0, -1.0, 0.0]), tip_mass_g=50.0), 0.5, 0.8),
+        pytest.param(
+            *(False, 0.0, Loads(down=np.array([0.0, -1.0, 0.0]), tip_mass_g=50.0), 0.5, 0.8),
+            marks=pytest.mark.nightly("test_a_chain_of_two_is_near_both_units_as_one_body"),
+        ),
     ],
     ids=["free", "turned and pulled", "heavy", "heavy, in one piece"],
 )

@@ -114,17 +114,30 @@ def test_nothing_is_named_of_a_unit_without_weight():
 
 
 @pytest.mark.slow
-def test_weight_is_found_by_turning_the_unit_with_an_interval_as_wide_as_its_error():
-    """Ten sets: errors over the intervals' standard deviations are about normal, without a bias."""
+@pytest.mark.parametrize(
+    "sets",
+    [
+        4,
+        pytest.param(
+            10,
+            marks=pytest.mark.nightly(
+                "test_weight_is_found_by_turning_the_unit_with_an_interval_as_wide_as_its_error"
+            ),
+        ),
+    ],
+)
+def test_weight_is_found_by_turning_the_unit_with_an_interval_as_wide_as_its_error(sets):
+    """Errors over the intervals' standard deviations are about normal, without a bias."""
     density, errors = 1100.0, []
-    for first in range(0, 1000, 100):
+    for first in range(0, 100 * sets, 100):
         verdict = of_poses(poses(density, first=first))
         assert verdict.names == ("gravity",)
         low, high = verdict.intervals["gravity.density_kg_m3"]
         errors.append((0.5 * (low + high) - density) / ((high - low) / 3.92))
     assert np.abs(errors).max() < 3.5
-    assert abs(np.mean(errors)) < 3.0 / np.sqrt(10.0)
-    assert 0.4 < np.std(errors) < 1.8
+    assert abs(np.mean(errors)) < 3.0 / np.sqrt(sets)
+    if sets > 4:
+        assert 0.4 < np.std(errors) < 1.8
 
 
 def presses(gap=0.0, lag_s=0.0, noise=0.004):

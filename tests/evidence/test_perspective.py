@@ -113,7 +113,15 @@ def test_a_camera_that_looks_at_an_angle_is_named(about):
     assert told == pytest.approx(math.sin(math.radians(5.0)) / 6.0, rel=0.15)
 
 
-@pytest.mark.parametrize("about", ["y", "z"])
+@pytest.mark.parametrize(
+    "about",
+    [
+        "y",
+        pytest.param(
+            "z", marks=pytest.mark.nightly("test_at_a_large_angle_the_whole_law_is_found_with_the_angle")
+        ),
+    ],
+)
 def test_at_a_large_angle_the_whole_law_is_found_with_the_angle(about):
     found = filmed(4, 15.0, about)
     assert (found.kind, found.names) == ("named", ("camera_perspective",))
@@ -121,5 +129,9 @@ def test_at_a_large_angle_the_whole_law_is_found_with_the_angle(about):
     assert low < 15.0 < high
 
 
-def test_a_camera_that_looks_straight_has_no_fault():
-    assert [filmed(seed).kind for seed in range(5, 8)] == ["none"] * 3
+STRAIGHT = pytest.mark.nightly("test_a_camera_that_looks_straight_has_no_fault")
+
+
+@pytest.mark.parametrize("seed", [5, pytest.param(6, marks=STRAIGHT), pytest.param(7, marks=STRAIGHT)])
+def test_a_camera_that_looks_straight_has_no_fault(seed):
+    assert filmed(seed).kind == "none"

@@ -115,7 +115,7 @@ def test_a_camera_that_is_set_up_anew_in_each_session_has_a_zero_of_each():
     np.testing.assert_allclose(each - each.mean(), np.array(zeros) - np.mean(zeros), atol=0.05)
 
 
-@pytest.mark.nightly("test_a_small_leak_beside_a_large_one_is_no_slow_noise")
+@pytest.mark.nightly("tests/evidence/test_owned.py::test_the_one_chamber_that_leaks_is_named")
 def test_leaks_of_several_chambers_are_each_their_own():
     losses = np.array([4e-3, 1e-3, 0.0, 2e-3, 0.0])
     verdict = judged(chambers(losses))
@@ -129,7 +129,7 @@ def test_leaks_of_several_chambers_are_each_their_own():
     assert [verdict.intervals[k][0] > 0.0 for k in keys] == [True, True, False, True, False]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/evidence/test_owned.py::test_the_one_chamber_that_leaks_is_named")
 def test_a_small_leak_beside_a_large_one_is_no_slow_noise():
     """A gauge's slow noise would be in the tight chambers' records, too."""
     found = judged(chambers([0.0, 1e-3, 0.0, 3e-4]))
@@ -141,7 +141,7 @@ def test_a_small_leak_beside_a_large_one_is_no_slow_noise():
     assert sentence(found)[0] == "leak of specimen B and leak of specimen D"
 
 
-@pytest.mark.nightly("test_a_small_leak_beside_a_large_one_is_no_slow_noise")
+@pytest.mark.nightly("tests/evidence/test_owned.py::test_the_one_chamber_that_leaks_is_named")
 def test_leaks_that_differ_are_not_one_with_valves_shut_late():
     losses = [5e-4, 1e-3, 1.5e-3]
     found = judged(chambers(losses))

@@ -83,6 +83,7 @@ def test_means_of_rows_are_exact_for_what_is_linear_and_skip_what_is_missing():
     assert thinned([short], simulator) == ([short], [])
 
 
+@pytest.mark.nightly("test_means_of_rows_are_exact_for_what_is_linear_and_skip_what_is_missing")
 def test_a_leak_in_long_records_has_an_interval_as_their_noise_allows():
     """Two holds of 60 000 readings, 0.3 kPa of white noise: the leak is known to 1 %, without a bias."""
     rng, t = np.random.default_rng(5), np.linspace(0.0, 4000.0, 60_000)

@@ -59,7 +59,10 @@ def work_of_beams(mesh, u, v, made):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: printed("solid"),
+        pytest.param(
+            lambda: printed("solid"),
+            marks=pytest.mark.nightly("test_it_is_the_derivative_by_places_shares_ties_and_stiffness"),
+        ),
         lambda: printed("resolved"),
         lambda: box((2, 2, 3), (4.0, 5.0, 6.0), clamp=True),
     ],

@@ -1,6 +1,8 @@
 """The examples of the pages on Python and on extending run as they stand, and print what is shown."""
 
+import ast
 import contextlib
+import inspect
 import io
 import re
 import runpy
@@ -58,7 +60,31 @@ def test_ten_lines_lead_from_a_preset_to_an_angle(printed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(1, len(EXAMPLES)))
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(1, marks=pytest.mark.nightly("test_every_example_names_what_there_is")),
+        *range(2, len(EXAMPLES)),
+    ],
+)
 def test_the_other_examples_print_what_the_page_shows(number, printed):
     code, shown = EXAMPLES[number]
     require_alike(printed(code), shown)
+
+
+@pytest.mark.parametrize("number", range(len(EXAMPLES)))
+def test_every_example_names_what_there_is(number):
+    """Imports, and the keywords of calls of what is imported."""
+    tree = ast.parse(EXAMPLES[number][0])
+    names = {}
+    for node in tree.body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            exec(compile(ast.Module([node], []), "example", "exec"), names)
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and callable(names.get(node.func.id))
+        ):
+            signature = inspect.signature(names[node.func.id])
+            signature.bind_partial(*node.args, **{k.arg: k.value for k in node.keywords if k.arg})

@@ -61,15 +61,15 @@ def part(mesh, name):
     return lattice & (octant == {"at the wall": [0, 2, 1], "beside": [0, 4, 1]}[name]).all(axis=1)
 
 
+NIGHTLY = pytest.mark.nightly("test_a_part_made_stiffer_moves_the_points_as_the_map_says")
+
+
 @pytest.mark.parametrize(
     "name",
     [
         "at the wall",
-        "wall",
-        pytest.param(
-            "beside",
-            marks=pytest.mark.nightly("test_a_part_made_stiffer_moves_the_points_as_the_map_says"),
-        ),
+        pytest.param("wall", marks=NIGHTLY),
+        pytest.param("beside", marks=NIGHTLY),
     ],
 )
 def test_a_part_made_stiffer_moves_the_points_as_the_map_says(half, found, name):

@@ -56,7 +56,16 @@ def test_octants_share_their_nodes_and_stay_in_their_planes():
     assert graded.nodes[order[0]] == pytest.approx(mirrored[order[1]], abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["body-centred", "body-centred-straight"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "body-centred",
+        pytest.param(
+            "body-centred-straight",
+            marks=pytest.mark.nightly("test_its_volume_is_that_of_the_drawn_struts"),
+        ),
+    ],
+)
 def test_its_volume_is_that_of_the_drawn_struts(name):
     unit = attrs.evolve(with_grading(STEEP), lattice=attrs.evolve(SMALL.lattice, kind=name))
     mesh = struts(unit.printed, 1, 5)

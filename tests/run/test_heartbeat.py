@@ -10,19 +10,23 @@ import pytest
 from mu_addon.run.heartbeat import PATIENCE_S, Heartbeat, to_watcher
 from mu_addon.run.progress import Progress
 
-# Holds the interpreter for nine seconds, so that no thread of it runs, and begins with a silence as long.
+# Holds the interpreter for three seconds, so that no thread of it runs, and begins with a silence as long;
+# its watcher is less patient.
 HELD = """
 import ctypes, sys
 from mu_addon.cli import check, main
 from mu_addon.cli.watched import run_watched
+from mu_addon.run import heartbeat
+
+heartbeat.PATIENCE_S = 1.0
 
 
 def run(options, context):
-    ctypes.PyDLL(None).sleep(9)
+    ctypes.PyDLL(None).sleep(3)
     context.progress.plan([("mesh", 100.0)])
     with context.progress.stage("mesh"):
         context.progress.update(0.5)
-        ctypes.PyDLL(None).sleep(9)
+        ctypes.PyDLL(None).sleep(3)
 
 
 check.run = run

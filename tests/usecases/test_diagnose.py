@@ -20,6 +20,7 @@ from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
+from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
 from mu_addon.usecases.diagnose.job import Job, read_job
@@ -294,13 +295,11 @@ def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic
     assert list(load_model(tmp_path / "three/model.toml").effects) == ["viscoelasticity"]
 
 
-def test_a_diagnosis_goes_on_with_what_it_knew(tmp_path, analytic_unit):
-    from mu_addon.usecases.diagnose.job import read_job
-
-    folder = bent_unit(tmp_path / "first", RELAXES)
-    run(folder, tmp_path / "one", load_preset("mu-1.0x"))
-    known = load_model(tmp_path / "one/model.toml")
-    run(folder, tmp_path / "two", load_preset("mu-1.0x"), known=known)
+def test_a_diagnosis_goes_on_with_what_it_knew(tmp_path, overcured):
+    blocks, out, _, _ = overcured
+    known = load_model(out / "model.toml")
+    assert known.effects
+    keep_inputs(tmp_path / "two", Job(read_folder(blocks), known=known).texts())
     assert read_job(tmp_path / "two").known == known
 
 

@@ -51,9 +51,9 @@ def for_good(request: pytest.FixtureRequest) -> bool:
     return bool(request.param)
 
 
-@pytest.mark.parametrize("step", [31, pytest.param(3, marks=pytest.mark.nightly("test_simulate"))])
+@pytest.mark.parametrize("step", [67, pytest.param(3, marks=pytest.mark.nightly("test_simulate"))])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    """Each 31st call, to be quick."""
+    """Each 67th call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
     monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
 
@@ -63,9 +63,9 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [122, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
+@pytest.mark.parametrize("step", [251, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
-    """Each 122nd call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    """Each 251st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 

@@ -56,7 +56,7 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("step", [21, pytest.param(7, marks=pytest.mark.nightly("test_simulate"))])
+@pytest.mark.parametrize("step", [43, pytest.param(7, marks=pytest.mark.nightly("test_simulate"))])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """From the solid on; all is solved anew, each time."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
@@ -68,14 +68,14 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [151, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
+@pytest.mark.parametrize("step", [307, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
     """What follows from the states of the unit and of its candidates; all of it by benchmarks/faults.py."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
     assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [101, pytest.param(31, marks=pytest.mark.nightly("test_export"))])
+@pytest.mark.parametrize("step", [211, pytest.param(31, marks=pytest.mark.nightly("test_export"))])
 def test_export(tmp_path: Path, step: int) -> None:
     job = ExportJob(
         STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
@@ -96,7 +96,7 @@ def test_check(tmp_path: Path) -> None:
     def run(folder: Path, context: RunContext) -> None:
         checking.USE_CASE.start(job, folder, context)
 
-    assert inject_each(run, tmp_path, layer, MuError.status, step=61) == []
+    assert inject_each(run, tmp_path, layer, MuError.status, step=127) == []
 
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])

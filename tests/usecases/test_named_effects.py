@@ -224,7 +224,7 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name):
     trajectory, _ = moved(job, mesh)
     monitored, d = (points, probe(mesh, points)), job.unit.dimensions
     sensor = UNIT.material.sensor_modulus_kPa / 1e3
-    for candidate in candidate_paths(points, windows)[::2]:
+    for candidate in candidate_paths(points, windows)[:1]:
         alone = evaluate(
             job.model(mesh), job.materials(mesh), trajectory, monitored, candidate, "volume_fraction",
             d.inclusion_radius, sensor, JOB.stations,

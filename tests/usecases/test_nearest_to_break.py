@@ -20,9 +20,10 @@ UNIT = load_preset("mu-1.0x").evolve(count=3)
 def test_a_brittle_resin_is_warned_of(tmp_path):
     job = Job(
         unit=UNIT.evolve(elongation_at_break=0.01),
-        protocol=Protocol(np.arange(2.0), np.array([0.0, 5.0])),
+        protocol=Protocol(np.arange(2.0), np.array([0.0, 2.0])),
         mesh=MeshSettings(refine=0.35, fidelity="resolved"),
         times=2,
+        self_contact=False,
         workers=1,
         stages=("design", "simulate"),
     )
@@ -33,7 +34,7 @@ def test_a_brittle_resin_is_warned_of(tmp_path):
     most = study.context.summary["nearest_to_break"]
     exceeded = max(float(row[6]) for row in study.stretch)
     assert most["percent"] == pytest.approx(100.0 * (exceeded - 1.0) / 0.01, rel=0.01)
-    assert most["pressure_kPa"] == 5.0
+    assert most["pressure_kPa"] == 2.0
     (warning,) = (text for text in study.warnings if "tear" in text)
     assert most["part"] in warning
     tough = attrs.evolve(job, unit=UNIT)

@@ -7,9 +7,9 @@ from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
 from mu_addon.usecases.chain.job import read_chain
-from mu_addon.usecases.graph.chain_orders import chain_of, chain_order
+from mu_addon.usecases.graph.chain_nodes import _chain, _solved
 from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.graph.optimize_orders import optimize_order, proposed_of
+from mu_addon.usecases.graph.optimize_nodes import _optimize, _proposed
 from mu_addon.usecases.graph.parts import Design
 from mu_addon.usecases.optimize.job import job_from
 
@@ -42,14 +42,14 @@ def node(tmp_path):
 
 
 def test_the_linked_unit_is_optimised_by_the_files_targets(node, tmp_path):
-    order = optimize_order(node())
+    order = _optimize(node())
     assert order.job.texts() == job_from(tmp_path / "design.toml", unit=UNIT).texts()
     assert order.job.design.unit == UNIT
-    assert optimize_order(node(proposed=2)).key == order.key, "another of the front is no other run"
+    assert _optimize(node(proposed=2)).key == order.key, "another of the front is no other run"
     (tmp_path / "design.toml").write_text(DESIGN.replace("evaluations = 5", "evaluations = 6"))
-    assert optimize_order(node()).key != order.key
+    assert _optimize(node()).key != order.key
     with pytest.raises(InputError, match="no targets are named"):
-        optimize_order(node(file=""))
+        _optimize(node(file=""))
 
 
 def test_a_proposed_unit_keeps_its_path_and_a_missing_one_is_named(node, tmp_path):
@@ -57,13 +57,13 @@ def test_a_proposed_unit_keeps_its_path_and_a_missing_one_is_named(node, tmp_pat
     write_unit(thin, tmp_path / "proposed-1.toml")
     row = {"file": "proposed-1.toml", "targets": [{"name": "mass", "met": False}]}
     done = Finished(tmp_path, {"proposed": [row], "outcome": "found"})
-    found = proposed_of(node(), done)
+    found = _proposed(node(), done)
     assert (found["unit"].unit.chambers, found["unit"].unit.name) == (thin.chambers, UNIT.name)
     assert found["unit"].path == "alpha2"
     definition = definitions()["optimize"]
     assert definition.remark(found) == "misses mass"
     with pytest.raises(InputError, match="there is no number 2"):
-        proposed_of(node(proposed=2), done)
+        _proposed(node(proposed=2), done)
     muted = definition.mute(node())
     assert muted["unit"].unit == UNIT
     assert definition.remark(muted) == ""
@@ -90,12 +90,12 @@ turn_deg = 90.0
 """)
     (tmp_path / "p.csv").write_text("time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,10,20\n")
     asked = {"turns_deg": "0 90", "tip_mass_g": 20.0, "refine": 0.25, "protocol": str(tmp_path / "p.csv")}
-    made = chain_order(chain(UNIT, load_preset("mu-1.0x"), **asked)).job
+    made = _chain(chain(UNIT, load_preset("mu-1.0x"), **asked)).job
     assert made.texts() == read_chain(tmp_path / "chain.toml").texts()
 
 
 def test_a_point_to_reach_and_what_is_wrong_with_a_chain(tmp_path):
-    job = chain_order(chain(UNIT, copies=3, reach_mm="0 -25 200", high_kPa=20.0)).job
+    job = _chain(chain(UNIT, copies=3, reach_mm="0 -25 200", high_kPa=20.0)).job
     assert [one.pressure_kPa for one in job.units] == [(0.0, 20.0)] * 3
     assert job.target.reach == (0.0, -25.0, 200.0)
     for settings, words in (
@@ -106,15 +106,15 @@ def test_a_point_to_reach_and_what_is_wrong_with_a_chain(tmp_path):
         ({"protocol": str(tmp_path / "none.csv")}, "cannot read the protocol"),
     ):
         with pytest.raises(InputError, match=words):
-            chain_order(chain(UNIT, **settings))
+            _chain(chain(UNIT, **settings))
     with pytest.raises(InputError, match="a chain of 16 units"):
-        chain_order(chain(UNIT, UNIT, copies=8))
+        _chain(chain(UNIT, UNIT, copies=8))
 
 
 def test_what_a_finished_chain_gives(tmp_path):
     summary = {"chain": {"angle_deg": 12.5, "tip_mm": [0.0, -3.0, 150.0]}}
-    found = chain_of(chain(UNIT), Finished(tmp_path, summary))
+    found = _solved(chain(UNIT), Finished(tmp_path, summary))
     assert (found["tip"].name, found["angle"]) == ("tip.csv", 12.5)
     assert definitions()["chain"].remark(found) == "tip at 0.0, -3.0, 150.0 mm"
-    reached = chain_of(chain(UNIT), Finished(tmp_path, {**summary, "target": {}}))
+    reached = _solved(chain(UNIT), Finished(tmp_path, {**summary, "target": {}}))
     assert reached["tip"].name == "target.csv"

@@ -18,8 +18,8 @@ from mathutils import Vector
 
 from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.displays import LEGEND
-from ..shared.viewports import Overlay
 from ..shared.texts import path_symbol
+from ..shared.viewports import Overlay
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.context import RunContext
 from ...run.versions import package_versions
 from .charts import TITLES, mode_chart, residual_chart
-from .fitting import Fitting, modes, tested
+
+if TYPE_CHECKING:
+    from .run import Fitting
 
 FILES = {
     "fit.toml": "inputs of this run",
@@ -54,7 +56,7 @@ def report(found: Fitting, versions: dict[str, str]) -> str:
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
     count = len(found.fitted) + len(found.held_out)
-    subtitle = f"{count} coupon test{'s' if count > 1 else ''}: " + ", ".join(TITLES[m] for m in modes(found))
+    subtitle = f"{count} coupon test{'s' if count > 1 else ''}: " + ", ".join(TITLES[m] for m in found.modes)
     return page(
         f"A law for {found.material.name}", subtitle, note(_warnings(found)), _headline(found), sections
     )
@@ -151,8 +153,8 @@ def _charts(found: Fitting) -> str:
         '<div class="pair">'
     )
     chosen = found.choice.chosen.form.name
-    for mode in modes(found):
-        fitted, held = tested(found, mode)
+    for mode in found.modes:
+        fitted, held = found.tested(mode)
         missed = [f.form.title for f in found.fits if mode in f.fails]
         html += (
             "<div>"
@@ -179,7 +181,7 @@ def _errors(found: Fitting) -> str:
     tests = [*found.fitted, *found.held_out]
     head = [("law", ""), ("parameters", "n")]
     head += [(c.name + ("" if c in found.fitted else ", held out"), "n") for c in tests]
-    unseen = [m for m in modes(found) if any(m in u for u in found.unseen.values())]
+    unseen = [m for m in found.modes if any(m in u for u in found.unseen.values())]
     head += [(TITLES[m], "n") for m in unseen]
     head += [("score", "n"), ("fails", "")]
     rows = []

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError
 from ...files import write_csv, write_text
 from ...materials.choice import Choice, choose, disagreement
-from ...materials.coupon import Coupon, response
+from ...materials.coupon import Array, Coupon, response
 from ...materials.fit import POISSON, TOLERANCE, Fit, fit_coupons, leave_one_mode_out, ranges
 from ...materials.library import Material, write_material
 from ...measured import Measured
@@ -20,12 +20,41 @@ from ...run.context import RunContext
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from .charts import mode_chart
-from .fitting import Fitting, modes, tested
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 
 FIT_S = 2.0
 """Approximate seconds to fit a law."""
+
+
+@attrs.frozen(eq=False)
+class Fitting:
+    """Coupons and the laws fitted to them.
+
+    unseen: share by which each law misses a mode when fitted without it; apart: how far laws differ in modes
+    that were not tested, see `disagreement`; compressibility: share by which kappa moves the chosen law's
+    stress at the end of its range.
+    """
+
+    measured: Measured
+    fitted: tuple[Coupon, ...]
+    held_out: tuple[Coupon, ...]
+    weights: str
+    fits: tuple[Fit, ...]
+    choice: Choice
+    unseen: dict[str, dict[str, float]]
+    apart: dict[str, tuple[Array, Array]]
+    compressibility: float
+    material: Material
+
+    @property
+    def modes(self) -> list[str]:
+        """Modes that were tested, in the order of the coupons."""
+        return list(dict.fromkeys(c.mode for c in (*self.fitted, *self.held_out)))
+
+    def tested(self, mode: str) -> tuple[list[Coupon], list[Coupon]]:
+        """Coupons of a mode, fitted and held out."""
+        return [c for c in self.fitted if c.mode == mode], [c for c in self.held_out if c.mode == mode]
 
 
 def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
@@ -134,8 +163,8 @@ def _write(found: Fitting, out: Path) -> None:
             for e in f.errors
         ],
     )
-    for mode in modes(found):
-        chart = mode_chart(mode, *tested(found, mode), found.fits, found.choice.chosen.form.name)
+    for mode in found.modes:
+        chart = mode_chart(mode, *found.tested(mode), found.fits, found.choice.chosen.form.name)
         write_text(out / f"fit_{mode}.svg", chart)
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...errors import InputError
 from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...sensing.settings import BAUD
-from .common import of_orders
+
+if TYPE_CHECKING:
+    from ...graph.evaluation import Finished, Order
 
 BENCH = "Bench"
-_ORDERS = "bench_orders"
 _LEFT_OUT = "neither this nor what needs it is computed"
 
 
@@ -38,6 +40,58 @@ def _calibration(call: Call) -> Outputs:
     return {"calibration": Path(file), "range": found.range_deg}
 
 
+def _record(call: Call) -> Order:
+    from ...graph.evaluation import Order
+    from ..sensor import record
+
+    names = ("port", "baud", "simulated", "seconds", "take")
+    return Order(record.USE_CASE, record.Job(**{name: call.settings[name] for name in names}))
+
+
+def _recorded(call: Call, done: Finished) -> Outputs:
+    s = done.summary
+    words = f"{s['rows']} samples, {s['duration_s']:.3g} s"
+    return {"recording": done.folder / str(s["recording"]), "words": words}
+
+
+def _calibrate(call: Call) -> Order:
+    from ...graph.evaluation import Order
+    from ...measured import Measured
+    from ..sensor import calibrate
+
+    s = call.settings
+    places = tuple(v.folder if isinstance(v, Measured) else Path(v) for _, v in call.inputs["bending"])
+    if not places:
+        raise InputError("nothing is linked to calibrate by", "bending", "link recordings, or measured data")
+    job = calibrate.Job(
+        places,
+        channel=s["channel"] or None,
+        dark=s["dark"] or None,
+        angles=Path(s["angles"]) if s["angles"] else None,
+    )
+    return Order(calibrate.USE_CASE, job)
+
+
+def _calibrated(call: Call, done: Finished) -> Outputs:
+    return {"calibration": done.folder / "calibration.toml", "error": float(done.summary["error_deg"])}
+
+
+def _measure(call: Call) -> Order:
+    from ...graph.evaluation import Order
+    from ..sensor import measured_motion
+
+    s, given = call.settings, call.inputs
+    names = ("pressure", "kPa_per_unit", "zero", "rate_hz", "name", "specimen")
+    job = measured_motion.Job(given["recording"], given["calibration"], **{name: s[name] for name in names})
+    return Order(measured_motion.USE_CASE, job)
+
+
+def _measured(call: Call, done: Finished) -> Outputs:
+    from ...measured import read_folder
+
+    return {"data": read_folder(done.folder), "range": done.summary["angle_deg"]}
+
+
 def bench_nodes() -> tuple[Definition, ...]:
     """Definitions of the nodes of the bench."""
     return (
@@ -56,8 +110,8 @@ def bench_nodes() -> tuple[Definition, ...]:
                     "take", 1, "raise it to record once more; earlier takes are kept", low=1, high=10_000
                 ),
             ),
-            order=of_orders("record_order", _ORDERS),
-            read=of_orders("recording_of", _ORDERS),
+            order=_record,
+            read=_recorded,
             muting=_LEFT_OUT,
             remark=lambda outputs: outputs["words"],
         ),
@@ -86,8 +140,8 @@ def bench_nodes() -> tuple[Definition, ...]:
                 setting("dark", "", "column of the dark level, or volts; empty: 0"),
                 setting("angles", "", "CSV of time_s,angle_deg; empty: by marks such as angle 30", path=FILE),
             ),
-            order=of_orders("calibrate_order", _ORDERS),
-            read=of_orders("calibration_of", _ORDERS),
+            order=_calibrate,
+            read=_calibrated,
             muting=_LEFT_OUT,
             remark=lambda outputs: f"error {outputs['error']:.2g} deg",
         ),
@@ -119,8 +173,8 @@ def bench_nodes() -> tuple[Definition, ...]:
                 setting("name", "bench", "name of the experiment"),
                 setting("specimen", "A", "which specimen"),
             ),
-            order=of_orders("measure_order", _ORDERS),
-            read=of_orders("measured_of", _ORDERS),
+            order=_measure,
+            read=_measured,
             muting=_LEFT_OUT,
             remark=lambda outputs: "{:.3g} to {:.3g} deg".format(*outputs["range"]),
         ),

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from ...graph.definition import FILE, Definition, Input, Output, Outputs, Setting, setting
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import attrs
+
+from ...errors import InputError
+from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ...optimization.settings import WORKERS
-from .common import of_orders
+
+if TYPE_CHECKING:
+    from ...graph.evaluation import Finished, Order
 
 OPTIMIZE = "Optimize"
-_ORDERS = "optimize_orders"
 
 
 def _remark(outputs: Outputs) -> str:
@@ -16,6 +23,34 @@ def _remark(outputs: Outputs) -> str:
         return ""
     missed = [t["name"] for t in proposed["targets"] if not t["met"]]
     return f"misses {', '.join(missed)}" if missed else "meets every target"
+
+
+def _optimize(call: Call) -> Order:
+    from ...graph.evaluation import Order
+    from ..optimize.job import job_from
+    from ..optimize.run import USE_CASE
+
+    s, design = call.settings, call.inputs["unit"]
+    if not s["file"]:
+        raise InputError("no targets are named", "file", "give a design.toml")
+    job = job_from(Path(s["file"]), call.inputs["model"], s["workers"], unit=design.unit, body=design.body)
+    return Order(USE_CASE, job)
+
+
+def _proposed(call: Call, done: Finished) -> Outputs:
+    from ...design.parameters import read_unit
+
+    rows, number = done.summary["proposed"], call.settings["proposed"]
+    if number > len(rows):
+        raise InputError(
+            f"{len(rows)} units are proposed: there is no number {number}",
+            "proposed",
+            f"choose 1 to {len(rows)}" if rows else f"see the outcome: {done.summary['outcome']}",
+        )
+    row = rows[number - 1]
+    design = call.inputs["unit"]
+    unit = attrs.evolve(read_unit(done.folder / row["file"]), name=design.unit.name)
+    return {"unit": attrs.evolve(design, unit=unit, path=row.get("path", design.path)), "proposed": row}
 
 
 def optimize_nodes() -> tuple[Definition, ...]:
@@ -41,8 +76,8 @@ def optimize_nodes() -> tuple[Definition, ...]:
                 setting("proposed", 1, "which of the proposed units", low=1, high=6),
                 Setting(WORKERS),
             ),
-            order=of_orders("optimize_order", _ORDERS),
-            read=of_orders("proposed_of", _ORDERS),
+            order=_optimize,
+            read=_proposed,
             muting="the unit passes on as it is",
             mute=lambda call: {"unit": call.inputs["unit"]},
             remark=_remark,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from ...design.profile import cavity_polygon, outer_polygon
 from ...design.section_picture import struts_beside_section
 from ...files import write_bytes
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
-from .results import Optimised
+
+if TYPE_CHECKING:
+    from .run import Optimised
 
 Array = np.ndarray[Any, Any]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from ...report.html import cards, facts_table, figure, note, number, page, table
 from ...run.progress import Progress
 from ...run.versions import package_versions
 from . import charts
-from .results import Optimised, Proposal
 from .words import sensitivities
+
+if TYPE_CHECKING:
+    from .run import Optimised, Proposal
 
 
 def write_report(found: Optimised, path: Path, progress: Progress) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from ...design.printing.printer import load_printer
 from ...errors import InputError, OutputError
 from ...files import write_csv
 from ...materials.library import material_text
+from ...optimization.design_file import Design
 from ...optimization.evaluation import Candidate, Evaluated, Evaluator, evaluate
 from ...optimization.robustness import Verified, verified
 from ...optimization.search import Found, Observed, Values, search_units
@@ -27,9 +28,50 @@ from . import charts
 from .expected import MOST_CHECKED, search_plan
 from .job import DESIGN, FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
-from .results import Optimised, Proposal
 from .words import changes, outcome, reasons, verdict
 from .worker import asked_of, several
+
+
+@attrs.frozen(eq=False)
+class Proposal:
+    """A proposed unit: its rank from 1, its design's number, and its results.
+
+    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words. choice: path and
+    resin, as far as they were free, by the freedom's name.
+    """
+
+    place: int
+    number: int
+    unit: Unit
+    observed: Observed
+    values: Array
+    checked: Verified
+    changes: tuple[str, ...]
+    reasons: tuple[str, ...]
+    choice: Mapping[str, str] = attrs.field(factory=dict)
+
+
+@attrs.frozen(eq=False)
+class Optimised:
+    """Result of an optimisation: the search, its proposals, the outcome in words, and its cost.
+
+    computed: units simulated by this run; model_a: Model A's, those of earlier runs in the folder included.
+    """
+
+    design: Design
+    search: Found
+    proposals: tuple[Proposal, ...]
+    words: str
+    computed: int
+    model_a: int
+    has_model: bool = False
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the targets."""
+        return [t.name for t in self.design.targets]
+
 
 Array = np.ndarray[Any, Any]
 
