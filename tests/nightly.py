@@ -20,7 +20,6 @@ The test named beside each runs by default and guards against the same fault.
 test | guarded by default by | last passed
 --- | --- | ---
 """
-NEVER = "never"
 
 
 def marked(file):
@@ -81,8 +80,8 @@ def dates():
     """Date on which each test of the page last passed, by `FILE::NAME`."""
     if not PAGE.exists():
         return {}
-    rows = [line.strip("| \n").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines()]
-    return {row[0].strip("`"): row[2] for row in rows if len(row) == 3 and "::" in row[0]}
+    rows = [line.split("|") for line in PAGE.read_text(encoding="utf-8").splitlines()]
+    return {row[0].strip("` "): row[2].strip() for row in rows if len(row) == 3 and "::" in row[0]}
 
 
 def write(passed=()):
@@ -92,7 +91,9 @@ def write(passed=()):
     for (file, name), (where, quick) in every().items():
         test = f"{file}::{name}"
         guard = quick if where == file else f"{where}::{quick}"
-        rows.append(f"`{test}` | `{guard}` | {today if test in passed else known.get(test, NEVER)}\n")
+        rows.append(
+            f"`{test}` | `{guard}` | {today if test in passed else known.get(test, '')}".rstrip() + "\n"
+        )
     PAGE.write_text(HEAD + "".join(rows), encoding="utf-8")
 
 

@@ -29,7 +29,7 @@ def test_a_run_at_night_dates_what_passed_and_keeps_other_dates(tmp_path, monkey
     tests = {("t.py", "test_a"): ("t.py", "test_q"), ("t.py", "test_b"): ("u.py", "test_r")}
     monkeypatch.setattr(nightly, "every", lambda: tests)
     nightly.write({"t.py::test_a"})
-    assert nightly.dates()["t.py::test_b"] == nightly.NEVER
+    assert nightly.dates()["t.py::test_b"] == ""
     written = nightly.dates()["t.py::test_a"]
     assert written.count("-") == 2
     nightly.write()
