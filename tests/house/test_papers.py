@@ -16,7 +16,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 VENV = "python3.11 -m venv .venv && .venv/bin/pip install -e "
 MAIN = VENV + ". && .venv/bin/python headless/run.py simulate --preset mu-1.0x --out out/mu-1.0x"
-TESTS = VENV + "'.[blender,dev]' && .venv/bin/python -m pytest"
+TESTS = VENV.replace("-e", "--no-compile -e") + "'.[blender,dev]' && .venv/bin/python -m pytest"
 
 
 def test_one_version():
