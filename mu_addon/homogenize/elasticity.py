@@ -143,26 +143,27 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
     true ones of the meshed shape. Raises MeshingError where a piece is loose, or where the result is
     indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
     """
+    return strained(mesh, materials, box)[0]
+
+
+def strained(
+    mesh: Mesh, materials: Materials, box: Sequence[float] | None = None
+) -> tuple[Elasticity, Array]:
+    """`effective_tensor`, and the displacements (6, n, 3) in mm under unit mean strains that give it.
+
+    In Voigt's order, of engineering shears. Raises MeshingError as that does.
+    """
     octant = Octant(mesh, materials, box)
     C = np.zeros((6, 6))
     limit = np.zeros((6, 6))
+    moved = np.zeros((6, mesh.nodes.size))
     for rows, affine, force, u, work in _responses(octant):
+        moved[list(rows)] = u.T
         C[np.ix_(rows, rows)] = u.T @ work / octant.volume
         limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
     found = Elasticity((C + C.T) / 2, octant.relative_density)
     _require_possible(found, octant, (limit + limit.T) / 2)
-    return found
-
-
-def strained(mesh: Mesh, materials: Materials) -> Array:
-    """Displacements (6, n, 3) in mm of a mesh, as `effective_tensor` takes it, under unit mean strains.
-
-    In Voigt's order, of engineering shears. Raises MeshingError where a piece is loose.
-    """
-    found = np.zeros((6, mesh.nodes.size))
-    for rows, _, _, u, _ in _responses(Octant(mesh, materials)):
-        found[list(rows)] = u.T
-    return found.reshape(6, -1, 3)
+    return found, moved.reshape(6, -1, 3)
 
 
 def _responses(octant: Octant) -> Iterator[tuple[range, Array, Array, Array, Array]]:

@@ -22,7 +22,7 @@ from ..fem.elements import reference_gradients
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.stress import PeakStretch, exceeded
-from ..homogenize.elasticity import effective_tensor, strained
+from ..homogenize.elasticity import Elasticity, strained
 from ..meshing.mesh import LATTICE, Array, Mesh
 from .strut import radius_of, strut_mesh
 
@@ -72,7 +72,7 @@ def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
     from scipy.optimize import brentq
 
     strut = _Strut(kind, junction, midspan)
-    solid = effective_tensor(*strut.octant())
+    solid = _octant(strut)[1]
     half = 0.5
     across = half * (solid.C11 - solid.C12)
     along = 3 * (half * solid.C44 - across / 6)
@@ -108,8 +108,7 @@ def concentration_factors(d: Dimensions) -> ConcentrationFactors:
 @lru_cache(maxsize=8)
 def _concentration_factors(kind: LatticeKind, junction: float, midspan: float) -> ConcentrationFactors:
     strut, zones = _Strut(kind, junction, midspan), _zones(kind, junction, midspan)
-    mesh, materials = strut.octant()
-    unit = strained(mesh, materials)
+    mesh, _, unit = _octant(strut)
     along = mesh.nodes[mesh.tets[:, :4]].mean(axis=1) @ np.ones(3) / math.sqrt(3.0)
     joint = (along < junction) | (along > strut.length - junction)
     reference = reference_gradients(mesh.nodes, mesh.tets[joint])
@@ -141,12 +140,6 @@ class _Strut:
         """Length from the cell's corner to its centre."""
         return math.sqrt(3.0) / 2
 
-    def octant(self) -> tuple[Mesh, Materials]:
-        """The solid octant of the cell, and its resin."""
-        mesh = strut_mesh(self, RINGS, LAYERS)
-        count = len(mesh.tets)
-        return mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON))
-
     def _sections(self, zone: float) -> tuple[Array, Array, Array]:
         """Positions, radii and weights along the part between rigid zones."""
         x, w = np.polynomial.legendre.leggauss(64)
@@ -175,6 +168,14 @@ class _Strut:
         turn, mixed = (w / inertia).sum(), -(w * lever / inertia).sum()
         offset = (w * lever**2 / inertia).sum() + (w / (shear * np.pi * r**2)).sum()
         return float(turn / (turn * offset - mixed**2))
+
+
+@lru_cache(maxsize=8)
+def _octant(strut: _Strut) -> tuple[Mesh, Elasticity, Array]:
+    """Solid octant of a strut's cell, its elasticity, and its motion (6, n, 3) under unit mean strains."""
+    mesh = strut_mesh(strut, RINGS, LAYERS)
+    count = len(mesh.tets)
+    return mesh, *strained(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
 
 
 def joint_stretch(model: Model, materials: Materials, d: Dimensions, u: Array) -> PeakStretch | None:

@@ -15,13 +15,14 @@ from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
 from ..design.lattice import Lattice, graph_of, with_struts
 from ..design.parameters import Unit
-from ..errors import InputError, MeshingError
+from ..errors import InputError
 from ..fem.elements import even_points, shape_functions, shape_gradients
 from ..fem.embedding import Footholds
 from ..meshing.mesh import Array, Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
+from ..meshing.wall_grid import unmovable
 from .beams import Layers, rotation_nodes
 from .joints import zones_of
 from .lattice import clearance, cuts
@@ -55,7 +56,7 @@ class PrintedMorph:
         wall = mirror(wall, "x") if self._full else wall
         self._count = count = len(wall.nodes)
         if len(mesh.nodes) <= count or not np.array_equal(mesh.nodes[:count], wall.nodes):
-            raise _failed("it is no printed unit's, or has other settings")
+            raise unmovable("it is no printed unit's, or has other settings")
         turns = np.unique(mesh.beams[:, 1::2])
         # Rotation vectors of beams are the last nodes, and follow the others.
         self._struts = mesh.nodes[count : len(mesh.nodes) - len(turns)]
@@ -79,10 +80,10 @@ class PrintedMorph:
         if a == b:
             return mesh
         if a.kind != b.kind:
-            raise _failed("its lattice is of another kind")
+            raise unmovable("its lattice is of another kind")
         factor = b.cell / a.cell
         if factor != 1.0 and self._body is not None:
-            raise _failed("a user-defined body does not grow with the cell")
+            raise unmovable("a user-defined body does not grow with the cell")
         near = b if factor == 1.0 else shrunk(b, a.cell)
         same_wall = struts_alone_differ(a, near)
         wall = mesh.nodes[: self._count]
@@ -170,9 +171,3 @@ class PrintedMorph:
         return np.stack(
             [share[:, own == q].sum(axis=1) / volume[:, own == q].sum(axis=1) for q in columns], axis=1
         )
-
-
-def _failed(why: str) -> MeshingError:
-    return MeshingError(
-        f"the mesh of a printed unit cannot be moved: {why}", "unit", "make a new mesh of the other unit"
-    )
