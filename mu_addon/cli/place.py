@@ -30,7 +30,7 @@ def add(commands: Commands[Any]) -> None:
     import attrs
 
     from ..placement.settings import BEND, LONGEST, RULE, SHORTEST
-    from ..sensing.optics import Optics
+    from ..sensing.guide import Optics
     from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 
     constants = ", ".join(f"{name} {value:g}" for name, value in attrs.asdict(Optics()).items())

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..design.quantity import in_MPa
 from ..errors import InputError
-from ..meshing.mesh import Mesh
+from ..meshing.mesh import Mesh, mirror, mirror_displacement
 from .bending_angle import TipSection
 from .equilibrium import Equilibrium
 from .kinematics import cavity_volume_mm3
@@ -126,3 +126,16 @@ def simulate(
             history.append(found[pressure])
     solved = tuple(found[p] for p in distinct)
     return Trajectory(time_s, pressure_kPa, solved, np.searchsorted(distinct, pressure_kPa), model.mesh)
+
+
+def whole_body(mesh: Mesh, trajectory: Trajectory) -> tuple[Mesh, Trajectory]:
+    """Mesh and trajectory of the whole body, mirrored from those of its half or quarter.
+
+    Nothing is solved again: equilibria stay equilibria, to rounding. A path off the mirror plane needs both
+    sides.
+    """
+    for axis in mesh.symmetry:
+        states = [attrs.evolve(s, u=mirror_displacement(mesh, s.u, axis)) for s in trajectory.solved]
+        mesh = mirror(mesh, axis)
+        trajectory = attrs.evolve(trajectory, solved=tuple(states), mesh=mesh)
+    return mesh, trajectory

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from .cell_mesh import mesh_cell as mesh_cell
     from .compression import Compression as Compression
     from .compression import compress as compress
-    from .curve import Curve as Curve
     from .effective import Effective as Effective
     from .effective import read_effective as read_effective
     from .effective import write_effective as write_effective
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from .foam_fit import FoamFit as FoamFit
     from .foam_fit import fit_foam as fit_foam
     from .foam_fit import lattice_law as lattice_law
+    from .modulus import Curve as Curve
     from .modulus import moduli as moduli
     from .specimen import Specimen as Specimen
     from .specimen import block_specimen as block_specimen

@@ -12,7 +12,7 @@ from ..errors import ConvergenceError, InputError
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
-from .curve import Curve
+from .modulus import Curve
 from .specimen import Specimen
 from .stability import Loss, SymmetryBreakingModes, first_loss, interpolated
 from .strut_contact import StrutContact, first_strut_contact

@@ -13,8 +13,8 @@ from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import CubicShear, DiagonalStretch, Foam
-from .curve import Curve
 from .foam_response import ellipticity, small_strain, uniaxial
+from .modulus import Curve
 
 Array = np.ndarray[Any, Any]
 

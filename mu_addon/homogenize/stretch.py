@@ -13,7 +13,7 @@ from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
 from ..fem.self_intersection import crossings
 from ..meshing.mesh import AXES, Array, Mesh
-from .curve import Curve
+from .modulus import Curve
 from .octant import Octant, require_factor
 
 # How far a node may lie beyond the mirror plane it should stay behind, as a share of the cell.

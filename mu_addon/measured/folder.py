@@ -6,7 +6,7 @@ import difflib
 import hashlib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from ..cells.own import own_text
 from ..errors import InputError
 from ..reading import file_bytes, file_text, parse_toml
+from ..run.inputs import digest
 from .experiment import Array, Experiment
 from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table
@@ -434,3 +435,29 @@ def _place(path: Path, text: str, number: int, key: str = "") -> str:
         elif count == number and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", words):
             return f"{path}, line {line}"
     return str(path)
+
+
+def experiments_digest(measured: Measured) -> str:
+    """SHA-256 of the file that describes a folder's experiments."""
+    return digest(file_bytes(measured.folder / FILE))
+
+
+def described(measured: Measured) -> dict[str, list[str]]:
+    """Kind, role and SHA-256 of each experiment's file, by name."""
+    return {e.name: [e.kind, e.role, e.sha256] for e in measured.experiments}
+
+
+def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -> None:
+    """Raise InputError if measured data differ from those that a run was made with.
+
+    before: in the run's inputs by name, or None; now: the present ones.
+    """
+    if before is None or before == now:
+        return
+    known = before if isinstance(before, Mapping) else {}
+    other = [name for name in {**known, **now} if known.get(name) != now.get(name)]
+    raise InputError(
+        f"the measured data are not those that the run was made with: {', '.join(other[:3])}",
+        str(measured.folder),
+        "put those back, or give these a separate folder of results",
+    )

@@ -15,8 +15,8 @@ from ..fem.bending_angle import TipSection
 from ..fem.kinematics import probe
 from ..placement.deviation import centreline
 from ..sensing.embedded_waveguide import Joints, embed_waveguide
+from ..sensing.guide import Optics
 from ..sensing.law import Law, fit_law
-from ..sensing.optics import Optics
 from ..sensing.signal import response, signal_of_nodes
 from .structure import WITHOUT, Condition, States, Structure
 

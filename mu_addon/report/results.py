@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from ..sensing.guide import Optics
     from ..sensing.law import Law
-    from ..sensing.optics import Optics
     from ..sensing.signal import Response
 
 Floats = NDArray[np.floating[Any]]

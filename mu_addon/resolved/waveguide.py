@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from ..design.anchors import Window
 from ..design.body import Body, covering
@@ -14,14 +16,14 @@ from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..design.waveguide import Bar, waveguide
 from ..errors import InputError
-from ..meshing.mesh import LATTICE, Mesh, part
+from ..fem.embedding import embed
+from ..meshing.mesh import LATTICE, Array, Mesh, part
 from ..meshing.quality import check_positive
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
 from .beams import REACH, without_beams
 from .lattice import LEAST_SUPPORT, Depth, clearance, cuts, filled_outside, support
 from .octants import in_replaced, is_thickening, thickened_nodes
 from .strut import is_half_diagonal
-from .ties import Ties, joined, tie
 
 # An element of a strut of which the bar leaves less than this is all replaced.
 _LEAST = 0.02
@@ -132,3 +134,45 @@ def _thickened(mesh: Mesh, bar: Bar, d: Dimensions, body: Body | None) -> tuple[
     kept = Ties(*(table[~moved[mesh.tied]] for table in before))
     ties = joined([kept, tie(again, nodes[again], part(found, ~struts))], len(nodes))
     return attrs.evolve(found, filled=filled), ties
+
+
+class Ties(NamedTuple):
+    """Nodes (t,) that move as weighted sums of others: their numbers and weights (t, k)."""
+
+    nodes: Array
+    to: Array
+    weights: Array
+
+
+def tie(rows: Array, points: Array, to: Mesh, first: int = 0) -> Ties:
+    """Nodes (t,), at points (t, 3) in mm, that follow a mesh whose own nodes are numbered from `first` on."""
+    follows = embed(to, points)
+    return Ties(rows, follows.nodes + first, follows.weights)
+
+
+def joined(parts: list[Ties], count: int) -> Ties:
+    """All ties of a body of `count` nodes, each node tied once at most.
+
+    A node that follows tied ones follows their nodes: weights multiply. Chains are two ties long at most.
+    """
+    width = max(part.to.shape[1] for part in parts)
+    padded = [(part, width - part.to.shape[1]) for part in parts]
+    nodes = np.concatenate([part.nodes for part in parts])
+    to = np.vstack([np.pad(part.to, ((0, 0), (0, more)), "edge") for part, more in padded])
+    weights = np.vstack([np.pad(part.weights, ((0, 0), (0, more))) for part, more in padded])
+    if not np.isin(to, nodes).any():
+        return Ties(nodes, to, weights)
+    free = np.setdiff1d(np.arange(count), nodes)
+    rows = np.concatenate([free, np.repeat(nodes, width)])
+    columns = np.concatenate([free, to.ravel()])
+    values = np.concatenate([np.ones(len(free)), weights.ravel()])
+    follows = sparse.csr_matrix((values, (rows, columns)), shape=(count, count))
+    follows = (follows[nodes] @ follows).tocsr()
+    follows.eliminate_zeros()
+    each = np.diff(follows.indptr)
+    place = np.arange(follows.nnz) - np.repeat(follows.indptr[:-1], each)
+    row = np.repeat(np.arange(len(nodes)), each)
+    to = np.repeat(follows.indices[follows.indptr[:-1], None], each.max(), axis=1)
+    weights = np.zeros(to.shape)
+    to[row, place], weights[row, place] = follows.indices, follows.data
+    return Ties(nodes, to, weights)

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from .framing import crc16 as crc16
     from .guide import Centreline as Centreline
     from .guide import Guide as Guide
+    from .guide import Optics as Optics
     from .law import Law as Law
     from .law import fit_law as fit_law
-    from .optics import Optics as Optics
     from .recording import Recorder as Recorder
     from .recording import Recording as Recording
     from .recording import read_recording as read_recording

@@ -13,8 +13,7 @@ import attrs
 import numpy as np
 import warp as wp
 
-from .guide import Guide
-from .optics import Optics
+from .guide import Guide, Optics
 from .rays import ABSORBED, DETECTED, FATES, trace_rays
 
 Array = np.ndarray[Any, Any]

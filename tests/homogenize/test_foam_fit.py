@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import Foam
 from mu_addon.fem.point import evaluate
-from mu_addon.homogenize.curve import Curve
 from mu_addon.homogenize.foam_fit import (
     fit_foam,
     lattice_law,
@@ -17,6 +16,7 @@ from mu_addon.homogenize.foam_fit import (
     stable_shear,
 )
 from mu_addon.homogenize.foam_response import directions, ellipticity, small_strain, uniaxial
+from mu_addon.homogenize.modulus import Curve
 from tests.fem.cubic import Cubic
 
 STRETCH = np.linspace(0.6, 1.4, 17)

@@ -15,7 +15,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.state import State
-from mu_addon.fem.trajectory import Trajectory, simulate
+from mu_addon.fem.trajectory import Trajectory, simulate, whole_body
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
@@ -32,7 +32,6 @@ from mu_addon.placement.influence import (
     shares_of_time,
     stable_part,
 )
-from mu_addon.placement.whole_body import whole_body
 
 from ..fem import bodies
 

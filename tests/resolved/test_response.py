@@ -11,12 +11,11 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_NEWTON
-from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import lattice_graph
 from mu_addon.placement.influence import loaded
-from mu_addon.placement.whole_body import whole_body
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.response import _frame, _natural, _stiffness, bar_response
 from mu_addon.resolved.unit import mesh_printed

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.sensing.guide import Optics
 from mu_addon.sensing.law import FEATURES, Law, features
-from mu_addon.sensing.optics import Optics
 from mu_addon.sensing.signal import (
     best_sets,
     differential_pairs,

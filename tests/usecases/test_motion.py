@@ -16,14 +16,13 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.model import Model
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.trajectory import simulate
+from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import write_npz
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Candidate, candidate_paths, roi, with_sensor
-from mu_addon.placement.whole_body import whole_body
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver

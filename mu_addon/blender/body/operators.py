@@ -8,8 +8,8 @@ from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError
 from ..shared.operators import UnitOperator
-from ..shared.texts import sentence
 from ..unit import object as unit_object
+from ..unit.fields import sentence
 from ..unit.properties import to_unit
 from . import state as bodies
 

@@ -13,9 +13,8 @@ from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, 
 from ...run.progress import spell
 from ...usecases.graph.definitions import definitions
 from ..shared.panels import wrapped
-from ..shared.texts import sentence
 from ..shared.updates import Signal
-from ..unit.fields import blender_property, field, label, tied_update, tooltip
+from ..unit.fields import blender_property, field, label, sentence, tied_update, tooltip
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import sockets
 

@@ -16,7 +16,7 @@ from ...usecases.graph.templates import template, template_names
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared.operators import UnitOperator, open_file, reports_errors
-from ..shared.texts import sentence
+from ..unit.fields import sentence
 from . import conversion, following, state
 from .classes import TREE
 from .groups import TreeOperator, active_tree

@@ -6,7 +6,7 @@ import bpy
 
 from ...errors import InputError
 from ..shared.panels import UnitPanel, wrapped
-from ..shared.texts import sentence
+from ..unit.fields import sentence
 from . import state as obstacles
 
 

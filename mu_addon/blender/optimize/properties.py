@@ -21,8 +21,7 @@ from ...optimization.freedoms import PATH, RESIN, parameters
 from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ORIENTATION, ROBUST, SELF_CONTACT
 from ...optimization.settings import REFINE as SEARCH_REFINE
 from ..shared.registration import property_group_factory
-from ..shared.texts import sentence
-from ..unit.fields import blender_property, exact, label, true_scale
+from ..unit.fields import blender_property, exact, label, sentence, true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")

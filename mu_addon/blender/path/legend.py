@@ -12,10 +12,10 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from ..results import field_colours, legend
 from ..results import motion as motion_parts
 from ..shared.displays import PART
-from ..shared.texts import path_symbol
 from ..shared.viewports import Overlay
 from ..unit import object as unit_object
 from ..unit.drawing import CANDIDATE
+from ..unit.fields import path_symbol
 from . import ranking
 
 BETTER = "Mean deviation [mm], smaller is better"

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty
 
 from ...design.anchors import windows
 from ..shared.panels import UnitPanel, parameters, wrapped
-from ..shared.texts import path_symbol
+from ..unit.fields import path_symbol
 from . import ranking
 from .legend import BETTER
 from .picking import selected_candidate

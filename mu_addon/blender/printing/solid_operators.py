@@ -12,8 +12,8 @@ from ...design import settings
 from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
 from ..shared.operators import ValidUnitOperator
-from ..shared.texts import sentence
 from ..unit import object as unit_object
+from ..unit.fields import sentence
 from ..unit.properties import to_unit
 from . import layer
 from . import state as printing

@@ -9,9 +9,9 @@ import bpy
 from ...usecases.simulate_and_place.charts import ANGLE, delta_name
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
 from ..shared.panels import UnitPanel, alert, wrapped
-from ..shared.texts import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.fields import path_symbol, sentence
 from . import field_colours, field_operators, legend_object, run_motions, run_panel, thumbnails
 from . import motion as motion_parts
 from .operators import NO_MOTION

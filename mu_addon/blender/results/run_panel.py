@@ -12,9 +12,9 @@ import bpy
 from ...run.progress import spell
 from ...usecases.simulate_and_place.comparison import compare
 from ..shared.panels import UnitPanel, wrapped
-from ..shared.texts import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.fields import path_symbol, sentence
 from . import runs
 
 ROWS = 4

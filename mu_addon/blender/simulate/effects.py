@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError
 from ...reading import parse_toml
-from ..shared.texts import readable
-from ..unit.fields import exact
+from ..unit.fields import exact, readable
 
 if TYPE_CHECKING:
     from ...usecases.simulate_and_place.named_effects import NamedEffects

@@ -12,9 +12,18 @@ from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream
 from ..shared import updates
 from ..shared.operators import UnitOperator
-from ..shared.texts import sentence
 from ..unit import object as unit_object
-from ..unit.fields import TRUE, blender_property, exact, label, millimetres, step_of, tooltip, true_scale
+from ..unit.fields import (
+    TRUE,
+    blender_property,
+    exact,
+    label,
+    millimetres,
+    sentence,
+    step_of,
+    tooltip,
+    true_scale,
+)
 from ..unit.properties import from_unit, to_unit
 from . import state as stack
 

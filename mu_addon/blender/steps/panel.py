@@ -6,8 +6,8 @@ import bpy
 
 from ...design.steps import STEPS
 from ..shared.panels import UnitPanel, parameter, wrapped
-from ..shared.texts import sentence
 from ..unit.drawing import DRAWN
+from ..unit.fields import sentence
 from . import state as stack
 
 

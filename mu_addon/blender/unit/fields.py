@@ -16,7 +16,6 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from ...design.nearest import tied
 from ...design.quantity import Description, describe
 from ..shared import updates
-from ..shared.texts import sentence
 
 UNITS = ("mm", "kPa", "s")
 MILLIMETRES = "DISTANCE_CAMERA"
@@ -168,3 +167,18 @@ def generated_fields(section: type, changed) -> dict[str, Any]:
         if d.unit == "mm" and not d.fixed:
             annotations |= true_length(d.name, label(d), tooltip(d), step_of(d.high))
     return annotations
+
+
+def readable(name: str) -> str:
+    """The name of an effect or quantity with spaces: "mullins_softening" becomes "mullins softening"."""
+    return name.replace("_", " ")
+
+
+def sentence(text: str) -> str:
+    """A text with its first letter as a capital, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def path_symbol(name: str) -> str:
+    """The name of a sensor path with its Greek letter: "alpha4" becomes "α4"."""
+    return name.replace("alpha", "α")

@@ -13,10 +13,10 @@ from ...reading import parse_json
 from ...run.progress import spell
 from ..printing import state as printing
 from ..shared.file_cache import UNREADABLE
-from ..shared.texts import sentence
 from ..steps import state as stack
 from . import object as unit_object
 from .broken import broken
+from .fields import sentence
 from .properties import to_unit
 
 LINES = 5

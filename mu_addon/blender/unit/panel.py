@@ -22,13 +22,13 @@ from ..shared.panels import (
     parameters,
     wrapped,
 )
-from ..shared.texts import path_symbol
 from ..simulate import study_folder as studies
 from ..simulate.job import SIMULATION
 from ..simulate.panel import start_words
 from . import drawing, figures
 from . import object as unit_object
 from .broken import broken
+from .fields import path_symbol
 
 LETTERS = 14
 """Letters of a running stage's name; a longer one is numbered."""

@@ -20,6 +20,7 @@ from ...evidence.simulator import Composite
 from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
+from ...measured.folder import described, experiments_digest, require_same_data
 from ...meshing.settings import (
     DIAGNOSED,
     HOMOGENISED,
@@ -33,7 +34,6 @@ from ...run.inputs import FORMAT, named_path, read_inputs
 from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ...toml_writer import toml_text
-from ..measured_data import described, experiments_digest, require_same_data
 from .job import UNIT, fidelity_in, unit_behind
 from .simulators import simulations_plan, simulators_of
 from .words import bare, listed, readable

@@ -14,7 +14,7 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...measured import Experiment, Measured, read_folder
-from ...measured.folder import FILE
+from ...measured.folder import FILE, described, experiments_digest, require_same_data
 from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import (
     DIAGNOSED,
@@ -26,7 +26,6 @@ from ...meshing.settings import (
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
 from ...toml_writer import toml_text
-from ..measured_data import described, experiments_digest, require_same_data
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings

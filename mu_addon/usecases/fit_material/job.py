@@ -12,10 +12,10 @@ from ...materials.coupon import Coupon
 from ...materials.forms import FORMS, Form, form
 from ...materials.settings import WEIGHTS
 from ...measured import Measured, read_folder
+from ...measured.folder import require_same_data
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs, structured
 from ...toml_writer import toml_text
-from ..measured_data import require_same_data
 
 LAYOUT = FolderLayout(
     "fit.toml",

@@ -16,7 +16,7 @@ from ...placement.settings import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.progress_estimate import Plan
-from ...sensing.optics import Optics
+from ...sensing.guide import Optics
 from ...toml_writer import toml_text
 from ..simulate_and_place.expected import BY_REFINEMENT
 from .grasp import OF_FIDELITY, Cube, Grip

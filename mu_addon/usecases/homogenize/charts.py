@@ -9,8 +9,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...homogenize.curve import Curve
 from ...homogenize.elasticity import young_modulus
+from ...homogenize.modulus import Curve
 from ...report.charts import BY_LENGTH, CHOSEN, INK, MAP, QUIET, WIDTH, canvas, signed
 from ...report.render import Camera, Floats, Image, Part, fit, png, render
 from ...report.results import Picture

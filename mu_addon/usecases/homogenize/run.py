@@ -15,11 +15,10 @@ from ...fem.materials import Materials
 from ...files import write_bytes, write_csv
 from ...homogenize.cell_mesh import cell_materials, mesh_cell
 from ...homogenize.compression import Compressed, Compression, Friction, compress
-from ...homogenize.curve import Curve
 from ...homogenize.effective import Effective, effective, write_effective
 from ...homogenize.elasticity import Elasticity, effective_tensor
 from ...homogenize.foam_fit import FoamFit, fit_foam
-from ...homogenize.modulus import moduli
+from ...homogenize.modulus import Curve, moduli
 from ...homogenize.specimen import Specimen, block_specimen
 from ...homogenize.stretch import Stretched, StretchSettings, stretch_lattice
 from ...meshing.mesh import Mesh

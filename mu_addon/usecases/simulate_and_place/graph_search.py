@@ -12,7 +12,7 @@ from ...errors import ConvergenceError, InputError
 from ...fem.kinematics import Probe, probe
 from ...fem.materials import Materials
 from ...fem.model import Model
-from ...fem.trajectory import Trajectory
+from ...fem.trajectory import Trajectory, whole_body
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
@@ -31,7 +31,6 @@ from ...placement.influence import (
 from ...placement.response import Response, reduced_response
 from ...placement.search import SearchSettings, front, search_paths
 from ...placement.settings import PRINTED
-from ...placement.whole_body import whole_body
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
 from ...resolved.response import bar_response

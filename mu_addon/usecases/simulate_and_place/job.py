@@ -33,7 +33,7 @@ from ...placement.settings import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock
-from ...sensing.optics import Optics
+from ...sensing.guide import Optics
 from .named_effects import NamedEffects
 from .settings import CHECKS, MESH_CHECK, MESHER, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
 from .study_file import FILES, FILES_OF, LAYOUT, NAME, Tables, compose, holds, read_run

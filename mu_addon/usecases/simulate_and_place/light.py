@@ -14,8 +14,8 @@ from ...files import write_csv
 from ...report.results import Checks, Signals
 from ...run.cache import Cache, key
 from ...sensing.embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
+from ...sensing.guide import Optics
 from ...sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
-from ...sensing.optics import Optics
 from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
 
 if TYPE_CHECKING:
