@@ -113,10 +113,10 @@ def _field() -> tuple[Any, dict[str, Any]]:
 
 
 _SAMPLES: dict[str, Callable[[], tuple[Any, dict[str, Any]]]] = {
-    nodes.tubes.NAME: _tubes,
-    nodes.balls.NAME: _balls,
-    nodes.labelled.NAME: _labelled,
+    nodes.TUBES.name: _tubes,
+    nodes.BALLS.name: _balls,
+    nodes.LABELLED.name: _labelled,
     nodes.waveguide.NAME: _waveguide,
-    nodes.field.NAME: _field,
+    nodes.COLOUR_FIELD.name: _field,
 }
 """By a group's name: a new mesh for its preview, and its inputs."""

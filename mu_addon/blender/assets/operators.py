@@ -48,7 +48,7 @@ class MU_OT_skin(bpy.types.Operator):
     group: EnumProperty(
         name="Group",
         description="Node group to add as a modifier",
-        items=[(name, name, module.TEXT) for name, module in nodes.GROUPS.items()],
+        items=[(name, name, one.text) for name, one in nodes.GROUPS.items()],
     )
 
     @classmethod

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
 
 import bpy
 
 from ...shared.compat import input_defaults, modifier_inputs, set_modifier_input
-from . import balls, field, labelled, tubes, unit, waveguide
+from . import unit, waveguide
+from .groups import BALLS, COLOUR_FIELD, LABELLED, TUBES, Group
 
-GROUPS: dict[str, ModuleType] = {module.NAME: module for module in (tubes, balls, labelled, waveguide, field)}
+GROUPS = {one.name: one for one in (TUBES, BALLS, LABELLED, waveguide.WAVEGUIDE, COLOUR_FIELD)}
 """Groups for any geometry, which are assets."""
-_ALL = {**GROUPS, unit.NAME: unit}
+_ALL = {**GROUPS, unit.UNIT.name: unit.UNIT}
 
 CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
 """Identifier of the groups' catalogue in the asset browser."""
@@ -21,15 +21,15 @@ CATALOGUE = "6f0f3a5e-5f0b-4a37-9a39-0c2f7c1b9d21"
 
 def group(name: str):
     """The node group of that name, built or brought up to date; those of `GROUPS` are assets of the file."""
-    module = _ALL[name]
+    asked = _ALL[name]
     found = bpy.data.node_groups.get(name)
     if found is None:
         found = bpy.data.node_groups.new(name, "GeometryNodeTree")
         found.is_modifier = True
         if name in GROUPS:
             found.asset_mark()
-    if found.get("mu_version") != module.VERSION:
-        _build(found, module)
+    if found.get("mu_version") != asked.version:
+        _build(found, asked)
     return found
 
 
@@ -48,17 +48,17 @@ def no_assets() -> Iterator[None]:
             tree.asset_data.description, tree.asset_data.catalog_id = description, catalogue
 
 
-def _build(tree, module: ModuleType) -> None:
+def _build(tree, asked: Group) -> None:
     """Build a group anew; modifiers that use it keep their values, by the name of the input."""
     users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
     kept = [modifier_inputs(modifier) for modifier in users]
     tree.nodes.clear()
     tree.interface.clear()
-    module.build(tree, *(group(name) for name in getattr(module, "USES", ())))
+    asked.build(tree, *(group(name) for name in asked.uses))
     if tree.asset_data is not None:  # the user may have taken the mark off
-        tree.asset_data.description = module.TEXT
+        tree.asset_data.description = asked.text
         tree.asset_data.catalog_id = CATALOGUE
-    tree["mu_version"] = module.VERSION
+    tree["mu_version"] = asked.version
     for modifier, values in zip(users, kept, strict=True):
         for name, default in input_defaults(tree).items():
             set_modifier_input(modifier, name, values.get(name, default))

@@ -6,13 +6,12 @@ the unit, and moving the unit moves them.
 
 from __future__ import annotations
 
-from . import balls, tubes
+from .groups import BALLS, TUBES, Group
 from .wiring import Wiring
 
 NAME = "MU Unit"
-VERSION = 3
-TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
-USES = (tubes.NAME, balls.NAME)
+_VERSION = 3
+_TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
 RESULTS = ("Result 1", "Result 2")
 """Inputs for the objects shown in place of the mesh, if any is given."""
 SHOW_RESULT = "Show Result"
@@ -21,7 +20,7 @@ PLAIN, TUBE, BALL, NODE = 0, 1, 2, 3
 """A point attribute and its values; a node is a coarser ball of the struts' material."""
 
 
-def build(tree, tube_group, ball_group) -> None:
+def _build(tree, tube_group, ball_group) -> None:
     """Parts of the mesh by `mu_skin`, each through its group, joined."""
     w = Wiring(tree)
     w.socket("Geometry", "Geometry")
@@ -71,3 +70,6 @@ def build(tree, tube_group, ball_group) -> None:
     tree.links.new(both.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "False"))
     tree.links.new(played.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "True"))
     w.output(chosen.outputs[0])
+
+
+UNIT = Group(NAME, _VERSION, _TEXT, _build, (TUBES.name, BALLS.name))

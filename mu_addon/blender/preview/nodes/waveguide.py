@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 
 from ...shared.compat import link_radius
+from .groups import Group
 from .wiring import Wiring
 
 NAME = "MU Waveguide"
-VERSION = 1
-TEXT = (
+_VERSION = 1
+_TEXT = (
     "A square bar along curves and edges, with wells at a constant pitch in the face the curve's normal shows"
 )
 
 
-def build(tree) -> None:
+def _build(tree) -> None:
     """A square swept along the curve; boxes at every pitch, cut out of it or shown in it.
 
     The wells rotate with the curve's normal; their number follows its length.
@@ -111,3 +112,6 @@ def build(tree) -> None:
         True_=cut.outputs["Mesh"],
     )
     w.output(chosen.outputs[0])
+
+
+WAVEGUIDE = Group(NAME, _VERSION, _TEXT, _build)
