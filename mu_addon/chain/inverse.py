@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import attrs
@@ -40,13 +39,12 @@ def reach_point(
     point_mm: Array,
     low_kPa: Array | None = None,
     high_kPa: Array | None = None,
-    report: Callable[[int, float], None] = lambda step, miss: None,
 ) -> Reach:
     """Pressures that bring the tip as near to a point (3,) in mm as bounds allow, low ones first.
 
     The point is in the frame of the chain's base. low_kPa, high_kPa (n,): bounds, by default the joints'
     ranges. The nearest stable state is followed from the chain at rest, so that another posture that reaches
-    the point, too, may be missed. report: called with the step and the miss in mm. Raises InputError for
+    the point, too, may be missed. Raises InputError for
     invalid bounds, ConvergenceError where the chain cannot carry its loads at rest.
     """
     from scipy.optimize import lsq_linear
@@ -69,9 +67,9 @@ def reach_point(
     if not np.array_equal(inside, state.pressures_kPa):
         state = chain.reach(state, inside)
     radius, now = 0.5 * float((high - low).max()), cost(state)
-    step = 0
-    for step in range(1, _MOST_STEPS + 1):
-        report(step, float(np.linalg.norm(state.tip_mm - point)))
+    steps = 0
+    while steps < _MOST_STEPS:
+        steps += 1
         p = state.pressures_kPa
         matrix = np.vstack([chain.slope_of_tip(state)[3:], _PER_KPA * np.eye(len(p))])
         left = np.concatenate([point - state.tip_mm, -_PER_KPA * p])
@@ -98,4 +96,4 @@ def reach_point(
                 break
     p = state.pressures_kPa
     at_bound = (np.abs(p - low) < 1e-6) | (np.abs(p - high) < 1e-6)
-    return Reach(p, state, float(np.linalg.norm(state.tip_mm - point)), at_bound, step)
+    return Reach(p, state, float(np.linalg.norm(state.tip_mm - point)), at_bound, steps)

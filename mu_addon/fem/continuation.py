@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal
 
 import attrs
@@ -74,13 +73,12 @@ def trace_branch(
     toward: float = 1.0,
     stop_at_critical: bool = False,
     settings: ContinuationSettings | None = None,
-    on_point: Callable[[Point], None] | None = None,
 ) -> Branch:
     """The branch of equilibria from a converged state, through limit points, by arc-length continuation.
 
     It ends where it first reaches the pressure until_MPa or the cavity volume until_mm3, at the first
     critical point (stop_at_critical), or after settings.max_points. It sets out toward the target, else to
-    higher (toward > 0) or lower pressure. body: an `Equilibrium`. on_point: called with each `Point`.
+    higher (toward > 0) or lower pressure. body: an `Equilibrium`.
 
     Mirror planes of the mesh hide bifurcations into shapes that lack their symmetry. Raises
     ConvergenceError where the smallest step fails. Sources: Keller (1977); Riks, J. Appl. Mech. 39 (1972)
@@ -112,8 +110,6 @@ def trace_branch(
             continue
         criticals += found
         points.append(new.point)
-        if on_point:
-            on_point(new.point)
         if found and stop_at_critical:
             ended = "critical point"
         turn = np.arccos(np.clip(arc.product(node.direction, new.direction), -1, 1))

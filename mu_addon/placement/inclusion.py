@@ -16,6 +16,8 @@ Array = np.ndarray[Any, Any]
 # Gauss rules lose less at such a kink than one long one.
 _PIECES = 16
 _GAUSS = np.polynomial.legendre.leggauss(6)
+LEAST_SHARE = 1e-9
+"""Share of an element below which a path does not touch it."""
 
 
 def _disc_polygon_area(polygon: Array, radius: float) -> Array:
@@ -130,19 +132,17 @@ class Inclusion:
         return float(np.pi * self.radius_mm**2 * self.length_mm)
 
 
-def straight_inclusion(
-    corners: Array, lattice: Array, start: Array, end: Array, radius: float, minimum_share: float = 1e-9
-) -> Inclusion:
+def straight_inclusion(corners: Array, lattice: Array, start: Array, end: Array, radius: float) -> Inclusion:
     """Inclusion of one straight path in the lattice elements of a mesh.
 
     corners (m, 4, 3), start and end (3,) and radius in mm; lattice (m,) bool, elsewhere the share stays 0;
-    shares below `minimum_share` are rounding at a face that the cylinder merely grazes and count as no
+    shares below `LEAST_SHARE` are rounding at a face that the cylinder merely grazes and count as no
     contact.
     """
     a, b, c, d = np.moveaxis(corners, 1, 0)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)) / 6
     share = np.where(lattice, cylinder_overlap(corners, start, end, radius) / volume, 0.0)
-    share[share < minimum_share] = 0.0
+    share[share < LEAST_SHARE] = 0.0
     length = float(np.linalg.norm(np.asarray(end, float) - np.asarray(start, float)))
     return Inclusion(np.minimum(share, 1.0), radius, length)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .inclusion import Inclusion, cylinder_overlap
+from .inclusion import LEAST_SHARE, Inclusion, cylinder_overlap
 
 Array = np.ndarray[Any, Any]
 
@@ -59,12 +59,10 @@ def polyline_overlap(corners: Array, points: Array, radius: float) -> Array:
     return overlap
 
 
-def polyline_inclusion(
-    corners: Array, lattice: Array, points: Array, radius: float, minimum_share: float = 1e-9
-) -> Inclusion:
+def polyline_inclusion(corners: Array, lattice: Array, points: Array, radius: float) -> Inclusion:
     """Inclusion of a path (n, 3) in mm in the lattice elements of a mesh.
 
-    corners (m, 4, 3) and radius in mm; lattice (m,) bool; minimum_share: below it no contact, as in
+    corners (m, 4, 3) and radius in mm; lattice (m,) bool; least shares are no contact, as in
     `straight_inclusion`. Raises InputError as `polyline_overlap`.
     """
     a, b, c, d = np.moveaxis(corners, 1, 0)
@@ -72,7 +70,7 @@ def polyline_inclusion(
     share = np.zeros(len(corners))
     inside = np.flatnonzero(lattice)
     share[inside] = polyline_overlap(corners[inside], points, radius) / volume[inside]
-    share[share < minimum_share] = 0.0
+    share[share < LEAST_SHARE] = 0.0
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     return Inclusion(np.minimum(share, 1.0), radius, length)
 

@@ -28,7 +28,7 @@ from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
 from .inclusion import Inclusion, sensor_share, straight_inclusion
-from .influence import Parity, loaded, parities, probe_loads, representative_pressures
+from .influence import loaded, parities, probe_loads, representative_pressures
 from .sampling import polynomials
 
 Array = np.ndarray[Any, Any]
@@ -128,21 +128,16 @@ def reduced_response(
     graph: Graph,
     rule: str,
     radius_mm: float,
-    pressures_MPa: Array | None = None,
-    sides: list[Parity] | None = None,
 ) -> Response:
     """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
     model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
-    monitor: probe of the backbone's p points. pressures_MPa (s,): the states, by default those of
-    `representative_pressures`; sides: `parities(model)`. Raises InputError where a step meets no element,
-    IndefiniteError at an unstable state.
+    monitor: probe of the backbone's p points. The states are those of `representative_pressures`. Raises
+    InputError where a step meets no element, IndefiniteError at an unstable state.
     """
     mesh = model.mesh
-    sides = parities(model) if sides is None else sides
-    states = loaded(
-        trajectory, representative_pressures(trajectory) if pressures_MPa is None else pressures_MPa
-    )
+    sides = parities(model)
+    states = loaded(trajectory, representative_pressures(trajectory))
     step, side, kept = _represented(graph, mirrored=len(sides) > 1)
     patterns = _patterns(model, materials, sensor_MPa, graph, kept, rule, radius_mm)
     k = patterns[0].force.shape[2]

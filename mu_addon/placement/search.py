@@ -77,14 +77,12 @@ def search_paths(
     predicted_mm: Array,
     check: Callable[[Array], Array],
     settings: SearchSettings | None = None,
-    on_check: Callable[[int, float], None] = lambda checked, risk: None,
 ) -> Search:
     """Solve paths in the order of their predicted deviation until no other is likely to beat the best.
 
     predicted_mm (n,): positive predictions of J_hat. check: maps numbers (k,) of paths to their exact J_hat
-    (k,) in mm, NaN for those that are impossible and left out. on_check: called with how many were checked
-    and the risk left. Raises InputError where a prediction is not positive or no path is possible, and
-    whatever `check` raises.
+    (k,) in mm, NaN for those that are impossible and left out. Raises InputError where a prediction is not
+    positive or no path is possible, and whatever `check` raises.
     """
     s = settings or SearchSettings()
     predicted_mm = np.asarray(predicted_mm, float)
@@ -106,7 +104,6 @@ def search_paths(
             if not checked:
                 raise InputError("none of the paths is possible", "search", "allow other paths")
             risk = probability_of_better(predicted_mm[possible], exact[possible])
-            on_check(checked, risk)
             if risk <= s.risk or checked >= s.most:
                 out = np.flatnonzero(~possible)
                 return Search(predicted_mm, exact, int(np.nanargmin(exact)), risk, risk <= s.risk, out)

@@ -222,11 +222,10 @@ class Line:
     valid_to: float = np.inf
 
 
-def compression_chart(lines: Sequence[Line], measured_kPa: tuple[float, float] | None = None) -> str:
-    """Nominal stress against strain; dashed where struts have met; a measured modulus as a band."""
+def compression_chart(lines: Sequence[Line]) -> str:
+    """Nominal stress against strain; dashed where struts have met."""
     with canvas(WIDTH, 3.3) as (figure, svg):
         axes = figure.add_axes((0.14, 0.15, 0.82, 0.81))
-        top = max(float(line.stress_kPa.max()) for line in lines)
         colors = (CHOSEN, BY_LENGTH[0], BY_LENGTH[1], QUIET)
         for line, color in zip(lines, colors, strict=False):
             sound = line.strain <= line.valid_to + 1e-12
@@ -242,19 +241,6 @@ def compression_chart(lines: Sequence[Line], measured_kPa: tuple[float, float] |
                 rest = max(int(sound.sum()) - 1, 0)
                 axes.plot(line.strain[rest:] * 100, line.stress_kPa[rest:], ":", color=color, linewidth=1.8)
                 axes.plot(line.strain[rest] * 100, line.stress_kPa[rest], "o", color=color, markersize=4)
-        if measured_kPa is not None:
-            value, spread = measured_kPa
-            end = min(0.4, top / (value + spread) * 1.0)
-            x = np.array([0.0, end])
-            axes.fill_between(
-                x * 100,
-                x * (value - spread),
-                x * (value + spread),
-                color=QUIET,
-                alpha=0.35,
-                linewidth=0,
-                label="measured modulus",
-            )
         axes.set(xlabel="compression [%]", ylabel="nominal stress [kPa]", xlim=(0, None), ylim=(0, None))
         axes.legend(loc="upper left")
     return svg()
