@@ -217,15 +217,15 @@ def add_fidelity(
 
 def fidelity_of(options: argparse.Namespace) -> tuple[str, bool]:
     """The fidelity that options ask for, or that they alone have; and whether parts keep apart."""
-    from ..meshing.settings import FIDELITY, HOMOGENISED
+    from ..meshing.settings import HOMOGENISED, fidelity_where_none_is_named
 
-    named = options.fidelity
-    if named is None:
+    if options.fidelity is None:
         order, mesher = getattr(options, "order", 2), getattr(options, "mesher", "auto")
-        only = order == 1 or mesher != "auto" or any(getattr(options, n, None) for n in ("lattice", "rule"))
-        named = HOMOGENISED if only else FIDELITY.default
-    apart = options.self_contact
-    return str(named), named != HOMOGENISED if apart is None else apart
+        others = mesher != "auto", *(getattr(options, name, None) for name in ("lattice", "rule"))
+        fidelity, apart = fidelity_where_none_is_named(order, (), *others)
+    else:
+        fidelity, apart = options.fidelity, options.fidelity != HOMOGENISED
+    return fidelity, apart if options.self_contact is None else options.self_contact
 
 
 def add_simulation(command: argparse.ArgumentParser) -> None:

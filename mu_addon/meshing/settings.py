@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import attrs
@@ -30,6 +31,21 @@ SELF_CONTACT = described(
     "keep walls and struts of a resolved unit apart, at several times the cost; without it they may cross, "
     "and the run gives the pressure",
 )
+OF_CONTINUUM = ("material.lattice_modulus_kPa", "material.lattice_poisson")
+"""Parameters of a unit that its printed struts do not have: theirs are the resin's."""
+
+
+def fidelity_where_none_is_named(
+    order: int | None = None, parameters: Iterable[str] = (), *others: Any
+) -> tuple[str, bool]:
+    """Fidelity of a run that names none, and whether its walls and struts are kept apart.
+
+    The printed body, unless what is asked for needs a continuum: elements of `order` 1, one of `parameters`
+    in OF_CONTINUUM, or any of `others`: a mesher, a law of the lattice, a rule of inclusion.
+    """
+    if order == 1 or any(others) or not {*OF_CONTINUUM}.isdisjoint(parameters):
+        return HOMOGENISED, False
+    return str(FIDELITY.default), bool(SELF_CONTACT.default)
 
 
 def _one_of(*allowed: Any) -> Any:

@@ -19,11 +19,11 @@ from ..design.settings import USUAL_RESIN
 from ..design.toml_text import nearest
 from ..errors import InputError
 from ..materials.library import Material, load_material, material_text, read_material
-from ..meshing.settings import FIDELITY, HOMOGENISED, RESOLVED, MeshSettings
+from ..meshing.settings import FIDELITY, HOMOGENISED, OF_CONTINUUM, RESOLVED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
-from .freedoms import OF_LATTICE, PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
@@ -337,7 +337,7 @@ def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fix
         if target.kind in OF_SENSOR:
             return f"{target.kind} is of a sensor, which a printed body has meshed into it"
     for name in (*(f.name for f in freedoms), *fixed):
-        if name in OF_LATTICE:
+        if name in OF_CONTINUUM:
             return f"{name} is of a homogenised lattice: printed struts have the resin's"
     return ""
 

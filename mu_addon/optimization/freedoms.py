@@ -21,8 +21,6 @@ PATH, RESIN = "path", "resin"
 """Freedoms besides a unit's parameters: the path of the sensor, and the resin of the unit."""
 # Struts of a homogenised lattice have no stiffness of their own: its modulus is a parameter.
 UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
-OF_LATTICE = ("material.lattice_modulus_kPa", "material.lattice_poisson")
-"""Parameters of a homogenised lattice alone."""
 
 
 @attrs.frozen

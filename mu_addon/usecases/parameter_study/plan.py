@@ -16,8 +16,7 @@ from ...design.quantity import Description
 from ...design.toml_text import nearest
 from ...errors import InputError, MuError
 from ...fem.protocol import Protocol
-from ...meshing.settings import FIDELITY, HOMOGENISED, SELF_CONTACT
-from ...optimization.freedoms import OF_LATTICE
+from ...meshing.settings import fidelity_where_none_is_named
 from ...reading import parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, read_toml
@@ -247,8 +246,7 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
 def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     """The document with the fidelity that its studies have where it names none.
 
-    The printed body, its walls and struts kept apart; homogenised where the lattice's moduli are varied or a
-    setting of the mesh or of placement needs a continuum.
+    A file that names a mesher, varies the order of its elements or has rules of inclusion needs a continuum.
     """
     simulate, place, vary = (document.get(name, {}) for name in ("simulate", "place", "vary"))
     # What is no table is refused later, by name.
@@ -260,11 +258,10 @@ def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     varied = _flat(vary)
     if "simulate.mesh.fidelity" in varied:
         return document
-    continuum = mesh.get("order") == 1 or "simulate.mesh.order" in varied or "mesher" in simulate
-    continuum |= "rules" in place or any(name in OF_LATTICE for name in varied)
-    fidelity = HOMOGENISED if continuum else FIDELITY.default
-    apart = {} if fidelity == HOMOGENISED else {"self_contact": SELF_CONTACT.default}
-    return document | {"simulate": apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}
+    others = "simulate.mesh.order" in varied, "mesher" in simulate, "rules" in place
+    fidelity, apart = fidelity_where_none_is_named(mesh.get("order"), varied, *others)
+    kept_apart = {"self_contact": apart} if apart else {}
+    return document | {"simulate": kept_apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}
 
 
 def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
