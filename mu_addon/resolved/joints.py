@@ -27,7 +27,7 @@ from ..meshing.mesh import LATTICE, Array, Mesh
 from .strut import radius_of, strut_mesh
 
 POISSON = 0.45
-# Of the solid octant: its elastic moduli are then within 1 % of a mesh by pytetwild (docs/resolved.md).
+# Of the solid octant: its moduli are then within 1 % of a mesh by pytetwild (docs/engineering/method.md).
 RINGS, LAYERS = 3, 18
 # A free joint of fewer octants bends more easily: factors of the zone in bending where 4, 2 and 1 meet, which
 # give blocks of 2 to 8 cells the stiffness that solid ones have.

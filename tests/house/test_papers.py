@@ -135,3 +135,13 @@ def test_the_search_for_machines_can_find_one(text, expected):
 def test_no_large_file():
     large = [path.name for path in _kept_files() if path.stat().st_size > 2_000_000]
     assert large == []
+
+
+def test_every_module_that_a_page_names_is_there():
+    """Of `folder/module.py`; what a page tells to write is of gent."""
+    files, missing = {path.as_posix() for path in _kept_files()}, []
+    for page in (ROOT / "docs").rglob("*.md"):
+        for name in re.findall(r"`([\w/-]+/[\w-]+\.py)`", page.read_text(encoding="utf-8")):
+            if not name.endswith("/gent.py") and not any(file.endswith(f"/{name}") for file in files):
+                missing.append(f"{page.relative_to(ROOT)}: {name}")
+    assert missing == []
