@@ -35,23 +35,23 @@ class Pace:
     """Pace of a stage by the shares done that it told: that of the later part of its time."""
 
     def __init__(self) -> None:
-        self._told = deque([(0.0, 0.0)])
+        self._shares = deque([(0.0, 0.0)])
 
     def tell(self, elapsed: float, share: float) -> None:
         """Process a share (0..1) known `elapsed` s after the stage's start."""
-        told = self._told
+        shares = self._shares
         if elapsed < AT_ONCE_S:
-            told.clear()
-        told.append((elapsed, share))
-        while len(told) > 2 and told[1][0] <= RECENT * elapsed:
-            told.popleft()
+            shares.clear()
+        shares.append((elapsed, share))
+        while len(shares) > 2 and shares[1][0] <= RECENT * elapsed:
+            shares.popleft()
 
     def left(self, elapsed: float) -> float | None:
         """Seconds left `elapsed` s after the stage's start, less those since the last share; None if unknown.
 
         A stage that is overdue by that is assumed to take a fifth of its time still.
         """
-        (began, before), (at, share) = self._told[0], self._told[-1]
+        (began, before), (at, share) = self._shares[0], self._shares[-1]
         if share <= before:
             return None
         rest = (1.0 - share) * (at - began) / (share - before)
@@ -77,7 +77,7 @@ class ProgressEstimate:
         self._taken: dict[str, float] = {}
         self._stage = ""
         self._share = self._kept = 0.0
-        self._told_itself = False
+        self._by_itself = False
         self._spent = 0.0
         self._own_left: float | None = None
         self._left: float | None = None
@@ -119,7 +119,7 @@ class ProgressEstimate:
         self._spent = float(seconds) if isinstance(seconds, int | float) else 0.0
         self._own_left = float(left) if isinstance(left, int | float) else None
         self._share = float(share) if isinstance(share, int | float) else 0.0
-        self._told_itself = self._share > 0.0
+        self._by_itself = self._share > 0.0
         if self._spent < AT_ONCE_S:
             self._kept = self._share
         if self._planned and self._share < SURE:
@@ -137,7 +137,7 @@ class ProgressEstimate:
                 self._own_left = weight * self._own_left + (1.0 - weight) * by_plan
         if message.get("state") == "end":
             self._taken[stage] = self._spent
-            self._share, self._own_left, self._told_itself = 1.0, 0.0, False
+            self._share, self._own_left, self._by_itself = 1.0, 0.0, False
         self._estimate(added)
 
     def _tell_part(self, stage: str, message: Mapping[str, Any]) -> None:
@@ -152,7 +152,7 @@ class ProgressEstimate:
             self._stage, self._began, self._kept = stage, now, 0.0
         self._spent = now - self._began
         share, left = (message.get(key) for key in ("part", "part_seconds_left"))
-        self._told_itself = isinstance(share, int | float)
+        self._by_itself = isinstance(share, int | float)
         if isinstance(share, int | float):
             self._share, self._own_left = float(share), float(left) if isinstance(left, int | float) else None
         else:
@@ -192,7 +192,7 @@ class ProgressEstimate:
         """
         ran = [(s, self._expected[name]) for name, s in self._taken.items()]
         share = self._share - self._kept
-        if self._told_itself and share >= SURE:
+        if self._by_itself and share >= SURE:
             ran.append((self._spent, share * self._expected[self._stage]))
         ran = [(s, expected) for s, expected in ran if s >= SKIPPED * expected]
         expected = sum(e for _, e in ran)
