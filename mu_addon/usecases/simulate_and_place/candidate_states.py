@@ -208,10 +208,10 @@ class CandidateSolver:
         loaded = sum(map(len, order))
         weight = np.bincount(trajectory.index, minlength=len(distinct)) * compared
         known: dict[int, Array] = {}
-        # Each round may be the last, and takes half of what is left; the path from rest comes after.
+        # Each round may be the last, and takes most of what is left; the path from rest comes after.
         done, of_rounds = 0.0, BEFORE_VERIFYING if verify else 1.0
         for pair in order:
-            part = (of_rounds - done) / 2.0 / len(pair)
+            part = 0.75 * (of_rounds - done) / len(pair)
             for numbers in self._together(distinct, pair):
                 begun, done = done, done + part * len(numbers)
                 found = self._solved(trajectory, numbers, within(on_progress, begun, done))
