@@ -10,7 +10,7 @@ import pytest
 from mu_addon.run.heartbeat import PATIENCE_S, Heartbeat, to_watcher
 from mu_addon.run.progress import Progress
 
-# Holds the interpreter for three seconds, so that no thread of it runs, and begins with a silence as long;
+# Holds the interpreter for five seconds, so that no thread of it runs, and begins with a silence as long;
 # its watcher is less patient.
 HELD = """
 import ctypes, sys
@@ -22,11 +22,11 @@ heartbeat.PATIENCE_S = 1.0
 
 
 def run(options, context):
-    ctypes.PyDLL(None).sleep(3)
+    ctypes.PyDLL(None).sleep(5)
     context.progress.plan([("mesh", 100.0)])
     with context.progress.stage("mesh"):
         context.progress.update(0.5)
-        ctypes.PyDLL(None).sleep(3)
+        ctypes.PyDLL(None).sleep(5)
 
 
 check.run = run
