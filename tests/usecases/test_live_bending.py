@@ -39,23 +39,23 @@ def answered(bending, number, unit, kPa=20.0):
 
 def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     warm, anew = LiveBending(tmp_path / "warm"), LiveBending(tmp_path / "anew")
-    first, motion = answered(warm, 1, UNIT, 6.0)
-    assert set(first) == {0.0, 3.0, 6.0}
-    assert 0.0 == first[0.0] < first[3.0] < first[6.0]
-    assert motion.state_kPa.tolist() == [0.0, 3.0, 6.0]
+    first, motion = answered(warm, 1, UNIT)
+    assert set(first) == {0.0, 10.0, 20.0}
+    assert 0.0 == first[0.0] < first[10.0] < first[20.0]
+    assert motion.state_kPa.tolist() == [0.0, 10.0, 20.0]
     thicker = UNIT.evolve(wall_mm=1.1)
-    second, moved = answered(warm, 2, thicker, 6.0)
+    second, moved = answered(warm, 2, thicker)
     assert (moved.mesh.nodes != motion.mesh.nodes).any(), "the mesh was moved"
-    wanted, _ = answered(anew, 1, thicker, 6.0)
-    assert second[6.0] < first[6.0]
-    for kPa in (3.0, 6.0):
+    wanted, _ = answered(anew, 1, thicker)
+    assert second[20.0] < first[20.0]
+    for kPa in (10.0, 20.0):
         assert second[kPa] == pytest.approx(wanted[kPa], rel=5e-3)
     # Other struts have other ties: their mesh is new.
     thin = thicker.evolve(junction_diameter_mm=1.3)
-    third, own = answered(warm, 3, thin, 6.0)
+    third, own = answered(warm, 3, thin)
     settings = MeshSettings(refine=requests.LEVELS[0][0], fidelity=RESOLVED)
     assert (own.mesh.tied_weights == mesh_of(thin, settings).tied_weights).all()
-    assert 0.0 < third[3.0] < third[6.0]
+    assert 0.0 < third[10.0] < third[20.0]
     assert not warm.step(), "nothing more was asked for"
 
 

@@ -140,8 +140,7 @@ def test_a_robust_search_judges_by_the_finer_mesh_and_within_its_uncertainty(tmp
 def test_a_unit_straight_under_its_weight_is_asked_for_by_an_angle_at_rest():
     text = "orientation_deg = 90\n" + TEXT.replace("pressure_kPa = 10", "pressure_kPa = 0")
     design = job_from_text(text)
-    unit = design.unit.evolve(count=3)
-    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([unit])
+    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([design.unit])
     hanging = attrs.evolve(design, orientation_deg=0.0)
     [other] = Evaluator(design.targets, design.freedoms, mechanics_of(hanging, None)[0]).of([design.unit])
     # Level, with the side of more lattice up, it sags away from it; hanging its weight bends it less.
@@ -177,7 +176,8 @@ def test_a_design_that_breaks_a_rule_is_a_row_and_not_the_end(job, tmp_path):
 
 def test_a_unit_that_does_not_bear_its_pressure_is_an_answer(job):
     design = job_from_text(TEXT.replace("pressure_kPa = 10", "pressure_kPa = -400"))
-    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([design.unit])
+    unit = design.unit.evolve(count=3)
+    [found] = Evaluator(design.targets, design.freedoms, mechanics_of(design, None)[0]).of([unit])
     assert not found.sound
     assert "no equilibrium" in found.why
     assert np.isnan(found.values).all()
