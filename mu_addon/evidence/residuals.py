@@ -34,6 +34,8 @@ BY_TURN = "turn"
 """Test against the angle that a unit is turned by within a record."""
 # Of a turn, in which a residual is sought.
 HARMONICS = 4
+# Digits of a whitened residual that count in its rank.
+RANKED = 6
 # Directions of a test's columns, each of unit length, that hold less than this are none.
 NEAR = 0.03
 # A column of which less than this share remains after projection has no information.
@@ -265,7 +267,10 @@ def _turned_alike(record: Record, r: Array) -> list[Dependence]:
     for s in record.series:
         e, own = record.experiments[s.experiment], r[s.at]
         if TURN in e.columns and math.isnan(s.sample_s) and s.group != KNOWN and len(own) > 2:
-            z = norm.ppf(rankdata(own) / (len(own) + 1.0))
+            # Readings that a display rounds to one number have one rank, whatever rounding left of it.
+            z = norm.ppf(rankdata(np.round(own, RANKED)) / (len(own) + 1.0))
+            if not z.any():
+                continue
             turned = np.round(s.mean(e[TURN]) % 360.0, 6).tolist()
             scores.append(dict(zip(turned, (z / z.std()).tolist(), strict=True)))
     products = [a[o] * b[o] for a, b in combinations(scores, 2) for o in a.keys() & b.keys()]

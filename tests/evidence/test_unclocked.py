@@ -60,10 +60,13 @@ def test_outliers_of_a_curve_by_strain_are_a_remark(kind, many, rows, share):
         ({}, "outliers", "none"),
         ({"outside_cable": {"deg": 1.0}}, "outliers", "unexplained"),
         ({"gravity": {"weight": 1.0}}, "outliers", "named"),
+        # A display shows one number at many orientations.
+        ({}, "quantised", "none"),
+        ({"outside_cable": {"deg": 1.0}}, "quantised", "unexplained"),
     ],
 )
 @pytest.mark.parametrize("number", range(3))
-def test_outliers_of_a_turned_unit_of_the_second_code(faults, noise, kind, number):
+def test_readings_of_a_turned_unit_of_the_second_code(faults, noise, kind, number):
     row = judged(Order("single", "unit_pose", faults, noise, 0.003, SEED + number))
     assert row["verdict"] == kind
     assert row["names"] == (["gravity"] if kind == "named" else [])
