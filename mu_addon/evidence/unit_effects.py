@@ -90,7 +90,7 @@ class Body:
         from ..meshing.morph import morphed
         from ..resolved.unit import mesh_of
 
-        if self.mesh.resolved:
+        if self.mesh.resolved and self.drawn:
             # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
             return mesh_of(self.unit, self.mesh, cache=cache)
         mesh = _mesh_kept(self.drawn or self.unit, self.mesh, cache)

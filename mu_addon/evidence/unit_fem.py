@@ -23,6 +23,7 @@ from ..resolved.unit import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
+from .effect import Parameter
 from .markers import Marker, attached
 from .prediction import blocked_force, pose, step
 from .prediction.flat_obstacle import NAME as CONTACT
@@ -56,6 +57,9 @@ CONTACT_SHARE = 0.2
 REACHES = (0.2, 0.5, NEAREST)
 SHARES = (0.15, 0.4, 0.7, 1.0)
 MESH_ERROR = "mesh_error"
+# Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
+# the order of the elements. In suction, where walls close, the error is another: there it may differ.
+FARTHER = 0.5
 KNOWN = (*EFFECTS, CONTACT)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
@@ -71,8 +75,8 @@ class UnitSettings:
     """Settings of the unit's simulation for the evidence.
 
     mesh: the model's; finer: the one that mesh_error compares with; changes: a coarser one for effects and
-    walls, whose changes of the response are taken over in proportion, or None for the model's: mesh_error
-    then compares with this one, and its size 1 is as far again from there. pressures:
+    walls, whose changes of the response are taken over in proportion, or None for the model's: what is
+    between these two is then fitted beside every hypothesis (`FARTHER`), in place of mesh_error. pressures:
     their approximate number; margin: beyond the measured ones, as a share of their range. effects: names of
     those to run. distal: chambers behind a clog. lattice: a law for the lattice in place of the unit's
     moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
@@ -338,7 +342,8 @@ class _Plan:
 
     def names(self, settings: UnitSettings) -> list[str]:
         """Effects that have runs, walls apart."""
-        return [n for n in settings.effects if n in EFFECTS] + [HELD.name] * self.held
+        without = MESH_ERROR if self.changes else ""
+        return [n for n in settings.effects if n in EFFECTS and n != without] + [HELD.name] * self.held
 
     def case(
         self, effect: str = "", size: float = 0.0, orientation: tuple[float, Direction] = (0.0, X)
@@ -360,12 +365,10 @@ class _Plan:
         return attrs.evolve(self.case(), body=self.body)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
-        """The base first, then the longest runs."""
-        yield self.base_case
+        """What runs of effects start from first, then the longest runs."""
         yield self.case()
+        yield self.base_case
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
-            if name == MESH_ERROR and self.changes:
-                continue
             effect = effect_of(name)
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
                 for size in effect.sizes_at(self.enlarged):
@@ -466,6 +469,7 @@ class _Plan:
             names = self.names(settings)
             every = {n: self._variant(n, orientation, base, found, kept) for n in names}
             variants = {n: v for n, v in every.items() if v is not None}
+            variants |= self._mesh_errors(base, reference, kept)
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
             turn, axis = orientation
@@ -490,8 +494,6 @@ class _Plan:
         for size in effect.sizes_at(self.enlarged):
             if size == null:
                 result = base
-            elif name == MESH_ERROR and self.changes:
-                result = self._without_mesh_error(size, base, self.reference(found))
             else:
                 reference = self.reference(found)
                 result = self._continued(found[self.case(name, size, orientation).key()], reference)
@@ -539,10 +541,21 @@ class _Plan:
         ratio = (far * near + least) / np.maximum(near**2 + least, np.finfo(float).tiny)
         return Result(base.values + ratio * (result.values - reference.values), result.why)
 
-    @staticmethod
-    def _without_mesh_error(size: float, base: Result, coarser: Result) -> Result:
-        """The base's response beyond its mesh's, by `size` times the way from the coarser one's."""
-        return Result(base.values + size * (base.values - coarser.values), base.why)
+    def _mesh_errors(self, base: Result, coarser: Result, kept: Any) -> dict[str, Variant]:
+        """Errors of the model's mesh, by the way from the coarser one's: everywhere, and more in suction."""
+        if not self.changes:
+            return {}
+        at, way = np.array(self.pressures_kPa), base.values - coarser.values
+        shares = {"mesh_share": np.ones_like(at)}
+        if at.min() < 0:
+            shares["mesh_share_in_suction"] = np.clip(at / at.min(), 0.0, None)
+        sizes, most, found = np.array([0.0, 1.0]), 10.0 * FARTHER, {}
+        for name, share in shares.items():
+            name += "_held" * self.held
+            p = Parameter(name, "", -most, most, 0.0, source="two meshes differ by 1", spread=FARTHER)
+            values = [(self.larger * (base.values + size * share * way))[kept] for size in sizes]
+            found[name] = Variant(p, sizes, np.array(values))
+        return found
 
     def _rows(self) -> list[int]:
         if self.held:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -19,6 +20,7 @@ from ..fem.state import State
 from ..fem.trajectory import branches
 from ..fem.unit_materials import self_contact_of
 from ..measured.pose import X
+from ..run.cache import Cache
 from .markers import material_points
 from .prediction.flat_obstacle import NAME as CONTACT
 from .unit_effects import EFFECTS, FLAT_OBSTACLE, HELD, Body, UnitEffect, with_flat_obstacle
@@ -29,6 +31,9 @@ Array = np.ndarray[Any, Any]
 REVISION = 3
 # Steps from a free tip to one that a load cell holds away from its place.
 HELD_STEPS = 4
+# Name in the cache of the displacements of runs without an effect.
+STATES = "states"
+NOTHING: Mapping[int, Array] = MappingProxyType({})
 
 
 def effect_of(name: str) -> UnitEffect:
@@ -116,7 +121,8 @@ def run(case: Run, cache: Path | None = None) -> Result:
     cache: folder where a mesher that is not repeatable keeps its meshes. A pressure that is not reached, with
     those beyond it, is nan; so is all where the body cannot be drawn or meshed.
     """
-    values = np.full((case.rows, len(case.pressures_kPa)), np.nan)
+    values, why = np.full((case.rows, len(case.pressures_kPa)), np.nan), ""
+    found: dict[int, Array] = {}
     try:
         body, effect = case.changed
         mesh = body.meshed(cache)
@@ -133,6 +139,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
             model.load = effect.load(body, mesh, case.size)
         equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
         start = equilibrium.at_zero_pressure()
+        beside = _beside(case, len(mesh.nodes), cache)
         if body.gap_mm is not None:
             held, start = _held(equilibrium, start, body.gap_mm)
             for at, state in _states(equilibrium, np.array(case.pressures_kPa), start):
@@ -142,7 +149,8 @@ def run(case: Run, cache: Path | None = None) -> Result:
         outline = with_flat_obstacle(body, mesh, 1e6).obstacles[0] if case.outline else None
         places = slice(2, 2 + 3 * len(case.points))
         whole, rest = 2 ** len(mesh.symmetry), model.cavity_volume(np.zeros_like(mesh.nodes))
-        for at, state in _states(equilibrium, np.array(case.pressures_kPa), start):
+        for at, state in _states(equilibrium, np.array(case.pressures_kPa), start, beside):
+            found[at] = state.u
             values[0, at] = tip.angle_deg(state.u)
             values[1, at] = whole * (model.cavity_volume(state.u) - rest)
             values[places, at] = points.at(state.u).ravel()
@@ -150,8 +158,10 @@ def run(case: Run, cache: Path | None = None) -> Result:
                 y, still = (outline.places(u)[..., 1] for u in (state.u, np.zeros_like(state.u)))
                 values[places.stop :, at] = y.max() - still.max(), still.min() - y.min()
     except (InputError, MeshingError, ConvergenceError) as error:
-        return Result(values, str(error))
-    return Result(values)
+        why = str(error)
+    if cache and found and not case.effect:
+        _keep(case, found, cache)
+    return Result(values, why)
 
 
 def _turned(body: Body) -> Any:
@@ -175,23 +185,69 @@ def _held(equilibrium: Equilibrium, start: State, gap_mm: float) -> tuple[HeldTi
     return held, start
 
 
-def _states(equilibrium: Equilibrium, pressures_kPa: Array, start: State) -> Iterator[tuple[int, State]]:
+def _keep(case: Run, found: dict[int, Array], cache: Path) -> None:
+    """Keep displacements by number of their pressure, from which runs with effects start."""
+    at = sorted(found)
+    Cache(cache).put(
+        STATES, case.key(), {"at": np.array(at), "u": np.array([found[i] for i in at], np.float32)}
+    )
+
+
+def _beside(case: Run, nodes: int, cache: Path | None) -> dict[int, Array]:
+    """Displacements (nodes, 3) in mm of the body without the effect, by number of their pressure.
+
+    Empty where they are not kept, or are of another mesh.
+    """
+    if cache is None or not case.effect or case.body.gap_mm is not None:
+        return {}
+    kept = Cache(cache).get(STATES, attrs.evolve(case, effect="", size=0.0, outline=True).key())
+    if kept is None or kept["u"].shape[1:] != (nodes, 3):
+        return {}
+    return dict(zip(kept["at"].tolist(), kept["u"].astype(np.float64), strict=True))
+
+
+def _states(
+    equilibrium: Equilibrium, pressures_kPa: Array, start: State, beside: Mapping[int, Array] = NOTHING
+) -> Iterator[tuple[int, State]]:
     """Yield number and state of each pressure as far as they are reached; raise the last ConvergenceError.
 
-    start: without pressure.
+    start: without pressure. beside: displacements of nearly the same body by number.
     """
     distinct, sides = branches(pressures_kPa)
+    number = {p: int(np.flatnonzero(pressures_kPa == p)[0]) for p in distinct}
     if 0.0 in distinct:
-        yield int(np.flatnonzero(pressures_kPa == 0.0)[0]), start
+        yield number[0.0], start
     failed: ConvergenceError | None = None
     for side in sides:
-        history = [start]
+        history, last = [start], number.get(0.0, -1)
         for pressure in side:
+            at, target = number[pressure], in_MPa(pressure)
             try:
-                history.append(equilibrium.reach(in_MPa(pressure), history))
+                state = _from_beside(equilibrium, history[-1], target, beside.get(last), beside.get(at))
+                history.append(state or equilibrium.reach(target, history))
             except ConvergenceError as error:
                 failed = error
                 break
-            yield int(np.flatnonzero(pressures_kPa == pressure)[0]), history[-1]
+            yield at, history[-1]
+            last = at
     if failed:
         raise failed
+
+
+def _from_beside(
+    equilibrium: Equilibrium, last: State, target: float, before: Array | None, there: Array | None
+) -> State | None:
+    """The state at a pressure in MPa, from those of nearly the same body at the last one and there.
+
+    Its difference from that body's is taken to grow with pressure. None without these, or where it does not
+    converge near its start.
+    """
+    if before is None or there is None:
+        return None
+    growth = target / last.pressure_MPa if last.pressure_MPa else 1.0
+    guess = equilibrium.model.following(there + growth * (last.u - before))
+    allowed = equilibrium.settings.predictor_tolerance * float(np.abs(guess - last.u).max())
+    try:
+        return equilibrium.newton(equilibrium.start(there, guess), target, allowed)
+    except ConvergenceError:
+        return None

@@ -1,5 +1,7 @@
 """The unit's simulated responses: exact at nulls, kept and found again, right in sign; its markers."""
 
+from unittest import mock
+
 import attrs
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from mu_addon.evidence.unit_fem import (
     run,
     unit_responses,
 )
+from mu_addon.evidence.unit_run import _from_beside
 from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
@@ -431,7 +434,7 @@ def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp
 
 
 def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
-    effects = ("wall_thickness", "mesh_error")
+    effects = ("wall_thickness",)
     # Orders differ, so that the meshes' errors do by a factor.
     fine = MeshSettings(refine=0.4, meridian_mm=1.2)
     alone = UnitSettings(fine, FINER, pressures=4, effects=effects, workers=1)
@@ -448,9 +451,32 @@ def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     away = np.abs(changes[0]) > 0.1 * np.abs(changes[0]).max()
     miss = [np.abs(c - changes[0])[away] / np.abs(changes[0])[away] for c in changes[1:]]
     assert miss[0].max() < 0.5 * miss[1].max()
-    # As far again as from the coarser mesh.
-    beyond = found.variants["mesh_error"].values[-1]
-    np.testing.assert_allclose(beyond - found.values, found.values - coarse.values, atol=1e-12)
+    # What is between both meshes stands beside every hypothesis, in suction with a size of its own.
+    way, at = found.values - coarse.values, found.pressures_kPa
+    more = np.clip(at / at.min(), 0.0, None)
+    for name, share in (("mesh_share", 1.0), ("mesh_share_in_suction", more)):
+        error = found.variants[name]
+        np.testing.assert_allclose(error.values[-1] - found.values, share * way, atol=1e-12)
+        assert error.parameter in UnitPressure([found], tests).nuisances
+    assert not set(wanted.variants) & {"mesh_share", "mesh_error"}
+
+
+@pytest.mark.parametrize(("effect", "size"), [("strain_stiffening", 0.4), ("gravity", 1300.0)])
+def test_a_run_starts_from_the_states_of_the_body_without_its_effect(tmp_path, effect, size):
+    base = Run(Body(UNIT, ROUGH, FINER), (-4.0, 0.0, 6.0, 12.0), outline=True)
+    run(base, tmp_path)
+    changed = attrs.evolve(base, effect=effect, size=size, outline=False)
+    taken = []
+
+    def counted(equilibrium, *args):
+        taken.append(_from_beside(equilibrium, *args))
+        return taken[-1]
+
+    with mock.patch("mu_addon.evidence.unit_run._from_beside", counted):
+        found = run(changed, tmp_path).values
+    assert len(taken) == 3
+    assert all(taken)
+    np.testing.assert_allclose(found, run(changed).values, atol=1e-6)
 
 
 def test_a_change_goes_on_beyond_the_readings_alone():

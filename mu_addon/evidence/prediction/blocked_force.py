@@ -110,7 +110,7 @@ class BlockedForce:
         modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
         relaxing = shares(values)
         p = self._driven.discrepant(_weighed(t, p / modulus, relaxing), values)
-        static = {name: values[key] for name, key in self._sizes.items() if key in values}
+        static = self._driven.static(values)
         if "gravity" in static:
             static["gravity"] = static["gravity"] / modulus
         force = self._balanced(response, p, static, get("frame_compliance.stand_mm_per_N", 0.0) * modulus)

@@ -70,7 +70,7 @@ class UnitPose:
         modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
         p = before_the_gauge(experiment["pressure_kPa"], values, self._largest_kPa)
         p = self._driven.discrepant(p / modulus, values)
-        static = {name: values[key] for name, key in self._sizes.items() if key in values}
+        static = self._driven.static(values)
         if "gravity" in static:
             static["gravity"] = static["gravity"] / modulus
         stations = self._stations(experiment)

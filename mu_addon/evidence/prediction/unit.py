@@ -49,8 +49,9 @@ class Variant:
     """The unit's response with one static effect, at m sizes of it.
 
     at (m,): values of `parameter` in its unit, ascending, its null among them. values (m, c, k): c channels
-    in their units at the k pressures of the response; at the null they are the base's. Raises InputError for
-    fewer than two sizes, or if they do not ascend through the null.
+    in their units at the k pressures of the response; at the null they are the base's. A parameter with a
+    spread is an error of the model itself, of known size, and is fitted beside every hypothesis. Raises
+    InputError for fewer than two sizes, or if they do not ascend through the null.
     """
 
     parameter: Parameter
@@ -368,7 +369,9 @@ class UnitPressure:
             for name, v in r.variants.items():
                 p = v.parameter
                 known[name] = known[name].narrowed(p.low, p.high) if name in known else p
-        static = {name: Effect(name, (p,), (self.kind,)) for name, p in known.items()}
+        errors = {name: p for name, p in known.items() if math.isfinite(p.spread)}
+        self.nuisances = (*self.nuisances, *errors.values())
+        static = {name: Effect(name, (p,), (self.kind,)) for name, p in known.items() if name not in errors}
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
             static[CONTACT] = contact_effect(walls, self.kind)
@@ -388,7 +391,7 @@ class UnitPressure:
             *camera,
             *slips,
         )
-        self._sizes = {e.name: e.keys[0] for e in static.values()}
+        self._sizes = {e.name: e.keys[0] for e in static.values()} | {n: p.name for n, p in errors.items()}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
@@ -405,7 +408,7 @@ class UnitPressure:
         """
         response = self._response(experiment)
         pressure = self.discrepant(self.effective_kPa(experiment, values), values)
-        static = {name: values[key] for name, key in self._sizes.items() if key in values}
+        static = self.static(values)
         if "gravity" in static:
             # Weight bends a stiffer unit less, in proportion.
             static["gravity"] = static["gravity"] / values.get("modulus_factor", 1.0)
@@ -423,6 +426,10 @@ class UnitPressure:
     def _moving(self, experiment: Experiment, still: Array, values: Mapping[str, float]) -> Array:
         """Channels (c, n) of a moving unit from those in equilibrium (c, n): the same, without inertia."""
         return still
+
+    def static(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Sizes by name of the response's variants, from values by key."""
+        return {name: values[key] for name, key in self._sizes.items() if key in values}
 
     def discrepant(self, pressure: Array, values: Mapping[str, float]) -> Array:
         """Effective pressures (n,) in kPa with the discrepancy of the model's response."""
