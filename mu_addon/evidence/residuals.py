@@ -32,6 +32,10 @@ PITCH_MM = Chambers().cell_mm
 ANGLE, TURN = "angle_deg", "orientation_deg"
 BY_TURN = "turn"
 """Test against the angle that a unit is turned by within a record."""
+ALTERNATION = "alternation"
+"""Test of readings without a clock for signs that change from each to the next."""
+# Fewer readings alternate by the fit alone.
+FEWEST_IN_A_ROW = 20
 # Of a turn, in which a residual is sought.
 HARMONICS = 4
 # Digits of a whitened residual that count in its rank.
@@ -160,6 +164,7 @@ def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
         *_spectrum(fitter, fit),
         *_cycles_alike(record, r),
         *_repeats_alike(record, r),
+        *_alternating(record, r),
         *_outliers(record, r),
     ]
 
@@ -257,27 +262,51 @@ def _by_turn(fitted: _Fitted, spare: Mapping[str, float]) -> list[Dependence]:
 
 
 def _turned_alike(record: Record, r: Array) -> list[Dependence]:
-    """Test whether records leave the same residual (N,) at the same orientations, by its ranks in each.
-
-    Of normal scores (van der Waerden 1952), in which an outlier is no larger than other readings.
-    """
-    from scipy.stats import norm, rankdata
+    """Test whether records leave the same residual (N,) at the same orientations, by normal scores."""
+    from scipy.stats import norm
 
     scores: list[dict[float, float]] = []
     for s in record.series:
         e, own = record.experiments[s.experiment], r[s.at]
         if TURN in e.columns and math.isnan(s.sample_s) and s.group != KNOWN and len(own) > 2:
-            # Readings that a display rounds to one number have one rank, whatever rounding left of it.
-            z = norm.ppf(rankdata(np.round(own, RANKED)) / (len(own) + 1.0))
-            if not z.any():
-                continue
             turned = np.round(s.mean(e[TURN]) % 360.0, 6).tolist()
-            scores.append(dict(zip(turned, (z / z.std()).tolist(), strict=True)))
+            scores.append(dict(zip(turned, _scores(own).tolist(), strict=True)))
     products = [a[o] * b[o] for a, b in combinations(scores, 2) for o in a.keys() & b.keys()]
     if not products:
         return []
     z = sum(products) / math.sqrt(len(products))
     return [Dependence(BY_TURN, z, float(norm.sf(z)), "all records alike")]
+
+
+def _alternating(record: Record, r: Array) -> list[Dependence]:
+    """Test whether a residual (N,) changes its sign from reading to reading, by normal scores.
+
+    Without a clock the noise is the scatter from one to the next, so that such a misfit is as large as it.
+    """
+    from scipy.stats import norm
+
+    products: list[float] = []
+    for s in record.series:
+        own = r[s.at]
+        if math.isnan(s.sample_s) and s.group != KNOWN and len(own) >= FEWEST_IN_A_ROW:
+            z = _scores(own)
+            products += (z[1:] * z[:-1]).tolist()
+    if not products:
+        return []
+    z = -sum(products) / math.sqrt(len(products))
+    return [Dependence(ALTERNATION, z, float(norm.sf(z)), "readings without a clock")]
+
+
+def _scores(values: Array) -> Array:
+    """Normal scores (n,) of values by their ranks, of unit standard deviation; zeros where all are one.
+
+    van der Waerden 1952: an outlier is no larger than other readings, and what a display rounds to one number
+    has one rank, whatever rounding left of it.
+    """
+    from scipy.stats import norm, rankdata
+
+    z = norm.ppf(rankdata(np.round(values, RANKED)) / (len(values) + 1.0))
+    return np.asarray(z / z.std()) if z.any() else z
 
 
 def _turns(record: Record) -> Array | None:

@@ -19,7 +19,7 @@ from .outliers import without_outliers
 from .owned import coincident_effects
 from .plausibility import require_plausible
 from .record import Record, record
-from .residuals import BY_TURN, strict_table, structure
+from .residuals import ALTERNATION, BY_TURN, strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
 from .search import coinciding, further_owners, one_more, select_owned, select_pooled
@@ -325,11 +325,12 @@ def _of_no_size(fitter: Fitter, found: Selection) -> str:
     """Reason why a misfit is none, in words: as small as the scatter, with no cause but a record's zero.
 
     Slow noise differs from record to record, as zeros do; none depends on how a unit is turned, which is read
-    at rest.
+    at rest, and none alternates.
     """
     left = fitter.record.values - fitter.predict(found.base.values)
     drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)
-    if not drifting or BY_TURN in structure(found.table) or not within_scatter(fitter.record, left):
+    as_large = {ALTERNATION, BY_TURN} & {*structure(found.table)}
+    if not drifting or as_large or not within_scatter(fitter.record, left):
         return ""
     depends = [c.effect.title for c in found.causes] or structure(found.table) or ["no quantity"]
     on = ", ".join(n.replace("_", " ") for n in depends)

@@ -379,13 +379,14 @@ EFFECTS = {
         ),
         UnitEffect(
             "anisotropy",
-            attrs.evolve(_shared(coupon.EFFECTS, "anisotropy"), low=-0.6, high=3.0),
+            attrs.evolve(_shared(coupon.EFFECTS, "anisotropy"), low=-0.6, high=3.0, starts=(-0.3, 0.3)),
             (-0.6, -0.3, 0.0, 0.5, 1.3, 3.0),
             materials=_layered,
         ),
         UnitEffect(
             "tension_compression_asymmetry",
-            _shared(coupon.EFFECTS, "tension_compression_asymmetry"),
+            # From the other side a fit may end in another minimum: beside it a thinner wall was named.
+            attrs.evolve(_shared(coupon.EFFECTS, "tension_compression_asymmetry"), starts=(-0.3, 0.3)),
             (-0.8, -0.4, 0.0, 0.5, 1.5, 4.0),
             materials=_asymmetric,
             newton=KINKED,

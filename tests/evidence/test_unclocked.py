@@ -11,6 +11,7 @@ from benchmarks.evidence.second_code.sets import Order
 from mu_addon.evidence.noise import estimate
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
+from mu_addon.evidence.residuals import ALTERNATION
 from mu_addon.evidence.scatter import FEW, TIMES
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unclocked import AROUND, IN_A_ROW, MOST, lone, points
@@ -74,7 +75,7 @@ def test_readings_of_a_turned_unit_of_the_second_code(faults, noise, kind, numbe
 
 @given(
     kind=st.sampled_from(["coupon", "lattice_compression"]),
-    shape=st.sampled_from(["wave", "end", "bump"]),
+    shape=st.sampled_from(["wave", "end", "bump", "alternating"]),
     rows=st.integers(30, 60),
     many=st.integers(1, 2),
     share=st.sampled_from([0.0, 0.05, 0.1]),
@@ -91,10 +92,21 @@ def test_no_gross_misfit_is_none_for_outliers_beside_it(kind, shape, rows, many,
             "wave": np.sin(4.0 * np.pi * x),
             "end": np.maximum(x - 0.85, 0.0),
             "bump": np.maximum(np.sin(np.pi * (x - 0.4) / 0.12), 0.0) * (np.abs(x - 0.46) < 0.06),
+            "alternating": (-1.0) ** np.arange(len(x)),
         }
         return times * SD * shapes[shape] / np.sqrt(np.mean(shapes[shape] ** 2))
 
     assert verdict_on(curves(kind, many, rows, share, off, seed)).kind != "none"
+
+
+@pytest.mark.parametrize("kind", ["coupon", "lattice_compression"])
+def test_a_misfit_that_alternates_from_reading_to_reading_is_no_noise(kind):
+    def off(x):
+        return SD * (-1.0) ** np.arange(len(x))
+
+    found = verdict_on(curves(kind, 3, 30, off=off))
+    assert found.kind == "unexplained"
+    assert ALTERNATION in found.selection.left
 
 
 def of_curves(made, modulus_kPa=40.0):

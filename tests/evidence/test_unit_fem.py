@@ -479,6 +479,13 @@ def test_a_run_starts_from_the_states_of_the_body_without_its_effect(tmp_path, e
     np.testing.assert_allclose(found, run(changed).values, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["wall_thickness", "anisotropy", "tension_compression_asymmetry"])
+def test_what_acts_both_ways_is_sought_from_both_sides(name):
+    """From above 0 alone, an asymmetry of -0.3 ended at 0.78, and a thinner wall was named."""
+    p = EFFECTS[name].parameter
+    assert min(p.starts) < p.null < max(p.starts)
+
+
 def test_a_change_goes_on_beyond_the_readings_alone():
     plan = _Plan(Body(UNIT), ROUGH, 1.0, 1.0, (), (-12.0, -8.0, 0.0, 8.0, 12.0), (-9.0, 12.0), (), ())
     reference = Result(np.array([[-32.0, -13.0, 0.0, 5.0, 7.0]]))
