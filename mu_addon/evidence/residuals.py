@@ -289,8 +289,8 @@ def _alternating(record: Record, r: Array) -> list[Dependence]:
     for s in record.series:
         own = r[s.at]
         if math.isnan(s.sample_s) and s.group != KNOWN and len(own) >= FEWEST_IN_A_ROW:
-            z = _scores(own)
-            products += (z[1:] * z[:-1]).tolist()
+            scores = _scores(own)
+            products += (scores[1:] * scores[:-1]).tolist()
     if not products:
         return []
     z = -sum(products) / math.sqrt(len(products))
