@@ -211,10 +211,14 @@ def _computed(
     for plan in plans:
         for m in plan.markers:
             report(f"marker {m.number} at {plan.scale:g}x lies {m.distance_mm:.2f} mm from its point", 0.0)
-    cases = {case.key(): case for plan in plans for case in plan.runs(settings)}
+    # What runs of effects start from comes before all of them: the same digits on any number of cores.
+    starts = {plan.case().key(): plan.case() for plan in plans}
+    cases = starts | {case.key(): case for plan in plans for case in plan.runs(settings)}
     with_contact = CONTACT in settings.effects
     part = 1 - CONTACT_SHARE if with_contact else 1.0
-    found = _found(cases, settings.workers, cache, lambda what, share: report(what, share * part))
+    found = _found(
+        cases, settings.workers, cache, lambda what, share: report(what, share * part), len(starts)
+    )
     if with_contact:
         walls = {c.key(): c for plan in plans for _, _, c in plan.walls(found)}
         more = _found(
@@ -568,8 +572,13 @@ def _warn(text: str) -> None:
     warnings.warn(text, UnitResponseWarning, stacklevel=4)
 
 
-def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Progress) -> dict[str, Result]:
-    """Results by key, from the cache where they are there, and stored as soon as one is found."""
+def _found(
+    cases: dict[str, Run], workers: int, cache: Path | None, report: Progress, alone: int = 0
+) -> dict[str, Result]:
+    """Results by key, from the cache where they are there, and stored as soon as one is found.
+
+    alone: how many of the cases, the first, are run before the others.
+    """
     table = None if cache is None else Cache(cache)
     found: dict[str, Result] = {}
     for key, case in cases.items():
@@ -578,7 +587,7 @@ def _found(cases: dict[str, Run], workers: int, cache: Path | None, report: Prog
             found[key] = result
     missing = {key: case for key, case in cases.items() if key not in found}
     # One run here first: it compiles the kernels for the other processes.
-    first = 1 if workers > 1 and not found else 0
+    first = max(sum(key in missing for key in list(cases)[:alone]), 0 if found else 1)
     for key, result in _solved(missing, first, workers, cache):
         found[key] = result
         if table is not None:
