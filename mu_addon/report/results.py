@@ -302,3 +302,8 @@ class ReportData:
     seconds: Mapping[str, float] = attrs.field(factory=dict)
     versions: Mapping[str, str] = attrs.field(factory=dict)
     files: Mapping[str, str] = attrs.field(factory=dict)  # name in the run's folder -> its content
+
+    @property
+    def is_partly_compared(self) -> bool:
+        """True if paths are not compared at some instants."""
+        return any(bool(np.isnan(rule.delta).any()) for rule in self.rules.values())

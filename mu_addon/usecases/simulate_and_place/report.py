@@ -145,9 +145,10 @@ def _key_figures(r: ReportData, rule: RuleResult) -> str:
 def _ranking(r: ReportData) -> str:
     if not r.rules:
         return ""
+    over = "the compared part of the pressure cycle" if r.is_partly_compared else "the whole pressure cycle"
     html = (
         "<p>Ĵ is the mean distance between the unit with the sensor and the unit without it, over the line "
-        "of anchors and the whole pressure cycle. Smaller is better.</p>"
+        f"of anchors and {over}. Smaller is better.</p>"
     )
     html += '<div class="pair">'
     for name, rule in r.rules.items():
@@ -434,11 +435,10 @@ def _heatmaps(r: ReportData) -> str:
         html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
     if not html:
         return ""
-    empty = any(np.isnan(rule.delta).any() for rule in r.rules.values())
     return (
         "<p>One map per path. Horizontal: length [%], from inlet to tip. Vertical: time [%] of the pressure "
         "cycle. All maps of a rule share one colour scale, in the square root of Δ; the chosen path is "
-        f"framed.{' Empty rows are not compared.' if empty else ''}</p>" + html
+        f"framed.{' Empty rows are not compared.' if r.is_partly_compared else ''}</p>" + html
     )
 
 
