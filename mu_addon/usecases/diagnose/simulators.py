@@ -21,7 +21,7 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 10.0, 150.0, 900.0
+LATTICE_S, UNIT_S, PRINTED_S = 10.0, 150.0, 450.0
 """Approximate seconds of the simulations of blocks, and of a homogenised and a printed unit with effects."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
