@@ -16,6 +16,7 @@ from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
 from .outer_faces import free_boundary
+from .parallel_edges import pairs_of, reweigh
 from .self_friction import SelfFriction
 from .self_intersection import facets_of
 
@@ -150,7 +151,7 @@ class SelfContact:
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: _Pairs | None = None
-        self._kept: tuple[Array, Any] | None = None
+        self._kept: tuple[Array, Any, Array] | None = None
         self._friction: SelfFriction | None = None
         if friction:
             parts = self._ipctk, self._surface, self._potential
@@ -367,7 +368,7 @@ class SelfContact:
         which is over a share of the squares of their lengths.
         """
         surface, places = self._surface, self._places(u)
-        near = self._near(places, self.gap_mm, by_places=True)
+        near = self._near(places, self.gap_mm, by_places=True, among=self._candidates(places))
         rest = np.asarray(surface.rest_positions)
         found = np.zeros((len(along), rest.size))
         for number in range(len(near)):
@@ -512,7 +513,8 @@ class SelfContact:
             found = self._ipctk.Candidates()
             # Boxes are inflated on either side.
             found.build(self._surface, places, self.gap_mm / 2 + self._margin_mm)
-            self._kept = places, found
+            parallel = pairs_of(self._surface, found, places, self.gap_mm, self._margin_mm)
+            self._kept = places, found, parallel
         assert self._kept is not None
         return self._kept[1]
 
@@ -527,7 +529,8 @@ class SelfContact:
     def _near(self, places: Array, reach_mm: float, by_places: bool = False, among: Any = None) -> Any:
         """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm.
 
-        by_places: with what derivatives by the places as drawn need. among: candidates that hold them all.
+        by_places: with what derivatives by the places as drawn need. among: candidates that hold them all;
+        without, weights may be wrong and only what is near is true.
         """
         near = self._ipctk.NormalCollisions()
         if by_places:
@@ -541,6 +544,8 @@ class SelfContact:
             near.build(self._surface, places, reach_mm)
         else:
             near.build(among, self._surface, places, reach_mm)
+            assert self._kept is not None
+            reweigh(self._ipctk, self._surface, near, self._kept[2], places, reach_mm)
         return near
 
     def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:
