@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
+LOWER = "lower the pressure, thicken the wall or stiffen the material"
+"""Remedy where a body has no equilibrium at a pressure."""
 # How much friction may still change with its lagged bound, as a share of it, and how often it may lag.
 FRICTION_TOLERANCE = 1e-4
 MOST_LAGS = 40
@@ -344,5 +346,5 @@ class Equilibrium:
             f"no equilibrium at {in_kPa(pressure):.4g} kPa: {why}",
             f"the last converged state is {last.pressure_kPa:.4g} kPa; its most distorted element is "
             f"{element} near ({place[0]:.1f}, {place[1]:.1f}, {place[2]:.1f}) mm with det F = {least:.3g}",
-            "lower the pressure, thicken the wall or stiffen the material",
+            LOWER,
         )

@@ -101,11 +101,11 @@ class PrintedEvaluator:
         return found
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
+        """Anchors (s, p, 3) in mm that a job moves from rest on, see `CandidatePool.alone`."""
         return self._candidates.alone(job, pressures_MPa)
 
     def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that a job moves at k instants, in their order; ConvergenceError."""
+        """Anchors (k, p, 3) in mm that a job moves at k instants, see `CandidatePool.simulated_in_time`."""
         return self._candidates.simulated_in_time(job, time_s, pressure_kPa)
 
 
@@ -136,11 +136,11 @@ class Evaluator:
         return [Moved(self._sweep.points(states), whole)]
 
     def alone(self, job: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a job moves along its path from rest. Raises ConvergenceError."""
+        """Anchors (s, p, 3) in mm that a job moves from rest on, see `CandidatePool.alone`."""
         return self._sweep.alone(job, pressures_MPa)
 
     def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that a job moves at k instants, in their order; ConvergenceError."""
+        """Anchors (k, p, 3) in mm that a job moves at k instants, see `CandidatePool.simulated_in_time`."""
         return self._sweep.simulated_in_time(job, time_s, pressure_kPa)
 
 

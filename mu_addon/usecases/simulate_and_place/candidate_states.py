@@ -14,6 +14,7 @@ import numpy as np
 from ...design.anchors import anchor_points
 from ...design.quantity import in_kPa, in_MPa
 from ...errors import ConvergenceError, MuError
+from ...fem.equilibrium import LOWER
 from ...fem.kinematics import probe
 from ...fem.state import State
 from ...fem.trajectory import Trajectory
@@ -36,8 +37,6 @@ PATH_DIFFERENCE_MM = 1e-5
 PATH_DIFFERENCE_SHARE = 0.02
 BEFORE_VERIFYING = 0.8
 """Share done before one candidate is followed along its whole path."""
-LOWER = "lower the pressure, thicken the wall or stiffen the material"
-"""Remedy where candidates have no equilibrium."""
 
 
 class _NotReachedError(Exception):

@@ -10,13 +10,13 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...errors import ConvergenceError
+from ...fem.equilibrium import LOWER
 from ...fem.kinematics import probe
 from ...fem.trajectory import Trajectory
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, Evaluation, evaluation
 from ...run.cache import Cache, key
 from .candidate_pool import CandidatePool, CandidateProblem
-from .candidate_states import LOWER
 from .contact_history import PRESSURE_AND_HALVINGS, DEPTH_mm
 from .job import Job
 
