@@ -5,7 +5,8 @@
     python benchmarks/commands.py --logs FOLDER sweep   # keeps each line that a command wrote, with its time
 
 A command whose full run takes over two minutes runs coarse, as its row shows. "Told" is the time that the
-command gave at its start, "silent" the longest time without a line on the terminal. "Left" is the largest
+command gave at its start beside other work, "first" the factor between that and what it took, "silent" the
+longest time without a line on the terminal. "Left" is the largest
 factor between a time left that a line told and the time that was left, of lines in the run's second half more
 than LEAST_S before the end. A share done that fell, and a time left that grew without a reason told, count as
 faults.
@@ -64,7 +65,7 @@ ROWS = (
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 _SHARE = re.compile(r"^ *(\d+) %  ")
 _LEFT = re.compile(r"(?:, |  )((?:[\d.]+ (?:h|min|s) ?)+) left")
-_TOLD = re.compile(r"^about (.*) on two cores")
+_TOLD = re.compile(r"^about ([^,]*?) (?:beside other work|on two cores)")
 
 
 class Line(NamedTuple):
@@ -111,9 +112,11 @@ def ran(words: list[str], folder: Path) -> Ran:
     return Ran(process.returncode, took, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1e3, lines)
 
 
-def judged(found: Ran) -> tuple[str, float, str, list[str]]:
-    """Time told at the start, longest silence in s, largest factor of a time left, and faults."""
+def judged(found: Ran) -> tuple[str, str, float, str, list[str]]:
+    """Time told at the start, its factor, longest silence in s, largest factor of a time left, and faults."""
     told = next((m[1] for line in found.lines if (m := _TOLD.match(line.text))), "")
+    ratio = seconds_of(told) / found.seconds
+    first = f"{max(ratio, 1.0 / ratio):.1f}" if told else ""
     at = [0.0, *(line.at for line in found.lines), found.seconds]
     silent = max(b - a for a, b in pairwise(at))
     factor, share, before, faults = 1.0, -1, None, []
@@ -130,7 +133,7 @@ def judged(found: Ran) -> tuple[str, float, str, list[str]]:
             if grew and "(" not in line.text[m.end() :]:
                 faults.append(f"grew: {line.text}")
             before = line.at, left
-    return told, silent, f"{factor:.1f}" if before else "", faults
+    return told, first, silent, f"{factor:.1f}" if before else "", faults
 
 
 def prepare(work: Path) -> None:
@@ -154,8 +157,9 @@ def main() -> None:
     parser.add_argument("--logs", type=Path, help="folder for the words of each command")
     given = parser.parse_args()
     print(circumstances(), "\n")
-    print("| command | exit | seconds | of the processor | memory [MB] | told | silent [s] | left | faults |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |", flush=True)
+    ran_as = "exit | seconds | of the processor | memory [MB]"
+    print(f"| command | {ran_as} | told | first | silent [s] | left | faults |")
+    print("| --- |" + " ---: |" * 9, flush=True)
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
@@ -170,9 +174,9 @@ def main() -> None:
             if name not in ("presets", "ports", "resume"):
                 words += ["--out", out]
             found = ran(words, work)
-            told, silent, factor, faults = judged(found)
+            told, first, silent, factor, faults = judged(found)
             took = f"{found.seconds:.1f} | {found.processor_s:.1f} | {found.memory_MB:.0f}"
-            cells = f"{found.status} | {took} | {told} | {silent:.1f}"
+            cells = f"{found.status} | {took} | {told} | {first} | {silent:.1f}"
             print(f"| `{row}` | {cells} | {factor} | {len(faults)} |", flush=True)
             if given.logs:
                 given.logs.mkdir(parents=True, exist_ok=True)

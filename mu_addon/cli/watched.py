@@ -54,7 +54,8 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
     def heartbeat() -> Heartbeat:
         from ..run.heartbeat import Heartbeat
 
-        return Heartbeat(lambda message: sink()(message), between)
+        # Its sink is loaded now: what the worker shows while it loads would come before an older share.
+        return Heartbeat(sink(), between)
 
     @cache
     def options() -> Any:
@@ -62,7 +63,6 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
 
         return parser().parse_args(list(line))
 
-    @cache
     def sink() -> Sink:
         from .main import sink_of
 

@@ -69,17 +69,25 @@ def _silent(what: str, share: float) -> None:
     pass
 
 
+def shipped(block: Block) -> OffsetResponse | None:
+    """The block's response that comes with the program, or None."""
+    key = block.key()
+    for name in asset_names(SHIPPED):
+        kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
+        if kept["key"] == key:
+            return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
+    return None
+
+
 def response(block: Block, cache: Path | None = None, report: Progress = _silent) -> OffsetResponse:
     """The block's response to a print offset: shipped, kept in the folder `cache`, or computed.
 
     report: called with the step and the share done, 0 to 1. The paper's block of 27 cells takes a minute or
     two to compute. Raises InputError for a cell that cannot be printed so, MeshingError and ConvergenceError.
     """
-    key = block.key()
-    for name in asset_names(SHIPPED):
-        kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
-        if kept["key"] == key:
-            return OffsetResponse(kept["offset_mm"], kept["modulus"], kept["density"])
+    known, key = shipped(block), block.key()
+    if known is not None:
+        return known
     table = Cache(cache) if cache else None
     stored = table.get("lattice", key) if table else None
     if stored is not None and set(stored) == {"offset_mm", "modulus", "density"}:
@@ -152,6 +160,12 @@ def block_of(experiment: Experiment, unit: Unit) -> Block | None:
         )
     cell = strut_cell(attrs.evolve(unit, scale=1.0, print=Printing()))
     return Block(cell, experiment.cells[0], experiment.plates or HELD, unit.material.membrane_poisson)
+
+
+def to_compute(experiments: Sequence[Experiment], unit: Unit) -> int:
+    """Number of blocks whose response does not come with the program; raises what `block_of` raises."""
+    blocks = {block_of(e, unit) for e in experiments if e.kind == KIND} - {None}
+    return sum(shipped(block) is None for block in blocks if block is not None)
 
 
 def scalings(

@@ -17,7 +17,7 @@ from typing import Any
 
 from ..errors import MuError
 from ..files import make_folder, output_error
-from .processes import slowed_by_others
+from .processes import slowed_by_load
 from .progress_estimate import Plan, ProgressEstimate
 
 PATIENCE_S = 20.0
@@ -49,7 +49,7 @@ class Child:
         """
         self.folder = folder
         self.state = WAITING
-        self.estimate = ProgressEstimate(plan, slowed=slowed_by_others())
+        self.estimate = ProgressEstimate(plan, slowed=slowed_by_load())
         self.progress: dict[str, Any] = {}
         self.warnings: list[str] = []
         self.result: dict[str, Any] | None = None
@@ -160,6 +160,9 @@ class Child:
         if kind == "progress":
             self.progress = message
             self.estimate.tell(message)
+        elif kind == "plan":
+            # It knows what its folder has already.
+            self.estimate = ProgressEstimate(message["stages"], slowed=message["slowed"])
         elif kind == "warning":
             self.warnings.append(str(message.get("what", "")))
         elif kind == "result":

@@ -13,6 +13,8 @@ from ..errors import MuError
 
 # With less memory or address space, libraries end a process by a signal or wait for ever.
 _LEAST_MB = {"RLIMIT_DATA": 500, "RLIMIT_AS": 2000}
+# Time on a core, in ns, after which what a process waited for one says how busy the machine is.
+RAN_NS = 3e8
 # Simulating a unit takes half a gigabyte a process; more processes than this wait for memory, not for cores.
 MOST_WORKERS = 16
 
@@ -23,13 +25,26 @@ def cores() -> int:
     return min(allowed, MOST_WORKERS)
 
 
-def slowed_by_others() -> float:
+def slowed_by_load() -> float:
     """How many times slower the machine's other work makes a new process, by the load of the last minute.
 
     Half of what the load says: work that waits for a disk or has a lower priority counts in it, too.
     """
     load = os.getloadavg()[0] / cores() if hasattr(os, "getloadavg") else 1.0
     return max(0.5 + 0.5 * load, 1.0)
+
+
+def slowed_so_far() -> float:
+    """How many times slower other work has made this process: by what it waited for a core, on Linux.
+
+    By the load where the system does not count that, or this process has hardly run yet.
+    """
+    try:
+        with open("/proc/self/schedstat", encoding="ascii") as file:
+            ran_ns, waited_ns, _ = map(int, file.read().split())
+    except (OSError, ValueError):
+        return slowed_by_load()
+    return (ran_ns + waited_ns) / ran_ns if ran_ns > RAN_NS else slowed_by_load()
 
 
 def end_with_parent() -> None:

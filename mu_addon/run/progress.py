@@ -30,7 +30,7 @@ from typing import Any, TextIO
 
 from ..errors import MuError
 from ..files import append_lines, output_error, plain
-from .processes import slowed_by_others
+from .processes import slowed_so_far
 from .progress_estimate import Pace, Plan, ProgressEstimate
 
 Message = dict[str, Any]
@@ -40,6 +40,8 @@ Clock = Callable[[], float]
 
 BEAT_S = 5.0
 """Seconds after which a message is sent for a stage that reports nothing."""
+SLOWED = 1.25
+"""Factor by which other work slows a run from which its time is told with and without that."""
 
 
 class Progress:
@@ -65,7 +67,7 @@ class Progress:
     def plan(self, stages: Plan) -> None:
         """Report the expected stages of the run, with their seconds; no effect without any."""
         if stages:
-            slowed = slowed_by_others()
+            slowed = slowed_so_far()
             self.estimate = ProgressEstimate(stages, self._clock, slowed)
             seconds = sum(s for _, s in stages)
             self.emit({"type": "plan", "stages": [*map(list, stages)], "seconds": seconds, "slowed": slowed})
@@ -263,9 +265,10 @@ class _Lines:
 
     def __call__(self, message: Message) -> None:
         if message["type"] == "plan":
-            busy = f"; other work slows it {slowed:.0f} times" if (slowed := message["slowed"]) >= 1.5 else ""
-            count = len(message["stages"])
-            self.write(f"about {spell(message['seconds'])} on two cores, {count} stages{busy}\n")
+            seconds, slowed, count = message["seconds"], message["slowed"], len(message["stages"])
+            alone = f"about {spell(seconds)} on two cores"
+            busy = f"about {spell(seconds * slowed)} beside other work, {alone[6:]} alone"
+            self.write(f"{busy if slowed >= SLOWED else alone}, {count} stage{'s' * (count > 1)}\n")
         elif message["type"] == "progress":
             self.progress(message)
         elif message["type"] in ("warning", "error"):

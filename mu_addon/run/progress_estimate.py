@@ -27,6 +27,8 @@ RECENT = 1.0 / 3.0
 """Share of a stage's time that is left out of its pace: its first steps may be other work than its last."""
 SKIPPED = 0.1
 """A stage that took less than this share of its plan was in the cache, and says nothing of the pace."""
+SHOWN_S = 7.0
+"""Seconds for which a reason stands at the least: a terminal's lines are almost that far apart."""
 PACES = 0.2, 20.0
 """Least and largest ratio of a run's time to its plan that is believed."""
 
@@ -84,7 +86,7 @@ class ProgressEstimate:
         self._at = self._began = clock()
         self.fraction = 0.0
         self.why = ""
-        self._grown_from = 0.0
+        self._grown_from = self._grown_at = 0.0
 
     @property
     def number(self) -> int:
@@ -210,12 +212,13 @@ class ProgressEstimate:
                 self._forget_reason(shown)
                 return
             self.why = f"{added} was added" if added else f"{self._stage} takes longer than expected"
-            self._grown_from = shown
+            self._grown_from, self._grown_at = shown, self._clock()
         else:
             self._forget_reason(left)
         self._left, self._at = left, self._clock()
 
     def _forget_reason(self, left: float) -> None:
         """Clear the reason why the time left grew once it is about what it was before."""
-        if left <= LONGER * self._grown_from + SLACK_S:
+        shown_long = self._clock() - self._grown_at >= SHOWN_S
+        if shown_long and left <= LONGER * self._grown_from + SLACK_S:
             self.why = ""

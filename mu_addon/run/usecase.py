@@ -12,6 +12,7 @@ from .context import RunContext
 from .folder import FolderLayout, begin
 from .processes import require_memory
 from .progress_estimate import Plan
+from .remaining import remaining, shares_done
 
 Job = TypeVar("Job")
 
@@ -23,7 +24,8 @@ class UseCase(Generic[Job]):
     name: of its command. read: the job that a folder's inputs describe; raises InputError. run: does the job
     in its folder, fills `context.summary`, sets `context.report` and returns the result. console_summary: a
     run's summary in a few lines of text. begin: makes a folder the run's, where that takes more than
-    `folder.begin`. plan: expected stages of a job, with their seconds on two cores.
+    `folder.begin`. plan: expected stages of a job, with their seconds on two cores; kept: beginnings of the
+    names of those that a resumed run takes from its cache.
     """
 
     name: str
@@ -33,6 +35,7 @@ class UseCase(Generic[Job]):
     console_summary: Callable[[dict[str, Any]], list[str]]
     begin: Callable[[Job, Path, RunContext], None] | None = None
     plan: Callable[[Job], Plan] = lambda job: ()
+    kept: tuple[str, ...] = ()
 
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
         """Run a job in a folder and write its report, also if it stops early; return the result.
@@ -46,7 +49,7 @@ class UseCase(Generic[Job]):
         else:
             begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
         context.console_summary = self.console_summary
-        context.progress.plan(self.plan(job))
+        context.progress.plan(remaining(self.plan(job), shares_done(folder), self.kept))
         found = self.run(job, folder, context)
         context.write_report()
         return found

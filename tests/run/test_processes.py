@@ -8,7 +8,8 @@ import threading
 
 import pytest
 
-from mu_addon.run.processes import ctrl_c_held_back
+from mu_addon.run import processes
+from mu_addon.run.processes import ctrl_c_held_back, slowed_so_far
 
 WORK = "import sys, time; print('ready', flush=True); time.sleep(3600)"
 
@@ -89,3 +90,10 @@ except MuError as error:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "this process may take up 90 MB" in done.stdout, done.stderr
     assert f"ulimit {option} " in done.stdout
+
+
+def test_a_process_that_hardly_ran_goes_by_the_load(monkeypatch):
+    assert slowed_so_far() >= 1.0
+    monkeypatch.setattr(processes, "RAN_NS", float("inf"))
+    monkeypatch.setattr(processes, "slowed_by_load", lambda: 2.5)
+    assert slowed_so_far() == 2.5

@@ -194,7 +194,7 @@ def test_half_a_line_of_a_killed_process_does_not_take_the_next_one_with_it(tmp_
 
 @pytest.fixture
 def quiet_machine(monkeypatch):
-    monkeypatch.setattr("mu_addon.run.progress.slowed_by_others", lambda: 1.0)
+    monkeypatch.setattr("mu_addon.run.progress.slowed_so_far", lambda: 1.0)
 
 
 @pytest.mark.usefixtures("quiet_machine")
@@ -231,6 +231,13 @@ def test_a_planned_run_has_one_fraction_that_only_grows_and_one_time(clock):
         " 90 %  report ...",
         "100 %  report: done in 10 s",
     ]
+
+
+def test_a_busy_machine_s_time_is_told_first(clock, monkeypatch):
+    monkeypatch.setattr("mu_addon.run.progress.slowed_so_far", lambda: 3.0)
+    stream = io.StringIO()
+    Progress([terminal(stream, clock)], clock).plan([("mesh", 20.0)])
+    assert stream.getvalue() == "about 1 min 00 s beside other work, 20 s on two cores alone, 1 stage\n"
 
 
 def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path, monkeypatch):

@@ -80,7 +80,8 @@ def plan_of(job: Job) -> Plan:
     return [*plan, ("chain", 20.0), ("files", 3.0), ("report", 10.0)]
 
 
-USE_CASE = UseCase("chain", LAYOUT, read_job, run_chain, console_summary, plan=plan_of)
+KEPT = ("mesh of unit", "joint of unit")
+USE_CASE = UseCase("chain", LAYOUT, read_job, run_chain, console_summary, plan=plan_of, kept=KEPT)
 
 
 Array = np.ndarray[Any, Any]

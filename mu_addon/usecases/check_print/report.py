@@ -53,7 +53,7 @@ def write_report(
     mended: Repair | None = None,
 ) -> None:
     """Write places.png and report.html."""
-    with progress.stage("report", expected_s=8.0):
+    with progress.stage("report", expected_s=4.0):
         picture = places_picture(vertices, triangles, found, job.direction)
         write_bytes(folder / "places.png", picture.png)
         write_text(folder / "report.html", report(job, vertices, triangles, found, picture, mended))

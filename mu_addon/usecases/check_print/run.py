@@ -178,8 +178,8 @@ def _where(places: np.ndarray[Any, Any]) -> str:
 
 def plan_of(job: Job) -> Plan:
     """Stages of a check with the expected seconds of each on two cores."""
-    stages = {"part": 4.0, "faces": 2.0, "thickness and gaps": 2.5, "chambers and drains": 2.0}
-    return [*stages.items(), ("layers", 1.0), ("build directions", 2.5), ("report", 9.0)]
+    stages = {"part": 2.5, "faces": 1.5, "thickness and gaps": 1.5, "chambers and drains": 1.5}
+    return [*stages.items(), ("layers", 0.5), ("build directions", 1.5), ("report", 4.0)]
 
 
 USE_CASE = UseCase("check", LAYOUT, read_job, check_print, console_summary, plan=plan_of)

@@ -55,7 +55,7 @@ NOISE = {
     "tip_deflection": 0.1,
     "voltage": 0.002,
 }
-SENSITIVITIES_S = 5.0
+SENSITIVITIES_S = 1.5
 # Half of the variance wanders, as slowly as a tenth of the longest record.
 SLOW = 0.1
 # Effects that look as much alike as this cannot be told apart.
@@ -311,7 +311,7 @@ USE_CASE = UseCase(
     design_experiments,
     console_summary,
     plan=lambda job: [
-        *simulations_plan(job.measured.experiments, job.fidelity),
+        *simulations_plan(job.measured.experiments, job.subject, job.fidelity),
         ("sensitivities", SENSITIVITIES_S),
     ],
 )

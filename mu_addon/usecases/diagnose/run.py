@@ -39,7 +39,9 @@ from .words import advice, readable, sentence, to_do
 # Of a unit, but not before its weight, or the place of what holds it, is simulated.
 LATER = ("unit_pose", "blocked_force")
 SET = 3
-"""Experiments of the data for which the plan's seconds of a verdict hold."""
+"""Records among the data for which the plan's seconds of a verdict hold."""
+RECORD = 10
+"""Rows from which an experiment is a record, not a few readings."""
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -293,15 +295,17 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 def plan_of(job: Job) -> Plan:
     """Stages of a diagnosis with the expected seconds of each on two cores."""
     experiments = job.measured.experiments
-    a_set = len(experiments) / SET
+    # A few readings take next to nothing.
+    records = sum(len(e.rows) >= RECORD for e in experiments) / SET
     judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 15.0, "gain": 0.5}
     return [
-        *simulations_plan(experiments, job.fidelity),
-        *((name, s * a_set) for name, s in judged.items()),
-        ("report", 4.0),
+        *simulations_plan(experiments, job.subject, job.fidelity),
+        *((name, 0.2 + s * records) for name, s in judged.items()),
+        ("report", 1.5),
     ]
 
 
+KEPT = ("lattice", "unit")
 USE_CASE = UseCase(
-    "diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis, plan=plan_of
+    "diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis, plan=plan_of, kept=KEPT
 )

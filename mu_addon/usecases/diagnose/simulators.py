@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...design.parameters import Unit
+from ...errors import InputError
 from ...evidence.prediction import blocked_force, lattice, pose, step
 from ...evidence.prediction import unit as unit_pressure
 from ...evidence.prediction.bench import bench_simulators
@@ -21,8 +23,8 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 10.0, 150.0, 450.0
-"""Approximate seconds of the simulations of blocks, and of a homogenised and a printed unit with effects."""
+LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 450.0
+"""Approximate seconds of the simulation of a block, and of a homogenised and a printed unit with effects."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
@@ -33,7 +35,7 @@ FREE: dict[str, Callable[..., Simulator]] = {
 }
 
 
-def simulations_plan(experiments: Sequence[Experiment], fidelity: str) -> Plan:
+def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, fidelity: str) -> Plan:
     """Stages of `simulators_of` with the expected seconds of each on two cores."""
     kinds = {e.kind for e in experiments}
     unit = UNIT_S
@@ -42,7 +44,13 @@ def simulations_plan(experiments: Sequence[Experiment], fidelity: str) -> Plan:
             (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
         )
         unit = PRINTED_S * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
-    lattice = [("lattice", LATTICE_S)] if any(e.cells for e in experiments) else []
+    lattice = []
+    if any(e.cells for e in experiments) and behind is not None:
+        from ...evidence.lattice_fem import to_compute
+
+        # What is wrong with a block is told by the stage itself.
+        with suppress(InputError):
+            lattice = [("lattice", 0.2 + LATTICE_S * to_compute(experiments, behind))]
     free = [("unit", unit)] if kinds & set(FREE) else []
     return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
 

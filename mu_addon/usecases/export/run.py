@@ -30,8 +30,8 @@ from .job import LAYOUT, MANIFEST, Job, read_job, resin_of
 Array = NDArray[np.float64]
 
 MESH_TOLERANCE = 1e-4
-SOLID_S = {"interactive": 3.0, "export": 20.0}
-FORMAT_S = {"stl": 2.0, "3mf": 12.0, "3mf-beams": 14.0, "step": 22.0, "txt": 0.5}
+SOLID_S = {"interactive": 2.0, "export": 11.0}
+FORMAT_S = {"stl": 0.8, "3mf": 7.0, "3mf-beams": 7.0, "step": 8.0, "txt": 0.1}
 """Approximate seconds to write a format and read it back."""
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
 STEP_TOLERANCE = 5e-3

@@ -189,7 +189,7 @@ def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
     limits = job.limit_parts
     every = [*specimens(unit), *(Specimen(p.name, p.make, p.measure) for p in limits)]
     rows = []
-    with progress.stage("specimens", 10.0):
+    with progress.stage("specimens", 4.0):
         for done, specimen in enumerate(every, 1):
             rows.append(_written(specimen, folder, resin))
             progress.update(done / len(every))
@@ -328,7 +328,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 def plan_of(job: Job) -> Plan:
     """Stages of the specimens with the expected seconds of each on two cores."""
-    return [("specimens", 10.0)]
+    return [("specimens", 4.0)]
 
 
 USE_CASE = UseCase("specimens", LAYOUT, read_job, make_specimens, console_summary, plan=plan_of)

@@ -38,7 +38,7 @@ WEIGHTS_MEAN = {
 
 def write_report(found: Fitting, out: Path, context: RunContext) -> None:
     """Write report.html; raises OutputError."""
-    with context.progress.stage("report", expected_s=4.0):
+    with context.progress.stage("report", expected_s=1.0):
         versions = package_versions()
         context.summary["versions"] = versions
         write_text(out / "report.html", report(found, versions))

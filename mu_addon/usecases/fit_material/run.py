@@ -23,7 +23,7 @@ from .charts import mode_chart
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 
-FIT_S = 2.0
+FIT_S = 1.0
 """Approximate seconds to fit a law."""
 
 
@@ -219,7 +219,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 
 def plan_of(job: Job) -> Plan:
     """Stages of a fit with the expected seconds of each on two cores."""
-    return [("fit", FIT_S * len(job.forms)), ("report", 4.0)]
+    return [("fit", FIT_S * len(job.forms)), ("report", 1.0)]
 
 
 USE_CASE = UseCase("fit-material", LAYOUT, read_job, fit_material, console_summary, plan=plan_of)

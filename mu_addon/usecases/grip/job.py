@@ -25,6 +25,8 @@ from .settings import COARSE_REFINE, REFINE, SIDES
 
 PRINTED_PACE = 3.0
 """Factor on the seconds of a grasp by printed struts."""
+OF_NOTHING, OF_CUBE = 0.5, 1.6
+"""Seconds of a ranking of paths, of a finger that closes on nothing and on a cube, over those of a grasp."""
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
     "grip.toml",
@@ -134,8 +136,15 @@ def read_job(folder: Path) -> Job:
 
 def plan_of(job: Job) -> Plan:
     """Stages of a grasp with the expected seconds of each on two cores."""
-    seconds = 280.0 * (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
+    finer = (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
+    seconds = 140.0 * finer / job.grip.step_s
     if job.mesh.resolved:
         seconds *= PRINTED_PACE
-    grasps = [(f"grasp of {cube.side_mm:g} mm", seconds) for cube in job.cubes]
-    return [("solid", 6.0), ("mesh", 5.0), *grasps, ("light", 20.0), ("report", 20.0)]
+    sides = [cube.side_mm for cube in job.cubes]
+    plan = [("solid", 5.0), *([("mesh", 5.0 * finer)] if sides or job.rules else [])]
+    plan += [(f"grasp of {side:g} mm", seconds) for side in sides]
+    plan += [("light", 4.0 * len(sides) / job.grip.step_s)] if sides else []
+    for rule in job.rules:
+        plan.append((f"paths, {rule}, on nothing", OF_NOTHING * seconds))
+        plan += [(f"paths, {rule}, on {side:g} mm", OF_CUBE * seconds) for side in sides[-1:]]
+    return [*plan, ("report", 6.0 if sides else 3.0)]

@@ -61,4 +61,5 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of)
+KEPT = ("grasp of", "paths")
+USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of, kept=KEPT)

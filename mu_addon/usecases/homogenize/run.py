@@ -64,7 +64,8 @@ def plan_of(job: Job) -> Plan:
     return [*stages, ("report", 10.0)]
 
 
-USE_CASE = UseCase("homogenize", LAYOUT, read_job, homogenize, console_summary, plan=plan_of)
+KEPT = ("mesh of the cell", "stretch of the cell", "specimen")
+USE_CASE = UseCase("homogenize", LAYOUT, read_job, homogenize, console_summary, plan=plan_of, kept=KEPT)
 
 
 Array = np.ndarray[Any, Any]

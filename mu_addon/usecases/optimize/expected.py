@@ -10,26 +10,34 @@ if TYPE_CHECKING:
 
 MOST_CHECKED = 6
 """Most units of a front that are simulated again on a finer mesh: its ends and some evenly between."""
-# Seconds on two cores that a unit of the search, and one that is checked, take about on a mesh of 1, whose
-# lattice is homogenised.
-_A_UNIT_S, _A_CHECK_S = 60.0, 100.0
-# Of the printed body, and of walls and struts that are kept apart.
-_PRINTED, _APART = 3.0, 3.0
+_A_STATE_S, _BY_REFINEMENT = {False: 6.5, True: 76.0}, {False: 2.3, True: 1.8}
+"""Seconds of a state with its slopes at a refinement of 1, and the exponent of the refinement: by whether the
+body is the printed one."""
+_CHECKED, _APART = 1.2, 3.0
+"""Factors on that of a unit that is checked, and of walls and struts that are kept apart."""
 
 
 def search_plan(
-    units: int, settings: MeshSettings, check_refine: float, self_contact: bool, objectives: int = 2
+    units: int,
+    settings: MeshSettings,
+    check_refine: float,
+    self_contact: bool,
+    objectives: int = 2,
+    states: int = 2,
 ) -> Plan:
     """Stages of a search among so many units, with the expected seconds of each on two cores.
 
     settings: of the search's mesh; check_refine: refinement of the check of its proposals, of which there is
-    one with fewer than two objectives.
+    one with fewer than two objectives; states: of a unit, under the targets' pressures.
     """
     checked = min(MOST_CHECKED, units) if objectives > 1 else 1
-    slower = (_PRINTED if settings.resolved else 1.0) * (_APART if self_contact else 1.0)
-    # A unit's time grows as the square of the refinement: homogenised 15 s at 0.5, printed 43 s.
+
+    def seconds(refine: float) -> float:
+        a_state = _A_STATE_S[settings.resolved] * refine ** _BY_REFINEMENT[settings.resolved]
+        return max(states, 1) * a_state * (_APART if self_contact else 1.0)
+
     return [
-        ("search", slower * _A_UNIT_S * settings.refine**2 * units),
-        ("check of what is proposed", slower * _A_CHECK_S * check_refine**2 * checked),
-        ("report", 20.0),
+        ("search", seconds(settings.refine) * units),
+        ("check of what is proposed", _CHECKED * seconds(check_refine) * checked),
+        ("report", 3.0),
     ]

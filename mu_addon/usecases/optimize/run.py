@@ -405,9 +405,17 @@ def plan_of(job: Job) -> Plan:
     """Stages of an optimisation with the expected seconds of each on two cores."""
     design = job.design
     objectives = sum(t.goal is not None for t in design.targets)
+    conditions = {c for t in design.targets if t.quantity is not None for c in t.quantity.conditions}
+    states = sum(condition.pressure_kPa != 0.0 for condition in conditions)
     return search_plan(
-        design.search.evaluations, design.settings, design.check_refine, design.self_contact, objectives
+        design.search.evaluations,
+        design.settings,
+        design.check_refine,
+        design.self_contact,
+        objectives,
+        states,
     )
 
 
-USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary, plan=plan_of)
+KEPT = ("search", "check of what is proposed")
+USE_CASE = UseCase("optimize", LAYOUT, read_job, optimise, console_summary, plan=plan_of, kept=KEPT)

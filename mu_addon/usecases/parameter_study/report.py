@@ -28,7 +28,7 @@ MOST_ROWS = 200
 
 def write_report(found: Found, path: Path, progress: Progress) -> None:
     """Write report.html; raises OutputError."""
-    with progress.stage("report", expected_s=5.0):
+    with progress.stage("report", expected_s=3.0):
         write_text(path, report(found))
 
 

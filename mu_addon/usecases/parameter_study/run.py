@@ -35,7 +35,7 @@ LAST = ("seconds", "memory_MB", "worker", "what", "where", "what_to_do")
 # Seconds between two writings of the table.
 EVERY_S = 10.0
 # What the process of a point takes before its first stage and after its last.
-BEGIN_S = 3.0
+BEGIN_S = 2.0
 
 
 @attrs.frozen(eq=False)
@@ -78,7 +78,7 @@ def sweep(job: Job, folder: Path, context: RunContext) -> Found:
     run = Run(plan, plan.points(values), folder, places, _density(plan))
     run.look(job.retry)
     run.write()
-    progress.plan([("points", run.expected_s(job.workers)), ("report", 5.0)])
+    progress.plan([("points", run.expected_s(job.workers)), ("report", 3.0)])
     try:
         with progress.stage("points"):
             run.solve(progress, job.scheduler, job.workers, job.work)

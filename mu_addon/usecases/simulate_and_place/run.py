@@ -83,4 +83,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-USE_CASE = UseCase("place", LAYOUT, read_job, simulate_and_place, console_summary, begin_study, plan=plan_of)
+KEPT = ("mesh", "Model A", "candidates", "light", "check of the best paths", "motion of the best path")
+USE_CASE = UseCase(
+    "place", LAYOUT, read_job, simulate_and_place, console_summary, begin_study, plan=plan_of, kept=KEPT
+)
