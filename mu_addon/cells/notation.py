@@ -13,12 +13,14 @@ Array = np.ndarray[Any, Any]
 
 DECIMALS = (".", ",")
 MISSING = ("", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---")
-# ASCII substitutes of typographic minus signs, spaces and apostrophes.
+# ASCII substitutes of typographic minus signs, spaces and apostrophes, of Arabic signs, and of digits.
 _SIGNS = str.maketrans(
     dict.fromkeys("\u2212\u2013\ufe63\uff0d\u2010\u2011", "-")
     | dict.fromkeys("\u00a0\u202f\u2009\u2007\u2006\u3000", " ")
     | dict.fromkeys("\u2019\u02bc\u00b4`", "'")
-    | {"\uff0c": ",", "\uff0e": "."}
+    | {"\uff0c": ",", "\uff0e": ".", "\u060c": ",", "\u066b": ".", "\u066c": "'"}
+    | dict.fromkeys("\u200e\u200f\u061c")  # marks of direction
+    | {chr(first + digit): str(digit) for first in (0x0660, 0x06F0, 0xFF10) for digit in range(10)}
 )
 _EXPONENT = r"(?:[eEdD][+-]?\d{1,3})?"
 _SIGNED = r"[+-]? ?"

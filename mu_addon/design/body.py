@@ -17,7 +17,7 @@ from . import shapes
 from .dimensions import Dimensions
 from .printing.crossing import MOST_CROSSINGS, crossings
 from .profile import outer_polygon
-from .surface import Triangles, Vertices, volume, weld
+from .surface import UNITS, Triangles, Vertices, volume, weld
 from .surface_reading import SUFFIXES, read_surface, require_mesh
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ AROUND = 96
 """Number of flat pieces around the actuator in the test of whether a body contains it."""
 SLACK_MM = 1e-3
 """Distance by which a body may miss an end plane."""
-_UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
 
 
 @attrs.frozen
@@ -200,7 +199,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
     if not 0.3 < size / own < 3.0:
         # Only guesses that would pass the checks below, best first.
-        by_size = sorted(_UNITS.items(), key=lambda item: abs(np.log(size * item[0] / own)))
+        by_size = sorted(UNITS.items(), key=lambda item: abs(np.log(size * item[0] / own)))
         fits = {f: unit for f, unit in by_size if size * f / own < 3.0 and _spans(f * body.bounds, d)}
         if fits:
             return [

@@ -11,6 +11,8 @@ from ..errors import InputError
 
 Vertices = NDArray[np.float64]
 Triangles = NDArray[np.int64]
+UNITS = {1000.0: "metres", 25.4: "inches", 10.0: "centimetres", 0.001: "micrometres"}
+"""Units in which a file of a surface may be, by their length in mm."""
 
 _Number = TypeVar("_Number", np.int64, np.float64)
 

@@ -199,7 +199,7 @@ class _Proposing:
         one = self.block.columns[k]
         if one.quantity == "count":
             return "no quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
-        return f"its quantity is not known; answer with column.{self._name(one)}=QUANTITY says it"
+        return f"its quantity is not known; say it with column.{self._name(one)}=QUANTITY"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
         """The columns of known quantity, in the units that are read, and the source of each."""
@@ -290,7 +290,7 @@ class _Proposing:
         fits = known is not None and known[0] == READ_IN[answer]
         return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, stated="")
 
-    def _ask_column(self, k: int, quantities: Sequence[str], words: str) -> None:
+    def _ask_column(self, k: int, quantities: Sequence[str], words: str, why: str = "") -> None:
         """Ask for the quantity of a column."""
         one = self.block.columns[k]
         values = self.block.values[:, k]
@@ -298,7 +298,9 @@ class _Proposing:
         if not one.title and "time" in quantities and k == 0 and (np.diff(values) > 0).all():
             proposed = "time"
         self.questions.append(
-            Question(f"column.{self._name(one)}", f"what does {words} hold?", (*quantities, "none"), proposed)
+            Question(
+                f"column.{self._name(one)}", f"what does {words} hold{why}?", (*quantities, "none"), proposed
+            )
         )
 
     def _unit(self, one: Column, k: int) -> Column:
@@ -311,7 +313,7 @@ class _Proposing:
                 and not one.unit
                 and np.nanmax(np.abs(self.block.values[:, k]), initial=0) > _NO_RADIANS
             ):
-                self.concluded.append(f"{self._title(k)} is in degrees{self._range(k)}")
+                self.concluded.append(f"in degrees{self._range(k)}: {self._title(k)}")
                 return attrs.evolve(one, unit="deg", factor=1.0)
             shown = f"{one.unit!r}, which is not known" if one.unit else "not given"
             title = repr(one.title) if one.title else f"column {one.place}"
@@ -441,7 +443,7 @@ class _Proposing:
             )
         for k in unknown[:_MOST_ASKED]:
             self._ask_column(
-                k, wanted, f"{self._title(k)}{self._range(k)}; {kind} needs {' and '.join(gone)}:"
+                k, wanted, f"{self._title(k)}{self._range(k)}", f", as {kind} needs {' and '.join(gone)}"
             )
             if len(unknown) == 1 and len(wanted) == 1:
                 self.questions[-1] = attrs.evolve(self.questions[-1], proposed=wanted[0])

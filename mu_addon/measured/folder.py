@@ -325,7 +325,7 @@ def _check_strain(strain: Array, rows: Array, kind: Kind, path: Path, remarks: l
             Remark(
                 f"the strain reaches {np.abs(strain).max():g}",
                 f"{path}, row {int(rows[np.argmax(np.abs(strain))])}, column strain",
-                "give strain as a bare number, not in percent",
+                "give strain as a bare number, not in percent; check length_mm, if it is by displacement",
             )
         )
 

@@ -26,11 +26,24 @@ QUICK_STUDY = ("--fidelity", "homogenised", "--order", "1", "--refine", "0.4", "
 QUICK = {
     "simulate": QUICK_STUDY,
     "place": (*QUICK_STUDY, "--stations", "11", "--no-mesh-check"),
-    "grip": ("--fidelity", "homogenised", "--refine", "0.5"),
+    "grip": ("--fidelity", "homogenised", "--refine", "0.25"),
     "homogenize": ("--cells", "2", "--no-specimen"),
     "design": ("--no-report",),
 }
 SMALL = {"mu-1.0x": "mu-0.75x"}
+# The same in the files that a command reads, by the stem of their names.
+QUICK_FILES = {
+    "design": (
+        (r"evaluations = \d+", "evaluations = 2"),
+        (r"\nrefine = .*", "\nrefine = 0.3\ncheck_refine = 0.3"),
+    ),
+    "sweep": (
+        (r"points = \d+", "points = 2"),
+        (r"times = \d+", "times = 3"),
+        (r"refine = 0.4", "refine = 0.3"),
+    ),
+    "three-walls": ((r"times = \d+", "times = 3"), (r"\nrefine = .*", "\nrefine = 0.3")),
+}
 
 
 def blocks(page):
@@ -106,8 +119,13 @@ def quick(words):
 
 def run_block(lines, folder):
     """Run the lines of a block in a folder as a reader does, beside the files of the repository."""
-    for name in ("assets", "tests"):
-        (folder / name).symlink_to(ROOT / name)
+    (folder / "tests").symlink_to(ROOT / "tests")
+    shutil.copytree(ROOT / "assets", folder / "assets")
+    for path in (folder / "assets").rglob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        for pattern, small in QUICK_FILES.get(path.stem, ()):
+            text = re.sub(pattern, small, text)
+        path.write_text(text, encoding="utf-8")
     for line in lines:
         words = words_of(line)
         if words is None:

@@ -291,3 +291,15 @@ def test_a_run_that_was_killed_is_told_by_the_next_one_in_its_folder(tmp_path):
         warned.append([m["what"] for m in messages if m["type"] == "warning"])
     assert ["was interrupted" in what for what in warned[0]] == [True]
     assert warned[1] == []
+
+
+@pytest.mark.parametrize("words", ["", "stopped by Ctrl-C"])
+def test_a_report_of_whole_results_says_that_its_run_was_stopped(tmp_path, words):
+    page = f"<body>\n<header>{words}</header>\n<main>\nfigures</main>\n"
+    with run_to_end(Progress()) as context:
+        context.open_folder(tmp_path)
+        context.report = lambda _: (tmp_path / "report.html").write_text(page)
+        raise KeyboardInterrupt
+    text = (tmp_path / "report.html").read_text()
+    assert text.count("stopped by Ctrl-C") == 1
+    assert "figures" in text

@@ -15,7 +15,7 @@ from ..dimensions import Dimensions
 from ..lattice import graph_of
 from ..parameters import Unit
 from ..profile import outer_radius
-from ..surface import Triangles, Vertices, genus, stl_bytes, stl_surface, volume
+from ..surface import UNITS, Triangles, Vertices, genus, stl_bytes, stl_surface, volume
 from ..waveguide import waveguide
 from . import faces
 from .building import build_findings
@@ -93,6 +93,8 @@ MOST_CELLS = 4e8
 """Cells of a grid beyond which it is made coarser: an array of units, or a part far too large."""
 STAGES = ("thickness", "chambers", "layers", "directions")
 INCH = 25.4
+SMALL_MM = 5.0
+"""Largest extent of a part that is taken to be in another unit."""
 
 Stage = Callable[[str], AbstractContextManager[Any]]
 
@@ -303,7 +305,7 @@ def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
     room, limit = printer.room, printer.limits["build_x_mm"]
     straight, turned = _flat(extent, room), _flat(extent[[1, 0, 2]], room)
     share = max(extent[2] / room[2], min(straight, turned))
-    tiny = float(extent.max()) < 5.0
+    tiny = float(extent.max()) < SMALL_MM
     bad = not fits(extent, room) or tiny
     what = (
         f"{extent[0]:.4g} x {extent[1]:.4g} x {extent[2]:.4g} mm as it stands, on "
@@ -314,7 +316,11 @@ def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
         what += f"; it fits {room[0]:g} x {room[1]:g} mm only if it is turned by 90 degrees on the platform"
         remedy = "turn the part by 90 degrees about the build direction"
     if tiny:
-        what += "; the whole part is smaller than 5 mm: the file may be in metres or inches"
+        units = {f: u for f, u in UNITS.items() if f * extent.max() >= SMALL_MM and fits(f * extent, room)}
+        what += f"; the whole part is smaller than {SMALL_MM:g} mm"
+        if units:
+            what += f": the file may be in {' or '.join(units.values())}"
+            remedy = f"scale it by {' or '.join(f'{factor:g}' for factor in units)}"
     elif bad and 3.0 < share < INCH:
         what += (
             "; it would fit at 1/25.4 of its size: it may have been scaled from inches though it was in mm"
