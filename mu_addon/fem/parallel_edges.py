@@ -10,82 +10,22 @@ for an equilibrium passes the jump.
 from __future__ import annotations
 
 import itertools
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 Array = np.ndarray[Any, Any]
 
-# ipctk smooths edges whose cross product is below this share of the product of their lengths as drawn; a
-# little more, so that none is missed: ipctk's own functions decide.
-_PARALLEL = 1.005 * np.sqrt(1e-3)
 
-
-def pairs_of(surface: Any, candidates: Any, places: Array, reach_mm: float, moves_mm: float) -> Array:
-    """Edges (c, 2) of candidates that may be nearly parallel within reach while no vertex moves any farther.
-
-    surface: ipctk's collision mesh; candidates: a superset of the pairs within reach meanwhile; places (v, 3)
-    in mm of its vertices.
-    """
-    found = candidates.ee_candidates
-    pairs = np.empty((len(found), 2), int)
-    for column, name in enumerate(("edge0_id", "edge1_id")):
-        pairs[:, column] = np.fromiter(map(attrgetter(name), found), int, len(found))
-    way, drawn = _ways(surface, places)
-    length = np.linalg.norm(way, axis=1)
-    # An edge's vector changes by twice the moves at most.
-    slack = 2.0 * moves_mm * (length[pairs].sum(axis=1) + 2.0 * moves_mm)
-    pairs = pairs[_across(way, pairs) < _PARALLEL * drawn[pairs].prod(axis=1) + slack]
-    # From where edges are nearest an end of one lies within half the shorter edge.
-    near = (reach_mm + 2.0 * moves_mm) ** 2 + 0.25 * length[pairs].min(axis=1) ** 2
-    return pairs[_to_ends(surface, places, pairs) < near]
-
-
-def _ways(surface: Any, places: Array) -> tuple[Array, Array]:
-    """Vectors (e, 3) of the edges in mm, and lengths (e,) as drawn."""
-    ends, rest = np.asarray(surface.edges), np.asarray(surface.rest_positions)
-    way, drawn = (at[ends[:, 1]] - at[ends[:, 0]] for at in (places, rest))
-    return way, np.linalg.norm(drawn, axis=1)
-
-
-def _across(way: Array, pairs: Array) -> Array:
-    """Lengths (c,) of the cross products of pairs of edges."""
-    (ax, ay, az), (bx, by, bz) = (way[column].T for column in pairs.T)
-    return np.asarray(np.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2))
-
-
-def _to_ends(surface: Any, places: Array, pairs: Array) -> Array:
-    """Least squared distances (c,) in mm2 of an end of one edge from the other."""
-    ends = np.asarray(surface.edges)[pairs]
-    least = np.full(len(pairs), np.inf)
-    for side in (0, 1):
-        start, stop = (places[ends[:, side, end]] for end in (0, 1))
-        way = stop - start
-        square = np.einsum("ij,ij->i", way, way)
-        for end in (0, 1):
-            off = places[ends[:, 1 - side, end]] - start
-            along = np.clip(np.einsum("ij,ij->i", off, way) / square, 0.0, 1.0)
-            off = off - along[:, None] * way
-            least = np.minimum(least, np.einsum("ij,ij->i", off, off))
-    return least
-
-
-def reweigh(ipctk: Any, surface: Any, near: Any, pairs: Array, places: Array, reach_mm: float) -> None:
+def reweigh(ipctk: Any, surface: Any, near: Any, candidates: Any, places: Array, reach_mm: float) -> None:
     """Weigh nearly parallel edges of `near`, ipctk's pairs on its mesh `surface`, anew and in place.
 
-    pairs (c, 2): a superset of its nearly parallel edges, see `pairs_of`; places (v, 3) in mm of the mesh's
-    vertices; reach_mm: `near` holds what is nearer.
+    candidates: ipctk's, of which `near` holds what is nearer than reach_mm; places (v, 3) in mm of the mesh's
+    vertices.
     """
-    way, drawn = _ways(surface, places)
-    pairs = pairs[_across(way, pairs) < _PARALLEL * drawn[pairs].prod(axis=1)]
-    # Nearly parallel edges are no nearer than their ends, but for what they turn towards each other.
-    turned = (_PARALLEL * drawn[pairs].max(axis=1)) ** 2
-    pairs = pairs[_to_ends(surface, places, pairs) < reach_mm**2 + turned]
-    ends, rest = np.asarray(surface.edges), np.asarray(surface.rest_positions)
-    parallel, slopes = {}, near.enable_shape_derivatives
-    for a, b in pairs.tolist():
-        threshold = ipctk.edge_edge_mollifier_threshold(*rest[ends[a]], *rest[ends[b]])
+    ends, slopes = np.asarray(surface.edges), near.enable_shape_derivatives
+    parallel = {}
+    for a, b, threshold in _pairs(ipctk, surface, candidates, places, reach_mm):
         at = places[ends[a]], places[ends[b]]
         if ipctk.edge_edge_cross_squarednorm(*at[0], *at[1]) < threshold:
             parallel[frozenset((a, b))] = [
@@ -98,6 +38,19 @@ def reweigh(ipctk: Any, surface: Any, near: Any, pairs: Array, places: Array, re
     terms = [one for one in terms if frozenset(one.edges) not in parallel]
     terms += itertools.chain(*parallel.values())
     near.ee_collisions = [one.made(ipctk) for one in terms if one.weight]
+
+
+def _pairs(
+    ipctk: Any, surface: Any, candidates: Any, places: Array, reach_mm: float
+) -> list[tuple[int, int, float]]:
+    """Pairs of edges within reach whose terms are of two edges, with ipctk's threshold of being parallel.
+
+    All that are nearly parallel are among them in the set without the improved maximum.
+    """
+    plain = ipctk.NormalCollisions()
+    plain.collision_set_type = ipctk.NormalCollisions.IPC
+    plain.build(candidates, surface, places, reach_mm)
+    return [(one.edge0_id, one.edge1_id, one.eps_x) for one in plain.ee_collisions]
 
 
 class _Term(NamedTuple):

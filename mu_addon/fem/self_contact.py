@@ -16,7 +16,7 @@ from ..design.quantity import in_kPa
 from ..errors import InputError
 from ..meshing.mesh import AXES, LATTICE, Mesh
 from .outer_faces import free_boundary
-from .parallel_edges import pairs_of, reweigh
+from .parallel_edges import reweigh
 from .self_friction import SelfFriction
 from .self_intersection import facets_of
 
@@ -33,7 +33,7 @@ _SLIVERS = 0.05
 # Relative step in which two edges' smoothing is differentiated.
 _SMALL = 1e-4
 # Gaps that a node may move before pairs are searched for anew.
-_MARGIN = 1.0
+_MARGIN = 0.3
 # Slip in gaps at which friction is full.
 _SLIP = 0.1
 # Share of the way to a mirror plane that a step may go, as ipctk has it for the way to a touch.
@@ -151,7 +151,7 @@ class SelfContact:
         # Half the time of ipctk's default, and as safe: it advances by what distance and speed allow.
         self._detection = self._ipctk.AdditiveCCD()
         self._last: _Pairs | None = None
-        self._kept: tuple[Array, Any, Array] | None = None
+        self._kept: tuple[Array, Any] | None = None
         self._friction: SelfFriction | None = None
         if friction:
             parts = self._ipctk, self._surface, self._potential
@@ -513,8 +513,7 @@ class SelfContact:
             found = self._ipctk.Candidates()
             # Boxes are inflated on either side.
             found.build(self._surface, places, self.gap_mm / 2 + self._margin_mm)
-            parallel = pairs_of(self._surface, found, places, self.gap_mm, self._margin_mm)
-            self._kept = places, found, parallel
+            self._kept = places, found
         assert self._kept is not None
         return self._kept[1]
 
@@ -544,8 +543,7 @@ class SelfContact:
             near.build(self._surface, places, reach_mm)
         else:
             near.build(among, self._surface, places, reach_mm)
-            assert self._kept is not None
-            reweigh(self._ipctk, self._surface, near, self._kept[2], places, reach_mm)
+            reweigh(self._ipctk, self._surface, near, among, places, reach_mm)
         return near
 
     def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:

@@ -139,9 +139,11 @@ class PrintedWaveguides:
 def _near(equilibrium: Equilibrium, start: Array, pressure: float) -> State | None:
     """State at a pressure in MPa near a start (m, 3) in mm, or None if none is found."""
     touch = equilibrium.model.self_contact
-    # What has passed through itself can only come back the way it went.
-    if touch is None or not touch.intersects(start):
-        for method in (equilibrium.newton, equilibrium.settled):
-            with contextlib.suppress(ConvergenceError):
-                return method(start, pressure)
-    return None
+    # What has passed through itself can only come back the way it went; and damped motion from where Newton's
+    # method fails takes longer than the way from the state before.
+    if touch is not None and touch.intersects(start):
+        return None
+    try:
+        return equilibrium.newton(start, pressure)
+    except ConvergenceError:
+        return None

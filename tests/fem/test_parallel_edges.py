@@ -4,7 +4,7 @@ import ipctk
 import numpy as np
 import pytest
 
-from mu_addon.fem.parallel_edges import pairs_of, reweigh
+from mu_addon.fem.parallel_edges import reweigh
 
 GAP = 0.1
 # Two triangles; an edge of each runs along x, one above the other and shifted along it.
@@ -34,7 +34,7 @@ def energies(turns, weighed, gap=GAP):
         near.collision_set_type = ipctk.NormalCollisions.IMPROVED_MAX_APPROX
         near.build(candidates, surface, at, gap)
         if weighed:
-            reweigh(ipctk, surface, near, pairs_of(surface, candidates, at, gap, 0.0), at, gap)
+            reweigh(ipctk, surface, near, candidates, at, gap)
         found.append(potential(near, surface, at))
     return np.array(found)
 
@@ -81,7 +81,7 @@ def test_gradients_of_weights_are_those_of_areas(turn):
         near.use_area_weighting = True
         near.collision_set_type = ipctk.NormalCollisions.IMPROVED_MAX_APPROX
         near.build(candidates, surface, at, GAP)
-        reweigh(ipctk, surface, near, pairs_of(surface, candidates, at, GAP, 0.0), at, GAP)
+        reweigh(ipctk, surface, near, candidates, at, GAP)
         weights.append(np.array([one.weight for one in near.ee_collisions]))
         if factor == 0.0:
             gradient = np.array(
