@@ -240,7 +240,7 @@ class PlateBody:
             at, u, eta = 0.0, np.zeros_like(self.mesh.nodes), self.rest
             slope_ = np.zeros(6)
             for target in side.tolist():
-                known = kept(target)
+                known, begun, eta_begun = kept(target), at, eta
                 if known is None:
                     count = max(1, int(np.ceil(abs(target - at) / step_kPa)))
                     for p in np.linspace(at, target, count + 1)[1:].tolist():
@@ -258,8 +258,9 @@ class PlateBody:
                         at, (u, eta) = p, (known[0], known[1].eta)
                     assert known is not None
                     keep(*known)
-                elif target != at:
-                    slope_ = (known[1].eta - eta) / (target - at)
+                if target != begun:
+                    # As from the cache, which has no steps between: a resumed run ends at the same digits.
+                    slope_ = (known[1].eta - eta_begun) / (target - begun)
                 at, (u, eta) = target, (known[0], known[1].eta)
                 found[target] = known
         return found

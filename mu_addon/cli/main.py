@@ -137,6 +137,8 @@ def main(arguments: list[str]) -> int:
             command.run(options, context)
     if context.status == 0 and not getattr(options, "json", False):
         results = [f"results: {context.folder}"] if context.folder is not None else []
+        applied = context.summary.get("model", {}).get("applied", ())
+        results += [f"applied of {options.model}: {words}" for words in applied]
         lines = [*results, *context.console_summary(context.summary)]
         sys.stdout.write(printable("\n".join(lines), sys.stdout) + "\n")
     return context.status

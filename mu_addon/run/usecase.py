@@ -49,7 +49,8 @@ class UseCase(Generic[Job]):
         else:
             begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
         context.console_summary = self.console_summary
-        context.progress.plan(remaining(self.plan(job), shares_done(folder), self.kept))
+        plan = [stage for stage in self.plan(job) if context.wants_report or stage[0] != "report"]
+        context.progress.plan(remaining(plan, shares_done(folder), self.kept))
         found = self.run(job, folder, context)
         context.write_report()
         return found

@@ -141,6 +141,15 @@ def test_a_second_learning_takes_every_state_from_the_cache(unit, mesh, tmp_path
     assert again.held_out == first.held_out
 
 
+@pytest.mark.slow
+def test_a_path_that_goes_on_from_the_cache_ends_at_the_same_digits(unit, mesh):
+    """Steps between its states are not kept; the slope at the last of them led to another guess."""
+    body, pressures = PlateBody(unit, mesh, DENSITY), np.array([0.0, 6.0, 12.0])
+    whole = body.free_path(pressures, step_kPa=2.0)
+    rest = body.free_path(pressures, kept=lambda p: whole[p] if p < 12.0 else None, step_kPa=2.0)
+    np.testing.assert_array_equal(rest[12.0][0], whole[12.0][0])
+
+
 def test_a_full_model_takes_no_couple_and_no_half(unit, mesh):
     loads = Loads(tip_couple_N_mm=np.array([1.0, 0.0, 0.0]))
     with pytest.raises(InputError, match="takes no couple"):

@@ -94,6 +94,15 @@ def _panel_pictures(study: Study) -> None:
         write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
 
 
+def _of_model(study: Study) -> list[str]:
+    """What an extended model changed in the unit, and what of it is left out, in words."""
+    model = study.context.summary.get("model", {})
+    return [
+        *(f"Applied of the extended model: {words}." for words in model.get("applied", ())),
+        *(f"Not applied of the extended model: {words}." for words in model.get("left_out", ())),
+    ]
+
+
 def report_data(
     study: Study,
     view: SideView | None,
@@ -113,7 +122,7 @@ def report_data(
         unit=f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
         status="partial" if stopped else "complete",
         reason=stopped,
-        warnings=(*study.warnings, *([NO_PICTURES] if study.context.hurried else [])),
+        warnings=(*study.warnings, *_of_model(study), *([NO_PICTURES] if study.context.hurried else [])),
         view=view,
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
