@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .parameters import Unit
+from .toml_text import nearest
 
 SHORTEST = 3
 """Fewest anchors of a path (the source paper's h >= 3)."""
@@ -70,7 +71,8 @@ def window(unit: Unit, name: str) -> Window:
         if candidate.name == name:
             return candidate
     raise InputError(
-        f"there is no path {name!r} among {unit.dimensions.count} anchors",
+        f"there is no path {name!r} among {unit.dimensions.count} anchors"
+        + nearest(name, [candidate.name for candidate in every]),
         "path",
         f"choose one of {every[0].name} .. {every[-1].name}",
     )

@@ -39,7 +39,7 @@ def track(clip, markers="bench.toml"):
 REFUSED = {
     "design of a path that is not there": (
         ("design", *UNIT, "--path", "alpha99"),
-        ("no path 'alpha99'", "where: path", "alpha1 .. alpha10"),
+        ("no path 'alpha99'", "did you mean 'alpha9'?", "where: path", "alpha1 .. alpha10"),
     ),
     "import of a missing file": (("import", "none.csv"), ("where: none.csv", "check path and file")),
     "import of a binary file": (("import", "noise.csv"), ("where: noise.csv", "export it as CSV or text")),
