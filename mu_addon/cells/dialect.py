@@ -130,7 +130,7 @@ def split(line: str, delimiter: str) -> tuple[str, ...]:
             if 2 * numbers >= len(words) and numbers > 1
             else _SPACES.split(BRACKET.sub(" ", line.strip()))
         )
-    elif '"' in line:
+    elif '"' in line and line.count('"') % 2 == 0:
         try:
             cells = next(
                 csv.reader([line] if "\n" not in line else line.splitlines(True), delimiter=delimiter), []
@@ -138,6 +138,7 @@ def split(line: str, delimiter: str) -> tuple[str, ...]:
         except csv.Error:
             cells = line.split(delimiter)
     else:
+        # A quote that is never closed divides nothing.
         cells = line.split(delimiter)
     # Line ends in a title are spaces; other spaces keep their kind, which may divide thousands.
     cells = [cell.replace("\r", "").replace("\n", " ").strip().strip('"').strip() for cell in cells]

@@ -133,7 +133,7 @@ class _Finding:
                 start = members[-1] + 1
                 if self._start(start) is None:
                     break
-                self._note_numbers(range(begin, start))
+                self._note_numbers(begin, range(begin, start))
                 self.facts = self.facts | _facts(self.rows[begin:start])
                 begin = start
                 continue
@@ -160,9 +160,18 @@ class _Finding:
             shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
             self._leave(same, f"{shown!r}: {why}")
 
-    def _note_numbers(self, places: Sequence[int] | range) -> None:
-        """List rows of numbers that belong to no record, also one that was cut after its first number."""
-        rows = [self.rows[k] for k in places if len(self.numeric[k]) > 1 or self._begins_with_number(k)]
+    def _note_numbers(self, begin: int, places: Sequence[int]) -> None:
+        """List rows of numbers that belong to no record, also one that was cut after its first number.
+
+        Or at another place: a row with a number directly below such a one or the last record, which ends
+        before row `begin`, is no fact of what follows.
+        """
+        rows, last = [], begin - 1 if begin else -2
+        for k in places:
+            cut = k == last + 1 and bool(self.numeric[k] & self.usual)
+            if cut or len(self.numeric[k]) > 1 or self._begins_with_number(k):
+                rows.append(self.rows[k])
+                last = k
         self._leave(rows, f"numbers above a table, fewer than {FEWEST} rows")
 
     def _begins_with_number(self, k: int) -> bool:
@@ -258,7 +267,7 @@ class _Finding:
         self.specimen = _specimen(remarks) or self.specimen
         self._leave_text(damaged, "between the titles and the first row that is read")
         if titles or not self.titles:
-            self._note_numbers([k for k in range(begin, start) if self.rows[k] in remarks])
+            self._note_numbers(begin, [k for k in range(begin, start) if self.rows[k] in remarks])
         else:
             titles = self.titles if self.titled == self.usual else []
             self._leave_text(

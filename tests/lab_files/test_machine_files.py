@@ -543,3 +543,22 @@ def test_a_table_of_a_long_file_is_quick():
     text = lines(TITLES, *rows(20000))
     (block,) = tables(sheet_of_text(text)).blocks
     assert block.values.shape == (20000, 3)
+
+
+@pytest.mark.parametrize("cut", ["\u00b5m;3,50", "Max;3"])
+def test_what_is_left_of_a_reading_above_the_next_titles_is_listed(tmp_path, cut):
+    titles = TITLES.replace(",", ";")
+    body = rows(4, ";")
+    (tmp_path / "a.csv").write_text(lines(titles, *body, cut, titles, *body), encoding="utf-8")
+    found = understand([tmp_path / "a.csv"], COUPON)
+    assert [len(p.lines) for p in found.proposals] == [4, 4]
+    assert any("line 6" in words for words in found.left_out)
+
+
+def test_a_stray_quote_among_titles_joins_no_two_of_them(tmp_path):
+    titles = TITLES.split(",")
+    damaged = f'{titles[0]},",{titles[2]}'
+    (tmp_path / "a.csv").write_text(lines(damaged, *rows(6)), encoding="utf-8")
+    (proposal,) = understand([tmp_path / "a.csv"], COUPON).proposals
+    assert "displacement_mm" in proposal.columns
+    assert proposal.columns["displacement_mm"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
