@@ -36,8 +36,8 @@ ALTERNATION = "alternation"
 """Test of readings without a clock for signs that change from each to the next."""
 # Fewer readings alternate by the fit alone.
 FEWEST_IN_A_ROW = 20
-# Of a turn, in which a residual is sought.
-HARMONICS = 4
+# Of a turn, in which a residual is sought, cut off at so many of its standard deviations (by the median).
+HARMONICS, CUT = 4, 3.0
 # Digits of a whitened residual that count in its rank.
 RANKED = 6
 # Directions of a test's columns, each of unit length, that hold less than this are none.
@@ -142,7 +142,6 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
             and ("pressure_kPa" not in needs or record.driven(i, "pressure_kPa"))
         }
         found += _tested(fitted, name, _powers(record, held), spare)
-    found += _by_turn(fitted, spare)
     found += _tested(fitted, "angle", _powers(record, _angles(fitter, fit)), spare)
     response = _response(fitter, fit)
     for name, condition in CONDITIONS:
@@ -160,6 +159,7 @@ def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[
 def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
     record, r = fitter.record, fit.residual
     return [
+        *_by_turn(fitter, fit),
         *_steps(fitter, fit),
         *_spectrum(fitter, fit),
         *_cycles_alike(record, r),
@@ -236,29 +236,50 @@ def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Arr
     return record.laid_out(powers)
 
 
-def _by_turn(fitted: _Fitted, spare: Mapping[str, float]) -> list[Dependence]:
+def _by_turn(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Test against the angle that a unit is turned by within a record.
 
     Such readings have no clock, and so a noise that is estimated from this very residual: a share of it is
-    tested (by the beta distribution), not its size over that noise. Outliers are part of it, so that records
-    are also compared with each other (`_turned_alike`).
+    tested (by the beta distribution), not its size over that noise. Misfits are cut off at `CUT` of their own
+    standard deviations, as outliers are part of them. Records are also compared (`_turned_alike`).
     """
     from scipy.stats import beta
 
-    columns = _turns(fitted.fitter.record)
-    if columns is None:
-        return []
-    total = float(fitted.residual @ fitted.residual)
-    left = len(fitted.residual) - len(fitted.along)
-    found = [
-        attrs.evolve(
-            d, p_value=float(beta.sf(min(d.statistic / total, 1.0), d.dof / 2, max(left - d.dof, 1) / 2))
-        )
-        for d in _tested(fitted, BY_TURN, columns, spare)
-    ]
-    found += _turned_alike(fitted.fitter.record, fitted.residual)
-    least = sorted(found, key=lambda d: d.p_value)[:1]
-    return [attrs.evolve(d, p_value=min(1.0, len(found) * d.p_value)) for d in least]
+    record, r, found = fitter.record, fit.residual, []
+    for channel in _channels(record):
+        members = [s for s in record.series if s.channel == channel and _turned(record, s)]
+        if not members:
+            continue
+        turned = np.radians(np.concatenate([s.mean(record.experiments[s.experiment][TURN]) for s in members]))
+        misfit = _cut([r[s.at] for s in members])
+        left = len(misfit) - len(members) - len(fit.keys)
+        apart = np.unique(np.round(turned % (2.0 * np.pi), 6))
+        for order in range(1, min(HARMONICS, (len(apart) - 1) // 2) + 1):
+            wave = np.stack([np.cos(order * turned), np.sin(order * turned)], axis=1)
+            q = _basis(wave - wave.mean(axis=0))
+            share = float(np.sum((q.T @ misfit) ** 2) / max(misfit @ misfit, 1e-300))
+            dof = q.shape[1]
+            p = float(beta.sf(min(share, 1.0), dof / 2, max(left - dof, 1) / 2))
+            found.append(Dependence(BY_TURN, share, p, f"{channel}, {order} times a turn", dof))
+    worst = sorted(found, key=lambda d: d.p_value)[:1]
+    either = [attrs.evolve(d, p_value=min(1.0, len(found) * d.p_value)) for d in worst]
+    either += _turned_alike(record, r)
+    least = sorted(either, key=lambda d: d.p_value)[:1]
+    return [attrs.evolve(d, p_value=min(1.0, len(either) * d.p_value)) for d in least]
+
+
+def _turned(record: Record, s: Series) -> bool:
+    """Return True if a series is read at rest while its unit is turned."""
+    e = record.experiments[s.experiment]
+    return TURN in e.columns and np.ptp(e[TURN]) > 0.0 and math.isnan(s.sample_s) and s.group != KNOWN
+
+
+def _cut(misfits: Sequence[Array]) -> Array:
+    """Misfits (n,) of records one after the other, about each one's median, cut off and of mean 0 in each."""
+    about = [m - np.median(m) for m in misfits]
+    most = CUT * 1.4826 * float(np.median(np.abs(np.concatenate(about)))) or math.inf
+    cut = [np.clip(m, -most, most) for m in about]
+    return np.concatenate([m - m.mean() for m in cut])
 
 
 def _turned_alike(record: Record, r: Array) -> list[Dependence]:
@@ -267,10 +288,9 @@ def _turned_alike(record: Record, r: Array) -> list[Dependence]:
 
     scores: list[dict[float, float]] = []
     for s in record.series:
-        e, own = record.experiments[s.experiment], r[s.at]
-        if TURN in e.columns and math.isnan(s.sample_s) and s.group != KNOWN and len(own) > 2:
-            turned = np.round(s.mean(e[TURN]) % 360.0, 6).tolist()
-            scores.append(dict(zip(turned, _scores(own).tolist(), strict=True)))
+        if _turned(record, s) and s.at.stop - s.at.start > 2:
+            turned = np.round(s.mean(record.experiments[s.experiment][TURN]) % 360.0, 6).tolist()
+            scores.append(dict(zip(turned, _scores(r[s.at]).tolist(), strict=True)))
     products = [a[o] * b[o] for a, b in combinations(scores, 2) for o in a.keys() & b.keys()]
     if not products:
         return []
@@ -307,26 +327,6 @@ def _scores(values: Array) -> Array:
 
     z = norm.ppf(rankdata(np.round(values, RANKED)) / (len(values) + 1.0))
     return np.asarray(z / z.std()) if z.any() else z
-
-
-def _turns(record: Record) -> Array | None:
-    """Harmonics (N, d) of the angle that a unit is turned by within a record; None where it is not turned."""
-    turned = {
-        i: np.radians(e[TURN])
-        for i, e in enumerate(record.experiments)
-        if TURN in e.columns and np.ptp(e[TURN]) > 0.0
-    }
-    if not turned:
-        return None
-    apart = np.unique(np.round(np.concatenate(list(turned.values())) % (2.0 * np.pi), 6))
-    orders = np.arange(1, min(HARMONICS, (len(apart) - 1) // 2) + 1)[:, None]
-
-    def harmonics_of(i: int) -> Array:
-        if i not in turned:
-            return np.zeros((2 * len(orders), len(record.experiments[i])))
-        return np.concatenate([np.cos(orders * turned[i]), np.sin(orders * turned[i])])
-
-    return record.laid_out(harmonics_of) if len(orders) else None
 
 
 def _by_condition(record: Record, values: Array, response: Array) -> Array | None:

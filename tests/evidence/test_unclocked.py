@@ -66,7 +66,7 @@ def test_outliers_of_a_curve_by_strain_are_a_remark(kind, many, rows, share):
         ({"outside_cable": {"deg": 1.0}}, "quantised", "unexplained"),
     ],
 )
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", range(6))
 def test_readings_of_a_turned_unit_of_the_second_code(faults, noise, kind, number):
     row = judged(Order("single", "unit_pose", faults, noise, 0.003, SEED + number))
     assert row["verdict"] == kind
