@@ -29,14 +29,14 @@ from mu_addon.files import write_text
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 
 LOW_kPa, HIGH_kPa = -10.0, 12.0
-PRESSURES_kPa = (-10.5, -8.0, -5.0, -2.5, 0.0, 3.0, 6.0, 9.0, 12.5)
+PRESSURES_kPa = tuple(np.arange(-12.0, 13.0).tolist())
 # Standard deviation of the angle's noise.
 NOISE_deg = 0.03
 OFFSET = "pressure_offset"
 # Hidden in each set: an effect and its size, in the unit of its parameter.
 SETS: dict[str, tuple[str, float]] = {
     "clean": ("", 0.0),
-    "offset": (OFFSET, 0.6),
+    "offset": (OFFSET, 1.5),
     "wall": ("wall_thickness", 0.87),
     "stiffening": ("strain_stiffening", 0.8),
     "layers": ("anisotropy", 0.6),
@@ -54,7 +54,7 @@ def angles(name: str, refine: float, folder: Path) -> np.ndarray:
     effect, size = SETS[name]
     if effect == OFFSET:
         effect, size = "", 0.0
-    kept = folder / f"truth-{effect or 'clean'}-{size:g}-{refine:g}.npy"
+    kept = folder / f"angles-{effect or 'clean'}-{size:g}-{refine:g}.npy"
     if not kept.exists():
         body = Body(small_unit(), MeshSettings(fidelity=RESOLVED, refine=refine), self_contact=True)
         found = run(Run(body, PRESSURES_kPa, (), effect, size))

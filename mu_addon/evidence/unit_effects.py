@@ -141,12 +141,12 @@ class UnitEffect:
     """A static effect of the unit: its parameter, the sizes that are run, and its change of the model.
 
     sizes: at 1.0x, in the parameter's unit, ascending, the null among them; larger: more of them, for units
-    at whose scale the bound is beyond the last. body: of a body and a size; materials: of those without it,
-    the mesh and a size; model, in place of the base's, and load (n, 3) in N: of a body, its mesh and a size.
-    Effects combine, each applied to the result of the others. has_gravity: whether it depends on gravity's
-    direction. newton: of its runs. length: the power of a length by which the size of the same change grows
-    with the unit, at the same moduli and pressures. Raises InputError where sizes lack the null or leave the
-    bounds.
+    at whose scale the bound is beyond the last; first: those that a first look at the effect needs. body: of
+    a body and a size; materials: of those without it, the mesh and a size; model, in place of the base's, and
+    load (n, 3) in N: of a body, its mesh and a size. Effects combine, each applied to the result of the
+    others. has_gravity: whether it depends on gravity's direction. newton: of its runs. length: the power of
+    a length by which the size of the same change grows with the unit, at the same moduli and pressures.
+    Raises InputError where sizes lack the null or leave the bounds.
     """
 
     name: str
@@ -160,6 +160,7 @@ class UnitEffect:
     newton: NewtonSettings = SMOOTH
     length: int = 0
     larger: tuple[float, ...] = ()
+    first: tuple[float, ...] = ()
 
     def __attrs_post_init__(self) -> None:
         p = self.parameter
@@ -172,6 +173,10 @@ class UnitEffect:
         needed = self.parameter.high / enlarged**self.length
         beyond = sum(s < needed * (1 - 1e-9) for s in every)
         return every[: beyond + 1]
+
+    def first_at(self, enlarged: float) -> tuple[float, ...]:
+        """Those of `sizes_at` that a first look needs, the null among them."""
+        return tuple(s for s in self.sizes_at(enlarged) if s == self.parameter.null or s in self.first)
 
 
 def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
@@ -346,12 +351,14 @@ EFFECTS = {
             has_gravity=True,
             length=-1,
             larger=(6000.0, 9000.0),
+            first=(1300.0,),
         ),
         UnitEffect(
             "strain_stiffening",
             _shared(coupon.EFFECTS, "strain_stiffening"),
             (-0.03, 0.0, 0.1, 0.4, 1.0, 2.0),
             materials=_stiffening,
+            first=(1.0,),
         ),
         UnitEffect(
             "overcure",
@@ -360,6 +367,7 @@ EFFECTS = {
             body=_overcured,
             length=1,
             larger=(0.34,),
+            first=(0.14,),
         ),
         UnitEffect(
             "skin_cure",
@@ -368,6 +376,7 @@ EFFECTS = {
             body=_skinned,
             length=1,
             larger=(0.54,),
+            first=(0.2,),
         ),
         UnitEffect(
             "wall_thickness",
@@ -376,12 +385,14 @@ EFFECTS = {
             ),
             (0.8, 0.9, 1.0, 1.15, 1.3),
             body=_thickened,
+            first=(0.8, 1.3),
         ),
         UnitEffect(
             "anisotropy",
             attrs.evolve(_shared(coupon.EFFECTS, "anisotropy"), low=-0.6, high=3.0, starts=(-0.3, 0.3)),
             (-0.6, -0.3, 0.0, 0.5, 1.3, 3.0),
             materials=_layered,
+            first=(-0.3, 1.3),
         ),
         UnitEffect(
             "tension_compression_asymmetry",
@@ -390,18 +401,21 @@ EFFECTS = {
             (-0.8, -0.4, 0.0, 0.5, 1.5, 4.0),
             materials=_asymmetric,
             newton=KINKED,
+            first=(-0.4, 1.5),
         ),
         UnitEffect(
             "clogged_chamber",
             Parameter("share_lost", "", 0.0, 1.0, 0.0, (0.1, 0.5), "of the pressure, in the last chambers"),
             (0.0, 0.3, 0.65, 1.0),
             model=_clogged,
+            first=(0.65,),
         ),
         UnitEffect(
             "mesh_error",
             Parameter("share", "", 0.0, 2.0, 0.0, (1.0,), "1: the finer mesh; beyond: the way further on"),
             (0.0, 1.0),
             body=_refined,
+            first=(1.0,),
         ),
     )
 }
@@ -414,6 +428,7 @@ HELD = UnitEffect(
     body=lambda body, more_mm: attrs.evolve(body, gap_mm=(body.gap_mm or 0.0) + more_mm),
     length=1,
     larger=(4.5,),
+    first=(1.5,),
 )
 
 # A flat obstacle in a run; its position depends on the free unit's range, see prediction/flat_obstacle.

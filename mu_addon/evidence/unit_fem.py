@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from .prediction import blocked_force, pose, step
 from .prediction.flat_obstacle import NAME as CONTACT
 from .prediction.flat_obstacle import NEAREST, ObstacleResponse
 from .prediction.unit import KIND, UnitResponse, Variant
-from .unit_effects import EFFECTS, HELD, Body
+from .unit_effects import EFFECTS, HELD, Body, UnitEffect
 from .unit_run import Result, Run, effect_of, run
 
 Array = np.ndarray[Any, Any]
@@ -55,6 +55,7 @@ LEAST_CHANGE = 0.05
 CONTACT_SHARE = 0.2
 # Walls as shares of how far the free unit gets, pressures as shares of the way on from where one is met.
 REACHES = (0.2, 0.5, NEAREST)
+FIRST_REACHES = (0.5,)
 SHARES = (0.15, 0.4, 0.7, 1.0)
 MESH_ERROR = "mesh_error"
 # Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
@@ -78,8 +79,9 @@ class UnitSettings:
     walls, whose changes of the response are taken over in proportion, or None for the model's: what is
     between these two is then fitted beside every hypothesis (`FARTHER`), in place of mesh_error. pressures:
     their approximate number; margin: beyond the measured ones, as a share of their range. effects: names of
-    those to run. distal: chambers behind a clog. lattice: a law for the lattice in place of the unit's
-    moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
+    those to run; whole: of those run at every size, the others at `UnitEffect.first` alone and believed no
+    further, or None for all. distal: chambers behind a clog. lattice: a law for the lattice in place of the
+    unit's moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
     `UnitResponse`. self_contact: of walls and struts of a resolved unit. workers: processes, one a core.
     """
 
@@ -89,6 +91,7 @@ class UnitSettings:
     pressures: int = 12
     margin: float = 0.05
     effects: tuple[str, ...] = KNOWN
+    whole: frozenset[str] | None = None
     distal: int = 1
     lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
@@ -101,8 +104,15 @@ class UnitSettings:
         """Settings for a unit simulated homogenised or resolved (`MeshSettings.fidelity`)."""
         if fidelity != HOMOGENISED:
             mesh, changes = (attrs.evolve(mesh, fidelity=fidelity) for mesh in (STRUTS, STRUTS_COARSE))
-            return cls(mesh, changes=changes, self_contact=self_contact)
+            return cls(mesh, changes=changes, whole=frozenset(), self_contact=self_contact)
         return cls(self_contact=self_contact)
+
+    def further(self, names: Collection[str]) -> UnitSettings | None:
+        """With those of some effects at every size that are not yet; None where all are."""
+        more = frozenset({*KNOWN, HELD.name}.intersection(names))
+        if self.whole is None or more <= self.whole:
+            return None
+        return attrs.evolve(self, whole=self.whole | more)
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(self.mesh, self.self_contact)
@@ -284,11 +294,13 @@ def similar(unit: Unit) -> Unit:
 class _Plan:
     """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large.
 
-    changes: the mesh of effects and walls. readings_kPa: the least and the greatest.
+    changes: the mesh of effects and walls. whole: effects at every size (`UnitSettings`). readings_kPa: the
+    least and the greatest.
     """
 
     body: Body
     changes: MeshSettings | None
+    whole: frozenset[str] | None
     scale: float
     enlarged: float
     orientations: tuple[tuple[float, Direction], ...]
@@ -330,6 +342,7 @@ class _Plan:
         return cls(
             body,
             settings.changes,
+            settings.whole,
             scale,
             enlarged,
             _orientations(here),
@@ -375,9 +388,20 @@ class _Plan:
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
             effect = effect_of(name)
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
-                for size in effect.sizes_at(self.enlarged):
+                for size in self.sizes(effect):
                     if size != effect.parameter.null:
                         yield self.case(name, size, orientation)
+
+    def sizes(self, effect: UnitEffect) -> tuple[float, ...]:
+        """Sizes of an effect that are run, its null among them."""
+        if self.whole is None or effect.name in self.whole:
+            return effect.sizes_at(self.enlarged)
+        return effect.first_at(self.enlarged)
+
+    @property
+    def reaches(self) -> tuple[float, ...]:
+        """Walls that are run, as shares of how far the free unit gets."""
+        return REACHES if self.whole is None or CONTACT in self.whole else FIRST_REACHES
 
     def base(self, found: dict[str, Result]) -> Result:
         """The free unit's angle, volume and places, or the force of a held one."""
@@ -412,7 +436,7 @@ class _Plan:
         from scipy.interpolate import PchipInterpolator
 
         for side, (pressure, outward) in self.free(found).items():
-            for reach in REACHES:
+            for reach in self.reaches:
                 gap = (1 - reach) * outward[-1]
                 met = float(PchipInterpolator(outward, pressure)(gap))
                 steps = sorted(met + s * (pressure[-1] - met) for s in SHARES)
@@ -495,7 +519,7 @@ class _Plan:
         sizes: list[float] = []
         missed: list[float] = []
         values: list[Array] = []
-        for size in effect.sizes_at(self.enlarged):
+        for size in self.sizes(effect):
             if size == null:
                 result = base
             else:
@@ -510,7 +534,8 @@ class _Plan:
                 _warn(f"{name} = {size * grown:g} at {self.scale:g}x is left out: {result.why}")
         if len(sizes) < 2:
             return None
-        # Beyond a size that could not be computed the effect is unknown.
+        # Beyond a size that was not, or could not be, computed the effect is unknown.
+        missed += [size * grown for size in effect.sizes_at(self.enlarged) if size not in self.sizes(effect)]
         low = sizes[0] if any(m < sizes[0] for m in missed) else -math.inf
         high = sizes[-1] if any(m > sizes[-1] for m in missed) else math.inf
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import Effect, Parameter
+from .effect import OF, Effect, Parameter
 from .fit import Fit, Fitter
 from .fitted_zeros import FittedZeros, fitted_zeros
 from .gain import Gain, gain
@@ -38,6 +38,9 @@ from .simulator import Composite
 from .steps import STEPS, begun, unlikely
 
 Array = np.ndarray[Any, Any]
+
+# Of what the best effect takes, what another must take for the verdict to turn on it, and at a bound.
+NEAR, SOME = 0.5, 0.1
 
 
 @attrs.frozen(eq=False)
@@ -86,6 +89,24 @@ class Verdict:
             return frozenset()
         rivals = {r for c in self.selection.causes for title in c.rivals for r in title.split(TOGETHER)}
         return frozenset(self.names) | rivals
+
+    @property
+    def in_question(self) -> frozenset[str]:
+        """Names of effects that the verdict turns on; none where it is `none`.
+
+        Those chosen, their rivals, and those that alone take `NEAR` of what the best takes, or `SOME` of it
+        as far as they are believed.
+        """
+        if self.kind == "none":
+            return frozenset()
+        found, names = self.selection, set(self.selection.chosen.names)
+        taken = [(f, found.base.chi2 - f.chi2) for f in (*found.singles, *found.wider)]
+        most = max((gain for _, gain in taken), default=0.0)
+        names |= {
+            f.names[0] for f, gain in taken if gain > NEAR * most or (gain > SOME * most and at_a_bound(f))
+        }
+        titles = [t for c in found.causes for title in c.rivals for t in title.split(TOGETHER)]
+        return frozenset(names | {t.split(OF)[0] for t in titles})
 
     def _share(self, cause: Cause) -> float:
         """Share of the base model's misfit that returns where one of several causes is taken away."""

@@ -31,7 +31,7 @@ from mu_addon.fem.clogged import CloggedModel
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.measured.pose import at_rest
+from mu_addon.measured.pose import X, at_rest
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic
@@ -486,8 +486,44 @@ def test_what_acts_both_ways_is_sought_from_both_sides(name):
     assert min(p.starts) < p.null < max(p.starts)
 
 
+def test_a_first_look_runs_few_sizes_and_a_name_asks_for_the_others():
+    settings = UnitSettings(whole=frozenset())
+    plan = _Plan(
+        Body(UNIT), None, settings.whole, 1.0, 1.0, ((0.0, X),), (-6.0, 0.0, 8.0, 12.0), (-6.0, 12.0), (), ()
+    )
+    sizes = {n: [r.size for r in plan.runs(settings) if r.effect == n] for n in EFFECTS}
+    assert max(map(len, sizes.values())) <= 2
+    assert min(map(len, sizes.values())) == 1
+    assert sizes["wall_thickness"] == [0.8, 1.3]
+    further = settings.further({"wall_thickness", "leak"})
+    assert further is not None
+    assert further.whole == {"wall_thickness"}
+    assert further.further(("wall_thickness",)) is None
+    assert attrs.evolve(plan, whole=further.whole).sizes(EFFECTS["wall_thickness"]) == (
+        0.8,
+        0.9,
+        1.0,
+        1.15,
+        1.3,
+    )
+
+
+def test_an_effect_is_believed_no_further_than_a_first_look_at_it():
+    plan = _Plan(
+        Body(UNIT), None, frozenset(), 1.0, 1.0, ((0.0, X),), (-6.0, 0.0, 8.0, 12.0), (-6.0, 12.0), (), ()
+    )
+    rest = Result(np.array([[-2.0, 0.0, 3.0, 5.0]]))
+    found = {r.key(): rest for r in plan.runs(UnitSettings(whole=frozenset()))}
+    kept = np.ix_([0], range(4))
+    bounds = {}
+    for name in ("strain_stiffening", "wall_thickness"):
+        p = plan._variant(name, (0.0, X), rest, found, kept).parameter
+        bounds[name] = p.low, p.high
+    assert bounds == {"strain_stiffening": (0.0, 1.0), "wall_thickness": (0.8, 1.3)}
+
+
 def test_a_change_goes_on_beyond_the_readings_alone():
-    plan = _Plan(Body(UNIT), ROUGH, 1.0, 1.0, (), (-12.0, -8.0, 0.0, 8.0, 12.0), (-9.0, 12.0), (), ())
+    plan = _Plan(Body(UNIT), ROUGH, None, 1.0, 1.0, (), (-12.0, -8.0, 0.0, 8.0, 12.0), (-9.0, 12.0), (), ())
     reference = Result(np.array([[-32.0, -13.0, 0.0, 5.0, 7.0]]))
     ended = Result(np.array([[np.nan, -11.0, 0.0, 4.0, np.nan]]), "it collapses")
     found = plan._continued(ended, reference)

@@ -48,6 +48,7 @@ def test_nothing_wrong_is_called_none():
     # What these data cannot show is said all the same, and why.
     assert "modulus" in found.identifiability["pressure_gain"]
     assert "zero" in found.identifiability["angle_offset"]
+    assert found.in_question == frozenset()
 
 
 def test_one_effect_is_named_with_its_size(lagging):
@@ -56,6 +57,9 @@ def test_one_effect_is_named_with_its_size(lagging):
     low, high = found.intervals["rate_independent_hysteresis.share"]
     assert low < 0.05 < high
     assert high - low < 0.04
+    # What a first look at each effect leaves out is asked for no more than this.
+    assert "rate_independent_hysteresis" in found.in_question
+    assert "clogged_chamber" not in found.in_question
 
 
 def test_a_gain_is_measured_where_nothing_was_fitted(lagging):

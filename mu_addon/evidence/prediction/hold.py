@@ -28,6 +28,8 @@ AIR_GAMMA = 1.4
 SUPPLY_K = 5.0
 # Pressure outside over that inside below which flow through a hole grows no more.
 CHOKED = (2 / (AIR_GAMMA + 1)) ** (AIR_GAMMA / (AIR_GAMMA - 1))
+# Steps of a hold, at least; where more are wanted; in the onset of creep; in the time constant of a leak.
+FEW_STEPS, MANY_STEPS, MANY, STEPS = 50, 200, 12, 4
 # Creep is spread over these decades after its onset.
 DECADES = 6
 # Parameters of cooling at two rates beside its size, and their values where none are given.
@@ -310,28 +312,49 @@ def chamber_pressure(
     V = 1 + C (p - p_i) + sum over decades d of c x_d, where x_d follows p with the time onset 10^d,
     + g p log10(1 + t/s) + f p (t/100 s)^n.
     """
-    from scipy.interpolate import CubicSpline
-
     end = float(time_s[-1])
     leaks = loss_per_s or hole_per_s or loss_until_tight_per_s or loss_above_per_s
     creeps = creep_per_kPa or growth_per_kPa or findley_per_kPa
+    compliance = compliance_per_kPa
+
+    def softness(t: Array) -> Array:
+        """Growth of the volume, in 1/kPa, by creep in proportion to the pressure at that time."""
+        found = growth_per_kPa * np.log10(1.0 + t / begins_s) if growth_per_kPa else np.zeros_like(t)
+        return found + findley_per_kPa * (t / 100.0) ** findley_power if findley_per_kPa else found
+
+    def warmed(t: Array) -> Array:
+        """Temperature of the gas over that at the start."""
+        warm = np.ones_like(t)
+        if cooling_K:
+            warm += cooling_K * np.expm1(-t / cooling_s) / (ROOM_K + cooling_K)
+        if warmth:
+            excess_K = warmth * _adiabatic_K(start / ATMOSPHERE_kPa)
+            warm += excess_K * np.expm1(-t / cools_s) / (ROOM_K + excess_K)
+        if cooling_per_kPa:
+            first_s, later, times = rates
+            excess_K = cooling_per_kPa * initial_kPa
+            cooled = (1.0 - later) * np.expm1(-t / first_s) + later * np.expm1(-t / (times * first_s))
+            warm += excess_K * cooled / (ROOM_K + excess_K)
+        return warm
+
     if not (leaks or creeps or cooling_K or warmth or cooling_per_kPa) or end <= 0:
         return np.full(len(time_s), float(initial_kPa))
     start = initial_kPa + ATMOSPHERE_kPa
-    # Runge and Kutta's method is stable below 2.8 steps a time constant; four steps are accurate.
-    steps = int(np.clip(4 * end * leaks * start / ATMOSPHERE_kPa, 200, 20000))
+    # Runge and Kutta's method is stable below 2.8 steps a time constant, and four are accurate. What begins
+    # or ends at a moment needs more of them.
+    abrupt = loss_until_tight_per_s or loss_above_per_s or hole_per_s * end > 1.0
+    fast_s = 0.0 if abrupt else onset_s if creep_per_kPa else end
+    lost = end * leaks * start / ATMOSPHERE_kPa
+    wanted = max(FEW_STEPS, MANY * end / max(fast_s, 1e-9), 8 * STEPS * lost)
+    steps = int(np.clip(max(min(wanted, MANY_STEPS), STEPS * lost), 1, 20000))
     t = np.linspace(0.0, end, 2 * steps + 1)
-    warm = np.ones_like(t)
-    if cooling_K:
-        warm += cooling_K * np.expm1(-t / cooling_s) / (ROOM_K + cooling_K)
-    if warmth:
-        excess_K = warmth * _adiabatic_K(start / ATMOSPHERE_kPa)
-        warm += excess_K * np.expm1(-t / cools_s) / (ROOM_K + excess_K)
-    if cooling_per_kPa:
-        first_s, later, times = rates
-        excess_K = cooling_per_kPa * initial_kPa
-        cooled = (1.0 - later) * np.expm1(-t / first_s) + later * np.expm1(-t / (times * first_s))
-        warm += excess_K * cooled / (ROOM_K + excess_K)
+    warm = warmed(t)
+    flow = _seeping(loss_per_s or loss_until_tight_per_s, inertia)
+    if hole_per_s:
+        flow = _through_a_hole(hole_per_s)
+    elif loss_above_per_s:
+        flow = _above(loss_above_per_s, 1.0 + opens_kPa / ATMOSPHERE_kPa)
+    soft = softness(t)
     p, grown = np.full_like(t, initial_kPa), np.zeros_like(t)
     for _ in range(50):
         before = p
@@ -340,32 +363,33 @@ def chamber_pressure(
                 first_order_lag(t, p, tau) - p[0] * np.exp(-t / tau)
                 for tau in onset_s * 10.0 ** np.arange(DECADES)
             )
-        elif growth_per_kPa:
-            grown = growth_per_kPa * p * np.log10(1.0 + t / begins_s)
-        elif findley_per_kPa:
-            grown = findley_per_kPa * p * (t / 100.0) ** findley_power
-        gas = np.ones_like(t)
-        flow = _seeping(loss_per_s or loss_until_tight_per_s, inertia)
-        if hole_per_s:
-            flow = _through_a_hole(hole_per_s)
-        elif loss_above_per_s:
-            flow = _above(loss_above_per_s, 1.0 + opens_kPa / ATMOSPHERE_kPa)
-        if leaks:
-            gas = _lost(t, warm, grown, start, flow, compliance_per_kPa)
+        rest = 1 + grown - compliance * start - soft * ATMOSPHERE_kPa
+        gas = _lost(t, start * warm, rest, compliance + soft, start, flow) if leaks else np.ones_like(t)
         if loss_until_tight_per_s and tight_s < end:
             gas = np.interp(np.minimum(t, tight_s), t, gas)
-        p = _pressure(start, gas * warm, grown, compliance_per_kPa) - ATMOSPHERE_kPa
-        if not creeps or np.abs(p - before).max() < 1e-8 * start:
+        p = _pressure(start * gas * warm, rest, compliance + soft) - ATMOSPHERE_kPa
+        if not creep_per_kPa or np.abs(p - before).max() < 1e-8 * start:
             break
     found, after = np.full(len(time_s), p[0]), time_s > 0
-    found[after] = CubicSpline(t, p)(time_s[after])
-    if findley_per_kPa:
-        # A power below 1 begins with no finite slope, which no spline follows.
-        amount = CubicSpline(t, gas * warm)(time_s[after])
-        for _ in range(50):
-            grown = findley_per_kPa * found[after] * (time_s[after] / 100.0) ** findley_power
-            found[after] = _pressure(start, amount, grown, compliance_per_kPa) - ATMOSPHERE_kPa
+    # What has a formula is taken at the times themselves: no cubic follows a fast beginning.
+    own = time_s[after]
+    amount = start * _between(gas, own / end) * warmed(own)
+    rest = 1 + _between(grown, own / end) - compliance * start - softness(own) * ATMOSPHERE_kPa
+    found[after] = _pressure(amount, rest, compliance + softness(own)) - ATMOSPHERE_kPa
     return found
+
+
+def _between(values: Array, shares: Array) -> Array:
+    """Values (n,) at even places, at shares (m,) of the way along them, by cubics through four neighbours.
+
+    As accurate as a spline, without its equations.
+    """
+    at = shares * (len(values) - 1)
+    first = np.clip(at.astype(np.int64) - 1, 0, len(values) - 4)
+    u = at - first
+    v, w, x = u - 1.0, u - 2.0, u - 3.0
+    a, b, c, d = (values[first + k] for k in range(4))
+    return np.asarray(v * w * (d * u - a * x) / 6.0 + u * x * (b * w - c * v) / 2.0)
 
 
 # Derivatives by what the gauge adds need the same chamber again.
@@ -411,52 +435,40 @@ def _through_a_hole(hole: float) -> Callable[[float], float]:
     return flow
 
 
-def _pressure(start: float, gas: Any, grown: Any, compliance: float) -> Any:
-    """Absolute pressure of an amount of warm gas in a chamber grown by a share, and by its compliance."""
-    rest = 1 + grown
-    if not compliance:
-        return start * gas / rest
-    # P (rest + C (P - P_i)) = P_i gas.
-    b = rest - compliance * start
-    return (-b + np.sqrt(b * b + 4 * compliance * start * gas)) / (2 * compliance)
+def _pressure(amount: Array, rest: Array, soft: Array) -> Array:
+    """Absolute pressures P in kPa with P (rest + soft P) = amount."""
+    return np.asarray(2.0 * amount / (rest + np.sqrt(rest * rest + 4.0 * soft * amount)))
 
 
 def _lost(
-    t: Array,
-    warm: Array,
-    grown: Array,
-    start: float,
-    flow: Callable[[float], float],
-    compliance: float,
+    t: Array, per_gas: Array, rest: Array, soft: Array, start: float, flow: Callable[[float], float]
 ) -> Array:
     """Share of the gas (2 n + 1,) left at times of which every second is a step.
 
-    flow: rate in 1/s, of the gas of the chamber at one atmosphere, at a pressure in atmospheres.
+    per_gas, rest, soft (2 n + 1,): amounts in kPa of all gas, as in `_pressure`. flow: rate in 1/s, of the
+    gas of the chamber at one atmosphere, at a pressure in atmospheres.
     """
-    rate = ATMOSPHERE_kPa / start
-    # In a rigid chamber the pressure, in atmospheres, is this times the gas.
-    per_gas = (start / ATMOSPHERE_kPa * warm / (1 + grown)).tolist()
-    W, G = warm.tolist(), grown.tolist()
-
-    def slope(gas: float, i: int) -> float:
-        P = float(_pressure(start, gas * W[i], G[i], compliance)) / ATMOSPHERE_kPa
-        return -rate * flow(P)
-
-    h = float(t[2] - t[0])
+    rate, h = ATMOSPHERE_kPa / start, float(t[2] - t[0])
     gas, found = 1.0, [1.0]
+    if soft.any():
+        A, R, S = (per_gas / ATMOSPHERE_kPa).tolist(), rest.tolist(), (4.0 * ATMOSPHERE_kPa * soft).tolist()
+
+        def slope(gas: float, i: int) -> float:
+            amount, r = A[i] * gas, R[i]
+            return -rate * flow(2.0 * amount / (r + math.sqrt(r * r + S[i] * amount)))
+
+    else:
+        # In a rigid chamber the pressure, in atmospheres, is this times the gas.
+        A = (per_gas / rest / ATMOSPHERE_kPa).tolist()
+
+        def slope(gas: float, i: int) -> float:
+            return -rate * flow(gas * A[i])
+
     for i in range(0, len(t) - 2, 2):
-        if compliance:
-            k1 = slope(gas, i)
-            k2 = slope(gas + h / 2 * k1, i + 1)
-            k3 = slope(gas + h / 2 * k2, i + 1)
-            k4 = slope(gas + h * k3, i + 2)
-        else:
-            # The same, with a call less for each slope: a fit asks for thousands of holds.
-            half = per_gas[i + 1]
-            k1 = -rate * flow(gas * per_gas[i])
-            k2 = -rate * flow((gas + h / 2 * k1) * half)
-            k3 = -rate * flow((gas + h / 2 * k2) * half)
-            k4 = -rate * flow((gas + h * k3) * per_gas[i + 2])
+        k1 = slope(gas, i)
+        k2 = slope(gas + h / 2 * k1, i + 1)
+        k3 = slope(gas + h / 2 * k2, i + 1)
+        k4 = slope(gas + h * k3, i + 2)
         middle = gas + h / 24 * (5 * k1 + 4 * k2 + 4 * k3 - k4)
         gas += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         found += [middle, gas]

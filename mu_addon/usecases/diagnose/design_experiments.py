@@ -152,7 +152,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     Raises InputError, OutputError.
     """
     measured, progress = job.measured, context.progress
-    settings = UnitSettings.of(job.fidelity, job.self_contact)
+    settings = attrs.evolve(UnitSettings.of(job.fidelity, job.self_contact), whole=None)
     simulators, remarks = simulators_of(
         measured.experiments, job.subject, folder / "cache", progress, settings
     )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -35,6 +35,9 @@ from .job import LAYOUT, Job, read_job
 from .report import write_report
 from .simulators import simulations_plan, simulators_of
 from .words import advice, readable, sentence, to_do
+
+if TYPE_CHECKING:
+    from ...evidence.unit_fem import UnitSettings
 
 # Of a unit, but not before its weight, or the place of what holds it, is simulated.
 LATER = ("unit_pose", "blocked_force")
@@ -84,13 +87,16 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     first = _first_look(job, folder, progress, known)
     if first:
         context.summary["first_look"] = first
-    simulators, notes = simulators_of(
-        measured.experiments, unit, folder / "cache", progress, job.unit_settings
-    )
-    simulator = Composite(simulators, known=known)
+    settings: UnitSettings | None = job.unit_settings
+    while settings is not None:
+        simulators, notes = simulators_of(measured.experiments, unit, folder / "cache", progress, settings)
+        simulator = Composite(simulators, known=known)
+        with _stages(progress) as on_model:
+            verdict = diagnose(measured.experiments, simulator, on_model)
+        # A first look at each effect tells which ones need all their sizes.
+        of_a_unit = any(e.kind in OF_A_UNIT for e in measured.experiments)
+        settings = settings.further(verdict.in_question) if of_a_unit else None
     notes += _known_before(job, simulator)
-    with _stages(progress) as on_model:
-        verdict = diagnose(measured.experiments, simulator, on_model)
     model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
     if isinstance(block, lattice.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
