@@ -80,7 +80,8 @@ parameter = "material.lattice_modulus_kPa"
 low = 10
 high = 30
 """
-PLACE = ["--preset", "mu-1.0x", "--refine", "0.4", "--order", "1", "--times", "7", "--stations", "11"]
+PLACE = ["--fidelity", "homogenised", "--preset", "mu-1.0x", "--refine", "0.4", "--order", "1"]
+PLACE += ["--times", "7", "--stations", "11"]
 # The printed body of three chambers at one pressure: the least that has every stage.
 RESOLVED = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--fidelity", "resolved", "--refine", "0.4"]
 RESOLVED += ["--times", "2", "--stations", "5", "--no-mesh-check"]
@@ -106,6 +107,7 @@ preset = "mu-1.0x"
 pressure_kPa = [0.0, 30.0]
 """
 CHAIN_PROTOCOL = "time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,30,10\n"
+GRIP = ["--coarse", "--no-paths", "--cube", "25", "--refine", "0.25"]
 MOST_S = 5.0
 COMMANDS = {
     "sweep": ["sweep", "sweep.toml"],
@@ -115,7 +117,7 @@ COMMANDS = {
     "place, resolved": ["place", *RESOLVED],
     "simulate": ["simulate", "--unit", "unit.toml", "--refine", "0.4", "--times", "3"],
     "homogenize": ["homogenize", "--preset", "mu-1.0x", "--cells", "2", "--refine", "0.5"],
-    "grip": ["grip", "--preset", "gripper", "--coarse", "--no-paths", "--cube", "25", "--refine", "0.3"],
+    "grip": ["grip", "--preset", "gripper", "--fidelity", "homogenised", *GRIP],
     "chain": ["chain", "chain.toml"],
     "diagnose": ["diagnose", str(ROOT / "assets/examples/paper-moduli")],
     "fit-material": ["fit-material", str(ROOT / "tests/data/treloar")],
