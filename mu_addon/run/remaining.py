@@ -9,8 +9,8 @@ from ..errors import InputError
 from ..reading import file_bytes, parse_json
 from .progress_estimate import Plan
 
-LOADED = 0.05
-"""Share of a stage's seconds that it takes to load its finished work."""
+LOADED, LOADED_S = 0.2, 1.5
+"""Largest share of a stage's seconds, and largest seconds, in which its finished work is loaded."""
 
 
 def shares_done(folder: Path) -> dict[str, float]:
@@ -44,7 +44,9 @@ def remaining(plan: Plan, done: dict[str, float], kept: Iterable[str]) -> Plan:
     """
     beginnings = tuple(kept)
 
-    def left(name: str) -> float:
-        return max(1.0 - done.get(name, 0.0), LOADED) if name.startswith(beginnings) else 1.0
+    def left(name: str, seconds: float) -> float:
+        if not name.startswith(beginnings):
+            return seconds
+        return max((1.0 - done.get(name, 0.0)) * seconds, min(LOADED * seconds, LOADED_S))
 
-    return [(name, seconds * left(name)) for name, seconds in plan]
+    return [(name, left(name, seconds)) for name, seconds in plan]

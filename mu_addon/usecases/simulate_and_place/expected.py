@@ -15,7 +15,7 @@ BEST = "solid with the best path"
 """Stage of the printable unit with the path that a ranking chose."""
 FULL_S = {
     "solid": 1.5, "mesh": 1.5, "Model A": 32.0, "candidates": 15.0, "mesh check": 20.0, "map": 8.0,
-    "light": 7.0, BEST: 1.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
+    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
     "motion of the best path": 60.0, "report": 14.0,
 }  # fmt: skip
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
