@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -35,16 +36,18 @@ def slowed_by_load() -> float:
 
 
 def slowed_so_far() -> float:
-    """How many times slower other work has made this process: by what it waited for a core, on Linux.
+    """How many times slower other work makes this process: by what it waited for a core, and by the load.
 
-    By the load where the system does not count that, or this process has hardly run yet.
+    Their geometric mean, as its wait is that of a second or two. By the load alone where the system does not
+    count waits, or this process has hardly run yet.
     """
     try:
         with open("/proc/self/schedstat", encoding="ascii") as file:
             ran_ns, waited_ns, _ = map(int, file.read().split())
     except (OSError, ValueError):
         return slowed_by_load()
-    return (ran_ns + waited_ns) / ran_ns if ran_ns > RAN_NS else slowed_by_load()
+    by_wait = (ran_ns + waited_ns) / ran_ns if ran_ns > RAN_NS else slowed_by_load()
+    return math.sqrt(by_wait * slowed_by_load())
 
 
 def end_with_parent() -> None:
