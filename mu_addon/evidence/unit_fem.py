@@ -59,8 +59,8 @@ FIRST_REACHES = (0.5,)
 SHARES = (0.15, 0.4, 0.7, 1.0)
 MESH_ERROR = "mesh_error"
 # Of the way from the mesh of changes to the model's, how much farther the answer may lie: a third of it by
-# the order of the elements. In suction, where walls close, the error is another: there it may differ.
-FARTHER = 0.5
+# the order of the elements. In suction, where walls close, it is another at each pressure.
+FARTHER, UNEVEN = 0.5, 0.25
 KNOWN = (*EFFECTS, CONTACT)
 # A second code with another mesh and another volumetric law, the same unit: its angles are ours at pressures
 # changed by 0.047 of the largest one times the square of their share of it.
@@ -571,17 +571,18 @@ class _Plan:
         return Result(base.values + ratio * (result.values - reference.values), result.why)
 
     def _mesh_errors(self, base: Result, coarser: Result, kept: Any) -> dict[str, Variant]:
-        """Errors of the model's mesh, by the way from the coarser one's: everywhere, and more in suction."""
+        """Errors of the model's mesh, by the way from the coarser one's: everywhere, and at each suction."""
         if not self.changes:
             return {}
         at, way = np.array(self.pressures_kPa), base.values - coarser.values
-        shares = {"mesh_share": np.ones_like(at)}
-        if at.min() < 0:
-            shares["mesh_share_in_suction"] = np.clip(at / at.min(), 0.0, None)
-        sizes, most, found = np.array([0.0, 1.0]), 10.0 * FARTHER, {}
-        for name, share in shares.items():
+        sucking = [i for i in kept[1].ravel() if at[i] < 0]
+        shares = {"mesh_share": (np.ones_like(at), FARTHER)}
+        shares |= {f"mesh_share_{-at[i]:.3g}_kPa_below": (np.eye(len(at))[i], UNEVEN) for i in sucking}
+        sizes, found = np.array([0.0, 1.0]), {}
+        for name, (share, spread) in shares.items():
             name += "_held" * self.held
-            p = Parameter(name, "", -most, most, 0.0, source="two meshes differ by 1", spread=FARTHER)
+            most = 10.0 * spread
+            p = Parameter(name, "", -most, most, 0.0, source="two meshes differ by 1", spread=spread)
             values = [(self.larger * (base.values + size * share * way))[kept] for size in sizes]
             found[name] = Variant(p, sizes, np.array(values))
         return found

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.prediction.unit import DISCREPANCIES, UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_fem import DISCREPANCY, FARTHER
+from mu_addon.evidence.unit_fem import DISCREPANCY, FARTHER, UNEVEN
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
@@ -96,16 +96,20 @@ def test_a_discrepancy_changes_nothing_at_rest_and_most_at_the_largest_pressure(
 
 
 def on_two_meshes(errors):
-    """The written unit's angle, 6 % of it from a coarser mesh's in suction, with and without these errors."""
+    """The written unit's angle, 6 % of it from a coarser mesh's in suction, with and without these errors.
+
+    The finer one lies 0.2 to 0.6 of the way beyond, as walls happen to touch.
+    """
     whole = known(DISCREPANCY)
     at = whole.pressures_kPa
-    shares = {"mesh_share": np.ones_like(at), "mesh_share_in_suction": np.clip(at / at.min(), 0.0, None)}
+    shares = [("mesh_share", np.ones_like(at), FARTHER)]
+    shares += [(f"mesh_share_{-p:.3g}_kPa_below", 1.0 * (at == p), UNEVEN) for p in at[at < 0]]
     way = np.where(at < 0, 0.06, 0.01) * whole.values
     variants = dict(whole.variants)
-    for name, share in shares.items() if errors else ():
-        p = Parameter(name, "", -5.0, 5.0, 0.0, spread=FARTHER)
+    for name, share, spread in shares if errors else ():
+        p = Parameter(name, "", -5.0, 5.0, 0.0, spread=spread)
         variants[name] = Variant(p, [0.0, 1.0], [whole.values, whole.values + share * way])
-    return attrs.evolve(whole, variants=variants), whole.values[0] + 0.8 * way[0]
+    return attrs.evolve(whole, variants=variants), whole.values[0] + np.resize([0.6, 0.2], len(at)) * way[0]
 
 
 @pytest.mark.parametrize("errors", [True, False])

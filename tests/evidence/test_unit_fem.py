@@ -451,10 +451,12 @@ def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     away = np.abs(changes[0]) > 0.1 * np.abs(changes[0]).max()
     miss = [np.abs(c - changes[0])[away] / np.abs(changes[0])[away] for c in changes[1:]]
     assert miss[0].max() < 0.5 * miss[1].max()
-    # What is between both meshes stands beside every hypothesis, in suction with a size of its own.
+    # What is between both meshes stands beside every hypothesis, at each suction with a size of its own.
     way, at = found.values - coarse.values, found.pressures_kPa
-    more = np.clip(at / at.min(), 0.0, None)
-    for name, share in (("mesh_share", 1.0), ("mesh_share_in_suction", more)):
+    shares = {"mesh_share": np.ones_like(at)}
+    shares |= {f"mesh_share_{-p:.3g}_kPa_below": 1.0 * (at == p) for p in at[at < 0]}
+    assert len(shares) == 2
+    for name, share in shares.items():
         error = found.variants[name]
         np.testing.assert_allclose(error.values[-1] - found.values, share * way, atol=1e-12)
         assert error.parameter in UnitPressure([found], tests).nuisances

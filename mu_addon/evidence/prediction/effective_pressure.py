@@ -118,7 +118,7 @@ def spread_lag(t: Array, p: Array, values: Mapping[str, float], longer: float = 
     return np.asarray(sum(first_order_lag(t, p, time) for time in times.tolist()) / TIMES)
 
 
-def lag_weights(h: Any, time_s: float) -> tuple[Any, Any, Any]:
+def lag_weights(h: Any, time_s: Any) -> tuple[Any, Any, Any]:
     """Weights of `first_order_lag` over steps h in s, for its state and for both ends of p."""
     a = np.exp(-h / time_s)
     mean = -np.expm1(-h / time_s) * time_s / h
