@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -60,9 +61,23 @@ def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array
     """
     from scipy.linalg.lapack import ztbtrs
 
+    stays, grows, band = _swing(time_s.tobytes(), hertz, damping)
     w = 2.0 * math.pi * hertz
     rate = w * (-damping + 1j * math.sqrt(1.0 - damping**2))
-    h = np.diff(time_s)
+    driven = still[:, :-1] * stays + np.diff(still, axis=1) * grows
+    driven = np.concatenate([-still[:, :1] / rate, driven], axis=1)
+    z, _ = ztbtrs(band, driven.T, uplo="L", diag="U")
+    return np.asarray(w / math.sqrt(1.0 - damping**2) * z.T.imag)
+
+
+# Derivatives by anything but the mode need the same weights.
+@lru_cache(maxsize=64)
+def _swing(time_s: bytes, hertz: float, damping: float) -> tuple[Array, Array, Array]:
+    """Weights (n - 1,) of a signal that stays and of one that grows in each step, and the band (2, n)."""
+    time = np.frombuffer(time_s)
+    w = 2.0 * math.pi * hertz
+    rate = w * (-damping + 1j * math.sqrt(1.0 - damping**2))
+    h = np.diff(time)
     keeps = np.exp(rate * h)
     # For steps much shorter than a period the difference of nearly equal numbers would lose its digits.
     x = rate * h
@@ -70,10 +85,7 @@ def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array
     safe = np.where(small, 1.0, x)
     stays = np.where(small, h * (1.0 + x / 2.0 + x**2 / 6.0), (keeps - 1.0) / rate)
     grows = np.where(small, h * (0.5 + x / 6.0 + x**2 / 24.0), h * (keeps - 1.0 - x) / safe**2)
-    driven = still[:, :-1] * stays + np.diff(still, axis=1) * grows
     # z_k - keeps z_(k-1) = drive: a band with ones on its diagonal.
-    band = np.ones((2, len(time_s)), complex)
+    band = np.ones((2, len(time)), complex, order="F")
     band[1, :-1] = -keeps
-    driven = np.concatenate([-still[:, :1] / rate, driven], axis=1)
-    z, _ = ztbtrs(band, driven.T, uplo="L", diag="U")
-    return np.asarray(w / math.sqrt(1.0 - damping**2) * z.T.imag)
+    return stays, grows, band

@@ -81,13 +81,21 @@ def first_order_lag(t: Array, p: Array, time_s: float) -> Array:
         return np.asarray(found)
     from scipy.linalg.lapack import dtbtrs
 
-    a, b0, b1 = lag_weights(h, time_s)
+    b0, b1, band = _lag(t.tobytes(), time_s)
     driven = np.concatenate([p[:1], b0 * p[:-1] + b1 * p[1:]])
-    # x_k - a x_(k-1) = drive: a band with ones on its diagonal.
-    band = np.zeros((2, len(p)))
-    band[1, :-1] = -a
     found, _ = dtbtrs(band, driven[:, None], uplo="L", diag="U")
     return np.asarray(found[:, 0])
+
+
+# Derivatives by anything but the time need the same weights.
+@lru_cache(maxsize=256)
+def _lag(t: bytes, time_s: float) -> tuple[Array, Array, Array]:
+    """Weights (n - 1,) of `first_order_lag` over uneven steps, and the band (2, n) of its equations."""
+    a, b0, b1 = lag_weights(_steps(t), time_s)
+    # x_k - a x_(k-1) = drive: a band with ones on its diagonal.
+    band = np.zeros((2, len(a) + 1), order="F")
+    band[1, :-1] = -a
+    return b0, b1, band
 
 
 @lru_cache(maxsize=64)
