@@ -64,7 +64,7 @@ def propose_experiment(
         except MuError:
             continue
         if expected > 0.0 and (best is None or expected > best.expected):
-            best = Proposal(f"{e.name}: {cause.effect.reveals}", names, expected)
+            best = Proposal(f"{e.name}; or {cause.effect.reveals}", names, expected)
     if best is None or best.expected < 1.0:
         own = {s.effect.name: s.effect.reveals for s in seen}
         plain = dict.fromkeys(n.partition(OF)[0].partition(" among ")[0] for n in names)
@@ -95,13 +95,13 @@ def _variations(made: Sequence[Experiment]) -> list[Experiment]:
             continue
         t, p = e["time_s"], e["pressure_kPa"]
         found += [
-            _driven(e, f"{e.name!r} three times as fast", t[0] + (t - t[0]) / 3.0, p),
-            _driven(e, f"{e.name!r} at a fifth of the rate", t[0] + (t - t[0]) * 5.0, p),
-            _driven(e, f"{e.name!r} to 1.3 times the pressure", t, 1.3 * p),
-            _driven(e, f"{e.name!r} with vacuum for pressure", t, -0.5 * p),
+            _driven(e, f"{e.name!r} again, three times as fast", t[0] + (t - t[0]) / 3.0, p),
+            _driven(e, f"{e.name!r} again, at a fifth of the rate", t[0] + (t - t[0]) * 5.0, p),
+            _driven(e, f"{e.name!r} again, to 1.3 times the pressure", t, 1.3 * p),
+            _driven(e, f"{e.name!r} again, with vacuum for pressure", t, -0.5 * p),
         ]
         found += [
-            attrs.evolve(e, name=f"{e.name!r} at {phi:g} deg", orientation_deg=phi)
+            attrs.evolve(e, name=f"{e.name!r} again, at {phi:g} deg", orientation_deg=phi)
             for phi in (0.0, 90.0, 180.0)
             if phi != e.orientation_deg
         ]
@@ -109,7 +109,7 @@ def _variations(made: Sequence[Experiment]) -> list[Experiment]:
             found.append(
                 attrs.evolve(
                     e,
-                    name=f"{e.name!r} with the tip free to {FURTHER_mm:g} mm more",
+                    name=f"{e.name!r} again, with the tip free to {FURTHER_mm:g} mm more",
                     gap_mm=e.gap_mm + FURTHER_mm,
                 )
             )

@@ -40,7 +40,7 @@ from .steps import STEPS, begun, unlikely
 Array = np.ndarray[Any, Any]
 
 # Of what the best effect takes, what another must take for the verdict to turn on it, and at a bound.
-NEAR, SOME = 0.5, 0.1
+NEAR, SOME = 0.75, 0.5
 
 
 @attrs.frozen(eq=False)

@@ -51,7 +51,7 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 def bare(p: Parameter) -> str:
     """A parameter's name for a reader, without the unit that follows its value."""
-    unit = p.unit.replace("1/", "per_").replace("/", "_")
+    unit = p.unit.replace("1/", "per_").replace("/h", "_per_hour").replace("/", "_")
     return readable(p.name.removesuffix(f"_{unit}") if unit else p.name)
 
 
@@ -129,7 +129,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
     if verdict.kind == "ambiguous":
         choices = [listed([called(c.effect), *(readable(n) for n in c.rivals)], "or") for c in found.causes]
-        sizes = [f"{readable(c.effect.title)} has {sized(verdict, c)}" for c in found.causes]
+        sizes = [f"{readable(c.effect.title)}: {sized(verdict, c)}" for c in found.causes]
         message = "Each of these effects explains the data, and these data do not distinguish them." + (
             "" if tabled else f" Fitted values: {'; '.join(sizes)}."
         )
