@@ -12,8 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import resource
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -21,7 +19,7 @@ import numpy as np
 
 from benchmarks.circumstances import circumstances
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
-from benchmarks.evidence.second_code.whole_unit import ROOT, small_unit
+from benchmarks.evidence.second_code.whole_unit import small_unit, verdict_on
 from mu_addon.design.parameters import to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
 from mu_addon.evidence.unit_run import Run, run
@@ -109,13 +107,7 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(data, trials(name, rng, bent))
         began, used = time.time(), _processor_s()
-        out = given.folder / "diagnosis"
-        command = [sys.executable, str(ROOT / "headless/run.py"), "diagnose", str(data), "--unit", str(unit)]
-        command += ["--fidelity", RESOLVED, "--out", str(out)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise SystemExit(done.stdout + done.stderr)
-        found = json.loads((out / "verdict.json").read_text())
+        found = verdict_on(data, unit, given.folder / "diagnosis", "--fidelity", RESOLVED)
         write_text(given.folder / f"{data.name}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -217,10 +218,14 @@ def _stuck(angle: Array) -> Array:
     return np.array(held)
 
 
-def verdict_on(folder: Path, unit: Path, out: Path) -> dict[str, object]:
-    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there."""
+def verdict_on(folder: Path, unit: Path, out: Path, *options: str) -> dict[str, Any]:
+    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there.
+
+    options: further ones of `diagnose`.
+    """
     command = [sys.executable, str(ROOT / "headless/run.py"), "diagnose", str(folder), "--unit", str(unit)]
-    done = subprocess.run([*command, "--out", str(out)], capture_output=True, text=True, check=False)
+    command += [*options, "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(done.stdout + done.stderr)
     return dict(json.loads((out / "verdict.json").read_text()))
@@ -246,7 +251,7 @@ def main() -> None:
             write(folder, trials(name, rng, angles))
         began = time.time()
         found = verdict_on(folder, described, given.out / "diagnosis")
-        causes = ", ".join(c["effect"] for c in found["causes"])  # type: ignore[attr-defined]
+        causes = ", ".join(c["effect"] for c in found["causes"])
         hidden = ", ".join(SETS[name]) or ("a mount that sticks" if name == "sticks" else "nothing")
         row = (name, hidden, str(found["verdict"]), causes, f"{time.time() - began:.0f}")
         print("| " + " | ".join(row) + " |", flush=True)
