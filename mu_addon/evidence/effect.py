@@ -20,6 +20,10 @@ FORCE_SCALE = "force_scale"
 SCALES = frozenset((BATCH, STEP, HEATING))
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
 SLIP = "marker_slip"
+# Faults of one camera, which has one at most: two of them imitate many pairs of physical effects.
+CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
+# Error of the model's own mesh: present in every set of data, seen or not.
+NUMERICS = "mesh_error"
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
 

@@ -348,3 +348,43 @@ def _step(gram: Array, gradient: Array, damping: float, x: Array, low: Array, hi
         scaled = inner / np.outer(scale, scale) + damping * np.eye(len(scale))
         step[free] = np.linalg.solve(scaled, gradient[free] / scale) / scale
     return step
+
+
+def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[float, float]:
+    """Confidence interval (low, high) of a fitted value, in its parameter's unit, by profile likelihood.
+
+    The ends are where chi squared, all else fitted anew, has risen by `rise` (3.84: 95 %), or the parameter's
+    bounds if those come first or the value has no finite standard deviation.
+    """
+    p = next(
+        (p for e in fit.effects for name, p in zip(e.keys, e.parameters, strict=True) if name == key),
+        None,
+    ) or next(p for p in fitter.curved if p.name == key)
+    log = logarithmic(p)
+    centre = math.log(fit.values[key]) if log else fit.values[key]
+    scale = fit.sd(key) / (fit.values[key] if log else 1.0)
+    if not (math.isfinite(scale) and scale > 0.0):
+        return p.low, p.high
+    found = []
+    for sign, bound in ((-1.0, p.low), (1.0, p.high)):
+        limit = math.log(bound) if log else bound
+        inner, outer, value = 0.0, math.inf, math.sqrt(rise)
+        for _ in range(7):
+            at = centre + sign * value * scale
+            if (limit - at) * sign <= 0.0:
+                at, value = limit, abs(limit - centre) / scale
+            fixed = {key: math.exp(at) if log else at}
+            try:
+                risen = fitter.fit(fit.effects, fit.values, fixed).chi2 - fit.chi2
+            except MuError:
+                # Without a prediction it cannot be the value.
+                risen = math.inf
+            if abs(risen - rise) < 0.2 or (risen < rise and at == limit):
+                break
+            inner, outer = (value, outer) if risen < rise else (inner, value)
+            grown = value * min(math.sqrt(rise / max(risen, 0.1)), 3.0)
+            value = grown if inner < grown < outer else 0.5 * (inner + min(outer, 4.0 * inner + value))
+        else:
+            at = centre + sign * value * scale
+        found.append(bound if at == limit else math.exp(at) if log else at)
+    return found[0], found[1]

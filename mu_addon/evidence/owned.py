@@ -8,8 +8,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, FORCE_SCALE, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
-from .selection import CAMERA
+from .effect import BATCH, CAMERA, FORCE_SCALE, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
 
 # Instruments and clamps may fail in one experiment, independent of the specimen.
 OF_THE_BENCH = CAMERA.union(

@@ -1,14 +1,15 @@
-"""Implausible values of nuisances: a sign that a column's unit or sign is not what its name says."""
+"""Implausible values: of nuisances a sign of a wrong unit or sign, of effects one that they are no cause."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container
 
 import numpy as np
 
 from ..errors import InputError
 from .effect import Parameter
-from .fit import Fit, Fitter
+from .fit import Fit, Fitter, logarithmic
 
 # Mistaken units: N for kN, kPa for MPa or Pa, mm for m.
 FACTORS = (1e3, 1e-3, 1e6, 1e-6)
@@ -62,3 +63,25 @@ def _refuse(fitter: Fitter, p: Parameter, fitted: float) -> None:
 def _source(columns: Container[str], channel: str) -> str:
     """The column that a channel was read from: the force where stress was computed from it."""
     return "force_N" if channel == "stress_kPa" and "force_N" in columns else channel
+
+
+def at_a_bound(fit: Fit) -> bool:
+    """Return True if a fitted value of an effect lies at a bound that is not its null."""
+    return any(
+        value_at_a_bound(p, fit.values[key])
+        for e in fit.effects
+        for key, p in zip(e.keys, e.parameters, strict=True)
+    )
+
+
+def value_at_a_bound(p: Parameter, value: float) -> bool:
+    """Return True if a value lies at a bound of its parameter that is not its null, or is implausible."""
+    if not p.plausible[0] <= value <= p.plausible[1]:
+        # An implausible value is no cause, though a fit may reach it.
+        return True
+    ends = [b for b in (p.low, p.high) if b != p.null]
+    if logarithmic(p):
+        # Over decades the range's own size is near the low end's neighbours, too.
+        near = 1e-3 * math.log(p.high / p.low)
+        return any(abs(math.log(value / b)) < near for b in ends)
+    return any(abs(value - b) < 1e-3 * (p.high - p.low) for b in ends)

@@ -1,4 +1,4 @@
-"""Effects added to a selection that explains too little: a common one, one of an owner, one that differs."""
+"""Search for the effects that explain a record: common ones, ones of an owner, ones that differ."""
 
 from __future__ import annotations
 
@@ -6,56 +6,174 @@ from collections.abc import Callable, Sequence
 
 import attrs
 
-from .effect import BATCH, FORCE_SCALE, STEP, Effect
+from .acceptance import accepted, doubts, loss, of_the_law, too_far
+from .effect import BATCH, CAMERA, Effect
 from .fit import Fit, Fitter
-from .owned import MACHINE, owned_effects, owners
+from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
+from .owned import owned_effects, owners
 from .pooled import fits_among, pooled_effects, sizes_of
-from .residuals import strict_table
-from .selection import (
-    ALONE,
-    FALSE_ALARM_RATE,
-    LAW,
-    MOST_EFFECTS,
-    RIVAL_DELTA_CHI2,
-    Cause,
-    Selection,
-    at_a_bound,
-    beside,
-    by_count,
-    causes_of,
-    cost,
-    doubts,
-    false_alarm_probability,
-    gain_of,
-    hypotheses,
-    loss,
-    promising_rivals,
-    share_by_experiment,
-)
+from .residuals import dependence_table, strict_table, structure, taken_by_scales
+from .rivals import causes_of, pairs_for
+from .selection import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .sensitivity import Sensitivity, sensitivities
+from .significance import by_count, by_gauges, false_alarm_probability, gain_of
 
+MOST_EFFECTS = 3
+# Ratio of the gain by scales of single tests to a first effect's, above which no second is tried.
+ELSEWHERE = 4.0
 # Most effects of owners that are fitted, the most promising first.
 MOST_FITS = 12
 
 
-def accepted(fitter: Fitter, found: Selection, less: Fit, more: Fit, p: float) -> bool:
-    """Return True if the last effect of a model may be named beside a model without it.
+def select(
+    fitter: Fitter, seen: Sequence[Sensitivity], progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """The effects that explain a record, added one at a time.
 
-    p: probability that noise alone gains as much, over all effects and owners tried. No value may lie at a
-    bound, left-out data must be predicted better, and neither a step change nor a curved gauge may explain
-    more. A common effect may not rest on one experiment (a share above `ALONE`).
+    Each must gain more chi squared than noise would at `FALSE_ALARM_RATE`, over the whole library, and must
+    reduce the leave-one-experiment-out error. seen: sensitivities of the effects; those not worth a fit are
+    not tried. progress: called with the names of the effects that are fitted. Without an explanation the base
+    model stays, with the structure that is left.
     """
-    last = more.effects[-1]
-    # An effect of the last experiment alone looks like a failure before it.
-    margin = RIVAL_DELTA_CHI2 if last.whose and last.name != STEP else 0.0
-    common = not (last.whose or last.among)
-    return (
-        p < FALSE_ALARM_RATE
-        and not at_a_bound(more)
-        and not (common and max(share_by_experiment(fitter, more).values()) > ALONE)
-        and loss(fitter, less, more) > 0.0
-        and not doubts(fitter, found.table_base, found.base, more, margin)
-    )
+    base = fitter.fit()
+    table_base = tuple(dependence_table(fitter, base))
+    usable = {s.effect.keys: s.effect for s in seen if s.worth_a_fit}
+    effects = tuple(usable.values())
+    pool: list[Fit] = []
+    for e in effects:
+        progress(e.name)
+        pool.append(beside(fitter, (), e, base.values))
+    pool = ranked(pool)
+    singles = tuple(pool)
+    chosen, ps, doubted, p_best = base, [], "", 1.0
+    taken = 0.0
+    levels: list[list[Fit]] = []
+    alone = False
+    while (level := len(levels)) < min(MOST_EFFECTS, len(effects)):
+        if level and ELSEWHERE * (base.chi2 - chosen.chi2) < taken_by_scales(fitter, base):
+            # Tests differ in scale by far more than by a common effect: see `owned`, `pooled`.
+            break
+        if level:
+            pool = hypotheses(fitter, levels[-1][:1], effects, progress)
+        if not pool or of_the_law(chosen, pool[0], taken):
+            break
+        p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
+        p_best = p if level == 0 else p_best
+        # The best single effect may be neither of two that act together.
+        if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
+            pool = hypotheses(fitter, other_seeds(levels[-1]), effects, progress, known=pool)
+            p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
+        if level == 0 and p >= FALSE_ALARM_RATE:
+            pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
+            if pair is not None:
+                p_best, chosen = pair
+                ps, levels = [p_best, p_best], [pool, [chosen]]
+            break
+        if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], taken):
+            break
+        if loss(fitter, chosen, pool[0]) <= 0.0:
+            # It cannot be compared with earlier ones; its part is left as structure.
+            doubted = "" if level else f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
+            break
+        if level == 1 and not alone:
+            alone = True
+            others = by_all_laws(fitter, levels[0], progress, every=True)
+            if cost(others[0]) < min(cost(pool[0]), cost(chosen)):
+                # One mechanism by another law replaces two.
+                levels[0], chosen, singles = others, others[0], tuple(others)
+                taken = base.chi2 - chosen.chi2
+                continue
+        pool = by_all_laws(fitter, pool, progress)
+        chosen = pool[0]
+        singles = singles if level else tuple(pool)
+        taken = base.chi2 - chosen.chi2
+        ps.append(p)
+        levels.append(pool)
+    if len(chosen.effects) > 2:
+        chosen = _without_superfluous(fitter, seen, base, chosen)
+    doubted = doubted or doubts(fitter, table_base, base, chosen)
+    table = tuple(strict_table(fitter, chosen))
+    accepted = not (doubted or structure(table))
+    causes = causes_of(fitter, effects, base, chosen, ps, levels, accepted)
+    if len(causes) == 1 and CAMERA.intersection(chosen.names):
+        pairs = pairs_for(fitter, seen, base, chosen, progress)
+        causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
+    if chosen is base and accepted:
+        table_base = table
+        doubted = too_far(fitter, base)
+    return Selection(base, chosen, causes, singles, table_base, table, p_best, doubted)
+
+
+def _hidden_pair(
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    seen: Sequence[Sensitivity],
+    base: Fit,
+    singles: Sequence[Fit],
+    progress: Callable[[str], None],
+) -> tuple[float, Fit] | None:
+    """Two effects visible together where neither alone does better than slow noise; None without.
+
+    Sought where one alone gains by the noise with every cause set aside, and not by the noise of the residual
+    as if without cause. The probability that noise gains as much is that of the best of all pairs.
+    """
+    raw = base.chi2 - singles[0].chi2 - by_gauges(fitter, base, singles[0])
+    if false_alarm_probability(fitter, base, seen, raw) >= FALSE_ALARM_RATE:
+        return None
+    pool = hypotheses(fitter, singles[:SEEDS], effects, progress)
+    if not pool:
+        return None
+    best = refined(fitter, pool[0], progress)
+    more = len(best.keys) - len(base.keys)
+    pairs = len(effects) * (len(effects) - 1) / 2
+    p = by_count(gain_of(fitter, base, best), more, pairs)
+    if p >= FALSE_ALARM_RATE or loss(fitter, base, best) <= 0.0:
+        return None
+    return p, best
+
+
+def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit, chosen: Fit) -> Fit:
+    """A fit without the effect that later ones make needless.
+
+    Its gain beside them is no more than noise or an error of their law would give.
+    """
+    found = []
+    for e in chosen.effects:
+        less = fitter.best([o for o in chosen.effects if o.keys != e.keys], [chosen.values])
+        found.append((less.chi2, less, attrs.evolve(chosen, effects=(*less.effects, e))))
+    _, less, last = min(found, key=lambda f: f[0])
+    gain = gain_of(fitter, less, last)
+    p = false_alarm_probability(fitter, less, seen, gain)
+    return less if p >= FALSE_ALARM_RATE or of_the_law(less, last, base.chi2 - chosen.chi2) else chosen
+
+
+def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
+    """Repeat a selection under the noise of another fitter; no effect is added.
+
+    Each effect's p-value is computed again, and rivals anew; an effect no longer significant is reported in
+    `doubted`.
+    """
+    base = fitter.fit((), found.base.values)
+    chosen = fitter.fit(found.chosen.effects, found.chosen.values)
+    singles = tuple(sorted((fitter.fit(f.effects, f.values) for f in found.singles), key=cost))
+    ps = [c.p_value for c in found.causes]
+    doubted = found.doubted
+    for e in chosen.effects:
+        less = fitter.best([o for o in chosen.effects if o is not e], [chosen.values])
+        own = attrs.evolve(chosen, effects=(*less.effects, e))
+        gain = less.chi2 - chosen.chi2 - by_search(own) + by_search(less)
+        p = false_alarm_probability(fitter, less, seen, gain - by_gauges(fitter, less, own))
+        ps.append(p)
+        if p >= FALSE_ALARM_RATE:
+            doubted = (
+                doubted or f"{e.name} gives no significant gain at the noise that remains with the causes"
+            )
+    table_base = tuple(dependence_table(fitter, base))
+    doubted = doubted or doubts(fitter, table_base, base, chosen)
+    effects = [f.effects[0] for f in singles]
+    table = tuple(strict_table(fitter, chosen))
+    causes = causes_of(fitter, effects, base, chosen, ps, [singles], not (doubted or structure(table)))
+    return Selection(base, chosen, causes, singles, table_base, table, found.p_best, doubted)
 
 
 def one_more(
@@ -228,33 +346,3 @@ def further_owners(
         chosen = best
         others.remove(_owner(best))
     return found
-
-
-def coinciding(
-    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
-) -> Selection:
-    """Add, as rivals of a selection's causes, effects that scale the same experiments' force equally well.
-
-    If one specimen was tested along x, or all fast tests came last, a cause that acts along x, or by rate,
-    may also be that specimen's height as typed, or a change before those tests. Each is fitted in place of
-    each cause, and is a rival within `RIVAL_DELTA_CHI2`.
-    """
-    chosen = found.chosen
-    scales = [e for e in fitter.simulator.effects if e.name == FORCE_SCALE]
-    # A stated standard deviation includes the spread of specimens.
-    single = [e for e in fitter.record.experiments if "stress_sd_kPa" not in e.columns]
-    owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
-    if not owned or not found.causes or found.left or found.doubted:
-        return found
-    causes = []
-    for c in found.causes:
-        scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
-        fits = promising_rivals(fitter, chosen, c.effect, scaled, progress)
-        near = [f for f in fits if cost(f) - cost(chosen) < RIVAL_DELTA_CHI2]
-        if c.effect.among and near and cost(near[0]) < cost(chosen):
-            # One size for some replaces a size of each.
-            found, near = attrs.evolve(found, chosen=near[0]), near[1:]
-            c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
-        rivals = dict.fromkeys((*c.rivals, *(f.effects[-1].title for f in near)))
-        causes.append(attrs.evolve(c, rivals=tuple(rivals)))
-    return attrs.evolve(found, causes=tuple(causes))

@@ -10,9 +10,11 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .acceptance import too_far
 from .drive import denoised_drives
 from .effect import Effect, Parameter
 from .fit import Fit, Fitter
+from .graded import mainly
 from .noise import Source, estimate, span
 from .outliers import NAME as OUTLIER
 from .outliers import without_outliers
@@ -21,9 +23,10 @@ from .plausibility import require_plausible
 from .record import Record, record
 from .residuals import ALTERNATION, BY_TURN, strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
+from .rivals import coinciding
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
-from .search import coinciding, further_owners, one_more, select_owned, select_pooled
-from .selection import FALSE_ALARM_RATE, Selection, mainly, reselected, select, too_far
+from .search import further_owners, one_more, reselected, select, select_owned, select_pooled
+from .selection import FALSE_ALARM_RATE, Selection
 from .sensitivity import WANDERING, Sensitivity, at_bounds, sensitivities, signatures
 from .simulator import Composite
 from .thinning import thinned
@@ -64,7 +67,7 @@ class Diagnosis:
 
     again: see `drive.denoised_drives`. set_aside: readings left out, and other remarks, in words. seen:
     sensitivities of the effects. graded: the causes are named although structure is left
-    (`selection.mainly`).
+    (`graded.mainly`).
     """
 
     experiments: tuple[Experiment, ...]

@@ -12,22 +12,17 @@ import numpy as np
 
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
-from .fit import Fit, Fitter
+from .fit import Fit, Fitter, interval
 from .fitted_zeros import FittedZeros, fitted_zeros
 from .gain import Gain, gain
+from .graded import share_taken
+from .hypotheses import ranked
 from .next_experiment import Proposal, propose_experiment
 from .noise import Source
+from .plausibility import at_a_bound
 from .record import Record
-from .selection import (
-    TOGETHER,
-    Cause,
-    Selection,
-    at_a_bound,
-    interval,
-    ranked,
-    share_taken,
-    with_promising_rivals,
-)
+from .rivals import with_promising_rivals
+from .selection import TOGETHER, Cause, Selection
 from .sensitivity import (
     ABSORBED,
     SEEN,
@@ -52,7 +47,7 @@ class Verdict:
     parameters' units. identifiability: effects that these data cannot show, with
     the reason. set_aside: readings left out, in words (`resolution.wrong_readings`). refused: why models that
     were tried have no prediction, by the titles of their effects. share_taken: of the base model's misfit by
-    the chosen one; a verdict `named` or `ambiguous` may leave structure (`selection.mainly`). nearest: title
+    the chosen one; a verdict `named` or `ambiguous` may leave structure (`graded.mainly`). nearest: title
     of the best single explanation, named or not, and its share of the misfit. far: nuisances that are far
     from what was known of them, the farthest first. zeros: of a load cell, where they hide an error.
     `as_json` is the content of verdict.json.

@@ -7,6 +7,7 @@ from mu_addon.evidence.effect import FORCE_SCALE
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.owned import coincident_effects, owned_effects, strain_rate
+from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.pooled import pooled_effects
 from mu_addon.evidence.prediction.beam import EFFECTS as BEAM
 from mu_addon.evidence.prediction.bench import bench_simulators
@@ -15,7 +16,8 @@ from mu_addon.evidence.prediction.hold import ChamberPressure
 from mu_addon.evidence.prediction.unit import TIMED
 from mu_addon.evidence.prediction.yielding import _borne_by_one
 from mu_addon.evidence.record import record
-from mu_addon.evidence.selection import Selection, _bounded, causes_of, with_promising_rivals
+from mu_addon.evidence.rivals import causes_of, with_promising_rivals
+from mu_addon.evidence.selection import Selection
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence, to_do
@@ -170,8 +172,8 @@ def test_a_gauge_is_not_off_by_a_fifth_of_what_it_reads():
 
 def test_a_density_that_no_resin_has_is_no_cause():
     weight = next(e for e in BEAM if e.name == "gravity").parameters[0]
-    assert _bounded(weight, 3710.0)
-    assert not _bounded(weight, 1070.0)
+    assert value_at_a_bound(weight, 3710.0)
+    assert not value_at_a_bound(weight, 1070.0)
 
 
 def test_gas_warms_with_its_room_as_logged_or_as_fitted():

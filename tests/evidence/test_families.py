@@ -12,6 +12,7 @@ from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
 from mu_addon.evidence.effect import Parameter
+from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
 from mu_addon.evidence.prediction.hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
 from mu_addon.evidence.prediction.instants import finer
@@ -20,7 +21,6 @@ from mu_addon.evidence.prediction.step import PressureStep
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
 from mu_addon.evidence.prediction.yielding import yielded
 from mu_addon.evidence.ringing import swinging
-from mu_addon.evidence.selection import _bounded
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
 from mu_addon.usecases.diagnose.words import sentence
@@ -231,13 +231,13 @@ def test_a_loss_goes_by_a_power_of_the_bend_or_by_its_square_and_cube():
 def test_a_time_below_a_second_is_not_at_its_bound():
     """Before, a relaxation by 0.56 s of 0.02 to 1000 was, by a thousandth of the range."""
     time = Parameter("middle_s", "s", 0.02, 1000.0, 1.0)
-    assert not _bounded(time, 0.56)
-    assert not _bounded(time, 0.03)
-    assert _bounded(time, 0.02)
-    assert _bounded(time, 1000.0)
+    assert not value_at_a_bound(time, 0.56)
+    assert not value_at_a_bound(time, 0.03)
+    assert value_at_a_bound(time, 0.02)
+    assert value_at_a_bound(time, 1000.0)
     share = Parameter("share", "", 0.0, 0.7, 0.0)
-    assert not _bounded(share, 0.0)
-    assert _bounded(share, 0.7)
+    assert not value_at_a_bound(share, 0.0)
+    assert value_at_a_bound(share, 0.7)
 
 
 def judged(tmp_path, part, number, battery=BATTERY):

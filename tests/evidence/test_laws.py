@@ -7,10 +7,11 @@ import pytest
 from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
+from mu_addon.evidence.acceptance import of_the_law
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
 from mu_addon.evidence.prediction.specimen import turns
-from mu_addon.evidence.selection import LAW, _of_the_law
+from mu_addon.evidence.selection import LAW
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
@@ -175,7 +176,7 @@ class Found:
 def test_what_a_law_s_own_error_would_gain_is_no_second_cause():
     first, taken = Found(1000.0, ("leak",)), 4e5
     little = LAW**2 * taken
-    assert _of_the_law(first, Found(1000.0 - 0.9 * little, ("leak", "pressure_drift")), taken)
-    assert not _of_the_law(first, Found(1000.0 - 1.1 * little, ("leak", "pressure_drift")), taken)
+    assert of_the_law(first, Found(1000.0 - 0.9 * little, ("leak", "pressure_drift")), taken)
+    assert not of_the_law(first, Found(1000.0 - 1.1 * little, ("leak", "pressure_drift")), taken)
     # Every mesh has an error, however large the cause beside it.
-    assert not _of_the_law(first, Found(999.0, ("leak", "mesh_error")), taken)
+    assert not of_the_law(first, Found(999.0, ("leak", "mesh_error")), taken)

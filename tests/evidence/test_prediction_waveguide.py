@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.fit import Fitter, interval
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
 from mu_addon.evidence.record import record
-from mu_addon.evidence.selection import interval
 from mu_addon.evidence.simulator import Composite
 
 from .bench import experiment, measured, recovered

@@ -8,12 +8,12 @@ import pytest
 
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.gain import gain
+from mu_addon.evidence.hypotheses import beside, hypotheses, ranked
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
-from mu_addon.evidence.search import one_more
-from mu_addon.evidence.selection import beside, hypotheses, ranked, reselected, select
+from mu_addon.evidence.search import one_more, reselected, select
 from mu_addon.evidence.sensitivity import sensitivities
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose

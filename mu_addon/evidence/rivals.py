@@ -1,0 +1,219 @@
+"""Rivals of a cause: effects that explain the data as well in its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations
+
+import attrs
+import numpy as np
+
+from .effect import CAMERA, FORCE_SCALE, NUMERICS, Effect
+from .fit import Fit, Fitter
+from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
+from .owned import MACHINE, owned_effects
+from .selection import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection
+from .sensitivity import Sensitivity
+
+# Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's
+# gain that they need by their first law.
+NEAREST, WORTH_LAWS = 3, 0.2
+
+
+def causes_of(
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    base: Fit,
+    chosen: Fit,
+    ps: Sequence[float],
+    levels: Sequence[Sequence[Fit]],
+    accepted: bool = True,
+) -> tuple[Cause, ...]:
+    """The chosen effects, the most needed first, each with its rivals.
+
+    Rivals are also effects beside the others whose residual is within their law's error (`LAW`). Those of
+    several effects that are not accepted are not sought: that takes as long as the selection.
+    """
+    found = []
+    for e in chosen.effects:
+        others = [o for o in chosen.effects if o.keys != e.keys]
+        tried = [f for f in levels[0] if f.names != chosen.names]
+        if others:
+            tried = [
+                beside(fitter, others, a, chosen.values)
+                for a in effects
+                if accepted and a.name not in chosen.names
+            ]
+        less = fitter.best(others, [chosen.values])
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
+        tried = _with_their_laws(fitter, chosen, less, tried)
+        # A rival's gain by its search is no fit.
+        spent = chosen.chi2 + by_search(chosen)
+        rivals = nearest(((f.effects[-1].title, f.chi2 + by_search(f) - spent) for f in tried), near)
+        if NUMERICS not in rivals:
+            # Where the mesh alone replaces it, anything beside the mesh would.
+            rivals |= _by_numerics(
+                fitter, effects, chosen, [f for f in tried if f.effects[-1].title not in rivals]
+            )
+        found.append(Cause(e, max(ps), less.chi2 - chosen.chi2, tuple(nearest(rivals.items(), math.inf))))
+    return tuple(sorted(found, key=lambda c: -c.loss))
+
+
+def promising_rivals(
+    fitter: Fitter,
+    chosen: Fit,
+    cause: Effect,
+    effects: Sequence[Effect],
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Fit]:
+    """Fits of those of some effects in the place of a cause that promise half of what it takes, or more.
+
+    Each is tried that is not in the chosen model; the best comes first.
+    """
+    others = [e for e in chosen.effects if e.keys != cause.keys]
+    less, known = fitter.best(others, [chosen.values]), {e.keys for e in chosen.effects}
+    enough = less.chi2 - chosen.chi2 - RIVAL_DELTA_CHI2
+    found = []
+    for e in effects:
+        if e.keys not in known and promise(fitter, less, e) >= HALF_WAY * enough:
+            progress(e.title)
+            found.append(beside(fitter, others, e, chosen.values))
+    return ranked(found)
+
+
+def with_promising_rivals(
+    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """A selection that is not accepted, its several causes with the rivals that `promising_rivals` finds."""
+    causes = []
+    for c in found.causes:
+        near = max(RIVAL_DELTA_CHI2, LAW**2 * (found.base.chi2 - found.chosen.chi2 - c.loss))
+        fits = promising_rivals(fitter, found.chosen, c.effect, not_chosen(found), progress)
+        titles = nearest(((f.effects[-1].title, cost(f) - cost(found.chosen)) for f in fits), near)
+        causes.append(attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *titles)))))
+    return attrs.evolve(found, causes=tuple(causes))
+
+
+def with_rivals(fitter: Fitter, found: Selection) -> Selection:
+    """The selection with the rivals of its causes, which are not sought where it is not accepted."""
+    effects, ps = [f.effects[0] for f in found.singles], [c.p_value for c in found.causes]
+    causes = causes_of(fitter, effects, found.base, found.chosen, ps, [found.singles])
+    return attrs.evolve(found, causes=causes)
+
+
+def coinciding(
+    fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """Add, as rivals of a selection's causes, effects that scale the same experiments' force equally well.
+
+    If one specimen was tested along x, or all fast tests came last, a cause that acts along x, or by rate,
+    may also be that specimen's height as typed, or a change before those tests. Each is fitted in place of
+    each cause, and is a rival within `RIVAL_DELTA_CHI2`.
+    """
+    chosen = found.chosen
+    scales = [e for e in fitter.simulator.effects if e.name == FORCE_SCALE]
+    # A stated standard deviation includes the spread of specimens.
+    single = [e for e in fitter.record.experiments if "stress_sd_kPa" not in e.columns]
+    owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
+    if not owned or not found.causes or found.left or found.doubted:
+        return found
+    causes = []
+    for c in found.causes:
+        scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
+        fits = promising_rivals(fitter, chosen, c.effect, scaled, progress)
+        near = [f for f in fits if cost(f) - cost(chosen) < RIVAL_DELTA_CHI2]
+        if c.effect.among and near and cost(near[0]) < cost(chosen):
+            # One size for some replaces a size of each.
+            found, near = attrs.evolve(found, chosen=near[0]), near[1:]
+            c = Cause(found.chosen.effects[-1], c.p_value, c.loss, (c.effect.title, *c.rivals))
+        rivals = dict.fromkeys((*c.rivals, *(f.effects[-1].title for f in near)))
+        causes.append(attrs.evolve(c, rivals=tuple(rivals)))
+    return attrs.evolve(found, causes=tuple(causes))
+
+
+def pairs_for(
+    fitter: Fitter,
+    seen: Sequence[Sensitivity],
+    base: Fit,
+    chosen: Fit,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[str, ...]:
+    """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
+
+    A camera's fault changes what each channel shows in proportion, which two physical effects can do together
+    where neither does anything alone. The `SEEDS` pairs that take most to first order are fitted.
+    """
+    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
+    columns = {id(s): s.column[: len(base.residual)] for s in physical}
+    promised = []
+    for one, other in combinations(physical, 2):
+        if one.effect.name != other.effect.name:
+            q = np.linalg.qr(np.stack([columns[id(one)], columns[id(other)]], axis=1))[0]
+            promised.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
+    promised.sort(key=lambda pair: -pair[0])
+    found: dict[str, None] = {}
+    for _, *pair in promised[:SEEDS]:
+        progress(" and ".join(e.name for e in pair))
+        starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
+        both = fitter.best(pair, starts)
+        if both.chi2 + by_search(both) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
+            found[TOGETHER.join(e.title for e in pair)] = None
+    return tuple(found)
+
+
+def nearest(each: Iterable[tuple[str, float]], within: float) -> dict[str, float]:
+    """Rivals by title, the nearest first: those of which a fit lies at a distance below a limit."""
+    least: dict[str, float] = {}
+    for title, distance in each:
+        if distance < within:
+            least[title] = min(distance, least.get(title, distance))
+    return dict(sorted(least.items(), key=lambda one: one[1]))
+
+
+def not_chosen(found: Selection) -> list[Effect]:
+    """Effects that were fitted alone, of mechanisms that the chosen model has not."""
+    return [f.effects[0] for f in found.singles if f.effects[0].name not in found.chosen.names]
+
+
+def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
+    """Rivals of one cause, the nearest of them with laws of more freedom where those fit better.
+
+    The cause's own law was chosen likewise. A rival must first take `WORTH_LAWS` of the cause's gain.
+    """
+    found = ranked(rivals)
+    reach = chosen.chi2 + (1.0 - WORTH_LAWS) * (less.chi2 - chosen.chi2)
+    lawful = {law.name for law in fitter.simulator.refinements}
+    names: dict[str, int] = {}
+    for i, f in enumerate(found):
+        name = f.effects[-1].name
+        if name in lawful and name not in names and len(names) < NEAREST and f.chi2 < reach:
+            names[name] = i
+    for i in names.values():
+        found[i] = refined(fitter, found[i])
+    return found
+
+
+def _by_numerics(
+    fitter: Fitter, effects: Sequence[Effect], chosen: Fit, tried: Sequence[Fit]
+) -> dict[str, float]:
+    """Rivals by title that differ from the chosen model only by the error of its mesh, with the difference.
+
+    No mesh is exact, and its error differs with and without the effect. So an effect has as a rival any that
+    explains the data as well once either has a free size of that error.
+    """
+    mesh = next((e for e in effects if e.name == NUMERICS), None)
+    if mesh is None or NUMERICS in chosen.names or not tried:
+        return {}
+
+    def meshed(f: Fit) -> Fit:
+        return beside(fitter, f.effects, mesh, f.values)
+
+    reference, found = meshed(chosen), {}
+    for f in tried:
+        if f.names[-1] != NUMERICS and promise(fitter, f, mesh) > PROMISING:
+            other = meshed(f)
+            searched = by_search(other) - by_search(reference)
+            if other.chi2 - reference.chi2 + searched < RIVAL_DELTA_CHI2:
+                found[f.effects[-1].title] = other.chi2 - reference.chi2 + searched
+    return found
