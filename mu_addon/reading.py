@@ -29,7 +29,7 @@ _DEEPEST, _LARGEST = 64, 1 << 63
 # The parser takes time by the square of a dotted key's length.
 _DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){65}""")
 
-# A long field is no fault of its own: what reads the table says what is wrong with it.
+# A long field is not a fault of its own: what reads the table says what is wrong with it.
 csv.field_size_limit(_LONGEST)
 
 
@@ -42,7 +42,7 @@ def file_bytes(path: str | Path, most: int = _LONGEST) -> bytes:
         size = found.st_size
         data = stream.read(min(size, most) + 1) if stat.S_ISREG(found.st_mode) else None
         if data is None:
-            raise OSError(errno.EINVAL, "that is no regular file", str(path))
+            raise OSError(errno.EINVAL, "that is not a regular file", str(path))
         if len(data) > size:
             parts = [data]
             while sum(map(len, parts)) <= most and (more := stream.read(1 << 20)):
@@ -64,11 +64,11 @@ def require_readable(path: str | Path, most: int = _LONGEST) -> None:
         found = path.stat()
     except ValueError as error:
         # A NUL byte in the name.
-        raise OSError(errno.EINVAL, f"that is no name of a file: {error}", repr(str(path))) from None
+        raise OSError(errno.EINVAL, f"that is not a file name: {error}", repr(str(path))) from None
     if not stat.S_ISREG(found.st_mode):
         if stat.S_ISDIR(found.st_mode):
             raise IsADirectoryError(errno.EISDIR, "that is a folder", str(path))
-        raise OSError(errno.EINVAL, "that is no regular file", str(path))
+        raise OSError(errno.EINVAL, "that is not a regular file", str(path))
     if found.st_size > most:
         words = f"its {_size(found.st_size)} are more than the {_size(most)} that are read"
         raise OSError(errno.EFBIG, words, str(path))

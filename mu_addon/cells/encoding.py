@@ -15,7 +15,7 @@ _OTHERS = (
     *("cp1252", "cp1250", "cp1251", "cp1254", "cp850", "mac_roman"),
     *("gb18030", "cp932", "cp949", "cp866", "cp950"),
 )
-# First bytes of files that are no text or table, and the remedy.
+# First bytes of files that are not text or table, and the remedy.
 _BINARY = (
     (b"%PDF", "a PDF", "export the data as CSV"),
     (b"\x1f\x8b", "compressed with gzip", "unpack it"),
@@ -35,7 +35,7 @@ _BINARY = (
     (b"\x89PNG", "a picture", "export the numbers as CSV"),
     (b"\xff\xd8\xff", "a picture", "export the numbers as CSV"),
 )
-# A text cut off by a logger's loss of power ends in zero bytes; more of them are no text.
+# A text cut off by a logger's loss of power ends in zero bytes; more of them are not text.
 _MOST_NUL = 0.5
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19]")
 
@@ -44,7 +44,7 @@ def decoded(data: bytes, where: str, known: Callable[[str], int] = lambda text: 
     """Text of bytes: by its byte order mark, as UTF-8 or UTF-16, else where `known` counts most.
 
     known: counts the known words of a text. Zero bytes in a text are kept as U+FFFD. Raises InputError for a
-    file that is no text, naming its kind.
+    file that is not text, naming its kind.
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -61,7 +61,7 @@ def decoded(data: bytes, where: str, known: Callable[[str], int] = lambda text: 
     if b"\0" in data:
         if data.count(0) > _MOST_NUL * len(data) or _CONTROL.search(head):
             raise InputError(
-                "the file holds NUL bytes: it is no text",
+                "the file holds NUL bytes: it is not text",
                 where,
                 "export it as CSV or text, or as a workbook (.xlsx, .xls, .ods)",
             )

@@ -1,4 +1,4 @@
-"""Numbers in the cells of a column: the signs for decimals and thousands, and cells that are no number."""
+"""Numbers in the cells of a column: the signs for decimals and thousands, and cells that are not numbers."""
 
 from __future__ import annotations
 

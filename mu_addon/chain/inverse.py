@@ -54,7 +54,7 @@ def reach_point(
     high = np.minimum(ends[:, 1], np.inf if high_kPa is None else high_kPa)
     point = np.asarray(point_mm, float)
     if point.shape != (3,) or not np.isfinite(point).all():
-        raise InputError(f"{point_mm!r} is no point", "[target] reach", "give x, y and z in mm")
+        raise InputError(f"{point_mm!r} is not a point", "[target] reach", "give x, y and z in mm")
     if (low > high).any():
         raise InputError("a bound below another", "[target]", "give low_kPa below high_kPa")
 

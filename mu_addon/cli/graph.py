@@ -18,7 +18,7 @@ def add(commands: Commands[Any]) -> None:
     command = commands.add_parser(
         "graph",
         help="Evaluate a node tree: units by their steps, simulations, rankings, prints, data and their "
-        "comparison. Only what is not in DIR yet is computed.",
+        "comparison. Only nodes without a result in DIR are computed.",
         epilog="example: run.py graph assets/graphs/three-walls.toml --out out/walls",
     )
     command.add_argument(
@@ -31,12 +31,12 @@ def add(commands: Commands[Any]) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="Evaluate this node and what it needs; repeat the option for more (default: all nodes).",
+        help="Evaluate this node and those that it needs; repeat the option for more (default: all nodes).",
     )
     command.add_argument(
         "--node-reports",
         action="store_true",
-        help="Write the full report of every run within the tree, too.",
+        help="Also write the full report of every run within the tree.",
     )
 
 

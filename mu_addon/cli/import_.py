@@ -27,7 +27,7 @@ def add(commands: Commands[Any]) -> None:
         "files",
         nargs="+",
         metavar="FILE",
-        help="CSV, text, workbook (.xlsx, .xls, .ods) or HTML table, by its content.",
+        help="CSV, text, workbook (.xlsx, .xls, .ods) or HTML table, recognised by content.",
     )
     command.add_argument(
         "--set",
@@ -36,8 +36,8 @@ def add(commands: Commands[Any]) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="Answer to a question, such as kind=coupon, section_mm=12.5x3, length_mm=40, unit.Load=N, "
-        "column.Ch1=force, column.2=none, decimal=, or, for one experiment alone, NAME.KEY=VALUE. A column "
-        "goes by its title or its number. Repeat the option for each answer.",
+        "column.Ch1=force, column.2=none, decimal=, or, for one experiment alone, NAME.KEY=VALUE. Name a "
+        "column by its title or its number. Repeat the option for each answer.",
     )
     command.add_argument(
         "--dry-run",
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     for given in options.answers:
         key, equals, value = given.partition("=")
         if not equals or not key.strip():
-            raise InputError(f"{given!r} is no answer", "--set", "write it as KEY=VALUE")
+            raise InputError(f"{given!r} is not an answer", "--set", "write it as KEY=VALUE")
         answers[key.strip()] = value.strip()
     asks = sys.stdin.isatty() and sys.stderr.isatty() and not options.json
     import_files(

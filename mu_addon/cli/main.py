@@ -90,14 +90,14 @@ def _require_usable(options: argparse.Namespace) -> None:
         where = _OPTIONS.get(name, f"--{name.replace('_', '-')}")
         for value in given if isinstance(given, list | tuple) else [given]:
             if isinstance(value, float) and math.isnan(value):
-                raise InputError("nan is no number", where, "give a number")
+                raise InputError("nan is not a number", where, "give a number")
             if not isinstance(value, str) or (name == "out" and not value):
                 continue
             if not value:
                 raise InputError("it is empty", where, "give a name, or leave the option out")
             if "\0" in value or value != value.encode(errors="replace").decode():
                 raise InputError(
-                    "it holds a NUL byte, or bytes that are no UTF-8 text", where, "give a name in UTF-8"
+                    "it contains a NUL byte, or bytes that are not UTF-8 text", where, "give a name in UTF-8"
                 )
 
 

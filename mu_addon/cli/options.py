@@ -192,7 +192,7 @@ class _Friction(argparse.Action):
 
     def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
         if not namespace.obstacles or namespace.obstacles[-1][1] is not None:
-            parser.error("--friction: give it after the --obstacle that it belongs to")
+            parser.error("--friction belongs after its --obstacle")
         *before, (path, _) = namespace.obstacles
         namespace.obstacles = [*before, (path, value)]
 

@@ -22,7 +22,11 @@ def add(commands: Commands[Any]) -> None:
         help="Resume a stopped run, or run again what the inputs in a folder describe.",
         epilog="example: run.py resume out/mu-1.0x",
     )
-    command.add_argument("out", metavar="FOLDER", help="Folder of any run: its --out, or its inputs alone.")
+    command.add_argument(
+        "out",
+        metavar="FOLDER",
+        help="Folder of any run: its --out folder, or a folder that holds only its inputs.",
+    )
     command.add_argument(
         "--json", action="store_true", help="Write one JSON message per line to standard output."
     )

@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
     require_out(options)
     if options.seconds is not None and not 0 < options.seconds < math.inf:
         raise InputError(
-            f"{options.seconds:g} s is no time to record", "--seconds", "give a number above zero"
+            f"{options.seconds:g} s is not a valid duration", "--seconds", "give a number above zero"
         )
     BAUD.checked(options.baud)
     source = simulated_source() if options.simulate else serial_source(options.port, options.baud)

@@ -45,7 +45,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 
 
 def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
-    """What hears the worker of a command line, and shows that it goes on where it is silent.
+    """Listener to a command's worker process; shows that the worker is alive while it is silent.
 
     Loaded once there is something to hear: the worker starts first, and says which package is missing.
     """
@@ -125,17 +125,17 @@ def _error(options: Any, folder: Path | None, stage: str, made: Sequence[str], c
     return _Crashed(
         f"the process that did the work {_how(crash)}",
         where,
-        f"if memory was short: {memory}{shared}{coarser}; then {again} takes up what is finished. If it ends "
-        f"like this again, {keep}",
+        f"if memory was short: {memory}{shared}{coarser}; then {again} continues from the finished stages. "
+        f"If it ends like this again, {keep}",
     )
 
 
 def _how(crash: Crash) -> str:
     if not crash.signal:
-        return f"was ended by a library, without a word (exit status {crash.status})"
+        return f"was ended by a library without a message (exit status {crash.status})"
     name = signal.Signals(crash.signal).name if crash.signal in {*signal.Signals} else str(crash.signal)
     if name == "SIGKILL":
-        return "was killed (SIGKILL): by somebody, or by the system, which does that where memory runs out"
+        return "was killed (SIGKILL) by a user, or by the system because memory ran out"
     return f"crashed ({name}): a library that it uses was refused memory, or has a fault"
 
 

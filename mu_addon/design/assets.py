@@ -21,7 +21,7 @@ def asset_root() -> Path:
     raise InputError(
         "the folder of presets and protocols is missing",
         f"{package / 'assets'} or {package.parent / 'assets'}",
-        "install the whole extension or work in a complete checkout",
+        "install the complete extension or work in a complete checkout",
     )
 
 

@@ -64,7 +64,7 @@ def parsed(text: str) -> tuple[CellFactor, ...]:
             factor = math.nan
         if match is None or not math.isfinite(factor):
             raise _refused(
-                f"{entry.strip()!r} is no entry of cells", 'write column, row and chamber: "0 2 3: 0.8"'
+                f"{entry.strip()!r} is not an entry of cells", 'write column, row and chamber: "0 2 3: 0.8"'
             )
         if not LEAST <= factor <= MOST:
             raise _refused(

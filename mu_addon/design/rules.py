@@ -225,8 +225,8 @@ def _ends(d: Dimensions) -> None:
     if d.inlet_radius >= bore:
         _refuse(
             "inlet within the neck's bore",
-            f"an inlet of {2 * d.inlet_radius / s:g} mm opens beside the cavity, "
-            f"whose first neck is {2 * bore / s:.4g} mm wide inside",
+            f"an inlet of {2 * d.inlet_radius / s:g} mm is wider than the cavity "
+            f"there: its first neck is {2 * bore / s:.4g} mm wide inside",
             "[chambers] inlet_diameter_mm",
             f"the largest inlet that fits is {_below(2 * bore / s):g} mm",
         )
@@ -280,7 +280,7 @@ def _grading(d: Dimensions) -> None:
             f"a factor of {most:.4g} makes struts {most * d.midspan_diameter / d.scale:.4g} mm wide, which "
             f"close the cell's openings, {opening / d.scale:.4g} mm across",
             "[grading] " + ", ".join(d.grading.grading.names),
-            f"let the factors come to less than {opening / d.midspan_diameter:.4g} everywhere",
+            f"keep the product of the factors below {opening / d.midspan_diameter:.4g} everywhere",
         )
     if least * d.junction_diameter < LEAST_STRUT_MM * d.scale:
         _refuse(

@@ -81,7 +81,7 @@ class StrutCell:
             raise InputError(
                 f"lattice {self.kind.name!r} is not its own mirror image across {' and '.join(across)}",
                 "lattice kind",
-                "only kinds with three mirror planes can be taken as an eighth of their cell",
+                "only kinds with three mirror planes can be computed on an eighth of their cell",
             )
         for name in ("size_mm", "junction_radius_mm", "midspan_radius_mm", "skin_factor"):
             if getattr(self, name) <= 0.0:
@@ -176,7 +176,7 @@ def specimen_solid(cell: StrutCell, n: int, facets: Facets | None = None) -> tup
     E - V + 1 of the lattice's graph: struts then close the openings or touch where they share no node.
     """
     if n < 1:
-        raise InputError(f"{n} cells a side are none", "specimen", "give 1 or more")
+        raise InputError(f"{n} cells a side are too few", "specimen", "give 1 or more")
     octant, faces = _octant(_shape(cell), facets or Facets())
     side = 2 * n
     parts: list[NDArray[np.int64]] = []

@@ -204,7 +204,7 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         mesh = read_buffer(io.BytesIO(content))
         corners = [np.asarray(face) for block in mesh.cells for face in block.data if len(face) > 2]
         if any(not np.issubdtype(face.dtype, np.integer) for face in corners):
-            raise ValueError("a corner of a face is no whole number")
+            raise ValueError("a corner of a face is not a whole number")
         faces = [face.tolist() for face in corners]
         points = np.asarray(mesh.points, float)
         if points.ndim != 2 or points.shape[1] != 3:

@@ -174,7 +174,7 @@ class Wall:
         """Raise InputError where the stress depends on history; what: the job that does not support it."""
         if self.has_memory:
             raise InputError(
-                f"{what} knows no wall that remembers",
+                f"{what} does not support a wall with memory",
                 "[wall] law, friction_share",
                 'simulate it with `simulate` or `place`, or take law = "yeoh" and friction_share = 0',
             )
@@ -195,7 +195,7 @@ def require_used(wall: Wall, given: Iterable[str]) -> None:
         if name not in offered(wall.law, 1.0):
             having = [law for law, names in _OF_LAW.items() if name in names]
             raise InputError(
-                f"{name} means nothing to law = {wall.law!r}",
+                f"{name} has no effect with law = {wall.law!r}",
                 f"[wall] {name}",
                 f"write law = {' or '.join(map(repr, having))}, or leave it out",
             )

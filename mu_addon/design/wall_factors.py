@@ -35,7 +35,7 @@ def parsed(text: str) -> dict[int, float]:
         except ValueError:
             factor = math.nan
         if match is None or not math.isfinite(factor):
-            raise _refused(f"{entry.strip()[:40]!r} is no chamber and factor", 'write "1: 0.8; 6: 1.3"')
+            raise _refused(f"{entry.strip()[:40]!r} is not a chamber and a factor", 'write "1: 0.8; 6: 1.3"')
         if not LEAST <= factor <= MOST:
             raise _refused(
                 f"the factor {factor:g} of chamber {match[1]} is out of bounds",

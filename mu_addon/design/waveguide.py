@@ -289,7 +289,7 @@ def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
             raise InputError(
                 f"({x:.4g}, {y:.4g}, {z:.4g}) mm is not a node of the lattice",
                 "path",
-                "take a path of this unit: of paths.csv of `place --paths graph` at the same scale",
+                "take a path of this unit, from the paths.csv of `place --paths graph` at the same scale",
             )
         found.append(int(gap.argmin()))
     return found

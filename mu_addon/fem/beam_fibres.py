@@ -1,4 +1,4 @@
-"""What a law other than neo-Hooke's adds to beams: energy of fibres along them, under uniaxial stress.
+"""Terms that laws other than neo-Hooke's add to beams: energy of fibres along them, under uniaxial stress.
 
 The beams of `fem.beams` are of a neo-Hookean resin. A fibre of another law differs from it by the energy of a
 rod of both laws pulled along the beam, free to change its section. Strains of fibres are those of linear

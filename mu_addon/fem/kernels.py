@@ -25,7 +25,7 @@ wp.config.enable_backward = False
 def start_warp() -> None:
     """Start Warp with a cache that can be used, without its notice that this machine has no NVIDIA driver.
 
-    That is no fault of a run's, and is written by native code straight to the process's standard error.
+    That is not a fault of the run, and is written by native code straight to the process's standard error.
     """
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)

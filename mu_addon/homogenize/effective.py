@@ -196,7 +196,7 @@ def write_effective(path: Path, found: Effective) -> None:
 def read_effective(path: str | Path) -> Effective:
     """Read effective.toml.
 
-    Raises InputError where the file cannot be read or is no text, and as `parse_effective`.
+    Raises InputError where the file cannot be read or is not text, and as `parse_effective`.
     """
     path = Path(path)
     try:

@@ -1,6 +1,6 @@
 """Tables in the rows of a file, judged by column: a row belongs to one if its columns have numbers.
 
-A row with a cell that is no number, a line of text or a blank line does not end a table; unread parts of them
+A row with a cell that is not a number, a line of text or a blank line does not end a table; unread parts
 are listed with lines and reason.
 """
 
@@ -53,7 +53,7 @@ class Unread:
 
     @property
     def words(self) -> str:
-        """The same in words, such as "line 62: 'OVERLOAD' in 'Load (N)' is no number"."""
+        """The same in words, such as "line 62: 'OVERLOAD' in 'Load (N)' is not a number"."""
         return f"{self.what or spans(self.lines)}: {self.why}"
 
 
@@ -76,7 +76,7 @@ class Block:
     columns: the quantity of each; values (n, columns) as in the file, nan where one is missing or unreadable;
     lines (n,) in the file; label: name above its columns, "" without one; facts: of the rows above, by name
     in small letters: the cells after it, none for a line of one cell; decimal: the sign in these; bad: text
-    of the cells that are no number, by row and column; unread: columns that are not read; unsure: both
+    of the cells that are not numbers, by row and column; unread: columns that are not read; unsure: both
     decimal signs are possible; noted: conclusions; clock: the column that holds times of day, None for none.
     """
 
@@ -164,7 +164,7 @@ class _Finding:
         """List rows of numbers that belong to no record, also one that was cut after its first number.
 
         Or at another place: a row with a number directly below such a one or the last record, which ends
-        before row `begin`, is no fact of what follows.
+        before row `begin`, is not a fact of what follows.
         """
         rows, last = [], begin - 1 if begin else -2
         for k in places:
@@ -466,14 +466,14 @@ def _named(title: str, k: int) -> str:
 
 
 def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) -> None:
-    """Raise InputError if commas divide columns and decimals alike."""
+    """Raise InputError if commas separate columns as well as decimals."""
     named = sum(map(bool, heads))
     if sheet.delimiter != "," or named < 2 or any("." in cell for row in rows[:99] for cell in row.cells):
         return
     widths = sorted(len(row.cells) for row in rows)
     if widths[len(widths) // 2] >= 2 * named - 1 and widths[-1] > named:
         raise InputError(
-            f"{widths[-1]} cells under {named} titles: commas divide columns and decimals alike",
+            f"{widths[-1]} cells under {named} titles: commas separate columns as well as decimals",
             f"line {rows[0].line}",
             "export it with semicolons or tabs between columns, or with decimal points",
         )
@@ -520,7 +520,7 @@ def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
     noted = ""
     if found.both:
         noted = (
-            f"{found.decimal!r} divides decimals and thousands alike from line {lines[found.both[0]]} on: "
+            f"{found.decimal!r} separates decimals as well as thousands from line {lines[found.both[0]]} on: "
             f"{cells[found.both[0]]} is read as {found.values[found.both[0]]:.10g}"
         )
     bad = {i: cells[i] for i in found.unreadable}
@@ -534,7 +534,7 @@ def _require_forced(sheet: Sheet, unreadable: Sequence[int], cells: Sequence[str
     for i in unreadable:
         if number(cells[i], other) is not None:
             raise InputError(
-                f"{cells[i]!r} is no number where {sheet.forced!r} is the decimal sign",
+                f"{cells[i]!r} is not a number where {sheet.forced!r} is the decimal sign",
                 f"line {lines[i]}",
                 f"answer decimal={other}, or leave the decimal sign to the columns",
             )

@@ -55,7 +55,7 @@ def _titles(cells: Sequence[str], header: dict[str, tuple[str, ...]]) -> tuple[s
 
 
 def _time(header: dict[str, tuple[str, ...]], count: int) -> tuple[str, str]:
-    """Time of a row by the beginning and step of its segment, and how; "" where these are no numbers."""
+    """Time of a row by the beginning and step of its segment, and how; "" where these are not numbers."""
     decimal = (header.get("Decimal_Separator") or (".",))[0]
     texts = [(header.get(key) or ("",))[0] for key in ("X0", "Delta_X")]
     begin, step = (number(text, decimal) for text in texts)

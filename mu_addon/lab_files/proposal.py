@@ -198,7 +198,7 @@ class _Proposing:
     def _why_free(self, k: int) -> str:
         one = self.block.columns[k]
         if one.quantity == "count":
-            return "no quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
+            return "not a quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
         return f"its quantity is not known; say it with column.{self._name(one)}=QUANTITY"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
@@ -280,7 +280,7 @@ class _Proposing:
             return None
         if answer not in READ_IN:
             raise InputError(
-                f"{key} = {answer!r} is no quantity",
+                f"{key} = {answer!r} is not a quantity",
                 self.where,
                 f"choose one of {', '.join(READ_IN)}, or none",
             )
@@ -333,7 +333,7 @@ class _Proposing:
             known = ("", 1.0)
         if known is None or known[0] != wanted:
             raise InputError(
-                f"{key} = {answer!r} is no unit of {one.quantity}",
+                f"{key} = {answer!r} is not a unit of {one.quantity}",
                 self.where,
                 f"choose one of {', '.join(_OFTEN[wanted])}; column.{self._name(one)}=QUANTITY says that "
                 f"it is no {one.quantity}",
@@ -523,12 +523,16 @@ class _Proposing:
                 text = self.block.bad.get((int(i), self.places[name]))
                 if may_be_missing(name):
                     if text is not None:
-                        why = f"{text!r} in {self._title(self.places[name])} is no number: left empty"
+                        why = f"{text!r} in {self._title(self.places[name])} is not a number: left empty"
                         reasons.setdefault(why, []).append(int(self.block.lines[i]))
                 elif self.keep[i]:
                     self.keep[i] = False
                     title = self._title(self.places[name])
-                    why = f"{text!r} in {title} is no number" if text is not None else f"no number in {title}"
+                    why = (
+                        f"{text!r} in {title} is not a number"
+                        if text is not None
+                        else f"no number in {title}"
+                    )
                     reasons.setdefault(why, []).append(int(self.block.lines[i]))
         self.unread += [Unread("", why, tuple(lines)) for why, lines in reasons.items()]
         if self.keep.sum() < KINDS[kind].fewest:
@@ -547,7 +551,7 @@ class _Proposing:
         begins = float(columns["time_s"][0])
         if begins > _LONGEST_TEST_S:
             columns["time_s"] = columns["time_s"] - begins
-            self.concluded.append(f"time_s: less its first value, {begins:.10g} s, of a calendar")
+            self.concluded.append(f"time_s: minus its first value, {begins:.10g} s, of a calendar")
         step = np.diff(columns["time_s"])
         lines = self.block.lines[self.keep]
         if (step < 0).any():
@@ -558,7 +562,7 @@ class _Proposing:
             )
         if not KINDS[kind].timed and (step == 0).any():
             at = lines[int(np.argmax(step == 0)) + 1]
-            why = f"time stands still at line {at}, and {kind} does not need it"
+            why = f"time does not increase at line {at}, and {kind} does not need it"
             self.unread.append(Unread(self._title(self.places["time_s"]), why))
             del columns["time_s"]
 
@@ -585,7 +589,7 @@ class _Proposing:
         if abs(first) > _OFFSET * float(np.nanmax(found) - np.nanmin(found)):
             columns["displacement_mm"] = found - first
             self.concluded.append(
-                f"displacement_mm: less its first value, {first:g} mm, the place of the machine "
+                f"displacement_mm: minus its first value, {first:g} mm, the machine's position "
                 "(zero=as_read keeps it)"
             )
 

@@ -63,7 +63,7 @@ def sheet_of_text(text: str, decimal: str | None = None, where: str = "") -> She
     """Sheet of a text, or of the tables in HTML; raises InputError for HTML without one."""
     if not is_markup(text):
         rows, delimiter = rows_of(text)
-        # A comma between columns is no decimal sign but in quotes.
+        # A comma between columns is not a decimal sign but in quotes.
         usual = "." if delimiter == "," and '"' not in text else ""
         if is_labview(rows):
             rows = rows_of_labview(rows)
@@ -113,7 +113,7 @@ def _require_small(path: Path, data: bytes) -> None:
             unpacked = sum(entry.file_size for entry in archive.infolist())
     except zipfile.BadZipFile as error:
         raise InputError(
-            "the workbook is cut off, or is no workbook", str(path), "export it again, or save it as CSV"
+            "the workbook is cut off, or is not a workbook", str(path), "export it again, or save it as CSV"
         ) from error
     if unpacked > _MOST_UNPACKED:
         raise InputError(

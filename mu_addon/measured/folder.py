@@ -234,7 +234,7 @@ def _axis(value: Any, at: _Place) -> tuple[float, float, float]:
         return tuple(float(a == value) for a in AXES)  # type: ignore[return-value]
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(
-            f"orientation_axis = {value!r} is no direction",
+            f"orientation_axis = {value!r} is not a direction",
             at("orientation_axis"),
             'give "x", "y", "z" or three numbers, [x, y, z]',
         )
@@ -367,7 +367,7 @@ def _check_apart(found: Experiment, before: Sequence[Experiment], at: _Place) ->
             raise InputError(
                 f"{found.name!r} and {other.name!r} contain the same data, and one of them is held out",
                 at("file"),
-                "hold out data that are not used in any fit",
+                "hold out data that no fit uses",
             )
 
 
@@ -457,7 +457,7 @@ def require_same_data(measured: Measured, before: Any, now: Mapping[str, Any]) -
     known = before if isinstance(before, Mapping) else {}
     other = [name for name in {**known, **now} if known.get(name) != now.get(name)]
     raise InputError(
-        f"the measured data are not those that the run was made with: {', '.join(other[:3])}",
+        f"the measured data have changed since the run was made: {', '.join(other[:3])}",
         str(measured.folder),
-        "put those back, or give these a separate folder of results",
+        "restore those, or use a separate results folder for these",
     )

@@ -70,7 +70,7 @@ def down(orientation_deg: float, axis: Direction = X) -> Array:
     length = float(np.linalg.norm(n))
     if not (n.shape == (3,) and length > 0.0):
         raise InputError(
-            f"{axis!r} is no axis to turn about", "orientation", "give three numbers, not all of them 0"
+            f"{axis!r} is not an axis to turn about", "orientation", "give three numbers, not all of them 0"
         )
     n /= length
     a, z = math.radians(orientation_deg), np.array([0.0, 0.0, 1.0])

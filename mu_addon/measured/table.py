@@ -237,7 +237,7 @@ def _numbers(body: Sequence[tuple[int, list[str]]], place: int, name: str, width
             values[i] = float(cell)
             if abs(values[i]) > LARGEST:
                 raise InputError(
-                    f"{cell} is no reading",
+                    f"{cell} is not a reading",
                     _at(path, row, name),
                     "correct it, or leave the cell empty where nothing was read",
                 )

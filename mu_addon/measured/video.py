@@ -166,7 +166,7 @@ def _check(tracks: Tracks, view: View, where: str) -> None:
         raise InputError("ruler_mm is missing or 0", where, "give ruler_mm, the distance of its two markers")
     for name, value in (("ruler_mm", view.ruler_mm), ("mm_per_pixel", view.mm_per_pixel)):
         if value is not None and not (math.isfinite(value) and value > 0):
-            raise InputError(f"{name} = {value:g} is no length", where, "give a number above 0")
+            raise InputError(f"{name} = {value:g} is not a length", where, "give a number above 0")
 
 
 def _scale(q: Mapping[str, Array], view: View, known: Array, remarks: list[Remark], where: str) -> float:
@@ -215,7 +215,7 @@ def _remark_lost_markers(q: Mapping[str, Array], time_s: Array, remarks: list[Re
                 Remark(
                     f"marker {name!r} is lost in {len(lost)} of {len(at)} frames, {_spans(lost, time_s)}",
                     where,
-                    "these rows stay empty; track it again from there where the motion matters",
+                    "these rows stay empty; track it again from there if the motion there matters",
                 )
             )
 

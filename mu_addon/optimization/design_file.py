@@ -332,7 +332,7 @@ def _places_of(
 
 
 def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fixed: Mapping[str, Any]) -> str:
-    """What only a homogenised lattice answers, in words, or ""."""
+    """Quantities that need a homogenised lattice, in words, or ""."""
     for target in targets:
         if target.kind in OF_SENSOR:
             return f"{target.kind} is of a sensor, which a printed body has meshed into it"

@@ -280,7 +280,7 @@ def _freedom(table: Mapping[str, Any], where: str) -> Freedom | None:
 
 
 def _choice(table: Mapping[str, Any], where: str) -> Freedom:
-    """The freedom of a path or a resin; raises InputError where its values are no names."""
+    """The freedom of a path or a resin; raises InputError where its values are not names."""
     name = str(table["parameter"])
     _require_keys(table, ("parameter", "values"), where)
     values = table.get("values")
@@ -344,7 +344,7 @@ def _require_start(freedom: Freedom, unit: Unit, where: str) -> None:
         within = value in d.choices if d.choices else d.type is bool or (fits and d.low <= value <= d.high)
         if not (fits and within):
             raise InputError(
-                f"{value!r} is no value of {freedom.name}",
+                f"{value!r} is not a value of {freedom.name}",
                 f"{where}, values",
                 f"choose {d.allowed or 'true or false'}",
             )

@@ -19,7 +19,7 @@ SEED = described("seed", 0, "seed of the samples that the search draws", low=0, 
 WORKERS = described(
     "workers",
     1,
-    "number of units simulated in parallel on this machine; it decides how the search goes",
+    "number of units simulated in parallel on this machine; the search depends on it",
     low=1,
     high=256,
 )

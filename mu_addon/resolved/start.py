@@ -25,7 +25,7 @@ def numbers_of(mesh: Mesh, points: Array) -> Array:
     if away.max() > 1e-6 * np.ptp(mesh.nodes[:, 2]):
         x, y, z = points[away.argmax()].round(3).tolist()
         raise InputError(
-            f"({x:g}, {y:g}, {z:g}) mm is no node of the lattice's mesh",
+            f"({x:g}, {y:g}, {z:g}) mm is not a node of the lattice's mesh",
             "path, [waveguide] row",
             "choose nodes within the envelope, and a lattice with a node at the cells' centres",
         )

@@ -27,7 +27,7 @@ def cores() -> int:
 
 
 def slowed_by_load() -> float:
-    """How many times slower the machine's other work makes a new process, by the load of the last minute.
+    """Factor by which the machine's other work slows a new process, by the load of the last minute.
 
     Half of what the load says: work that waits for a disk or has a lower priority counts in it, too.
     """
@@ -36,7 +36,7 @@ def slowed_by_load() -> float:
 
 
 def slowed_so_far() -> float:
-    """How many times slower other work makes this process: by what it waited for a core, and by the load.
+    """Factor by which other work slows this process: by its wait for a core, and by the load.
 
     Their geometric mean, as its wait is that of a second or two. By the load alone where the system does not
     count waits, or this process has hardly run yet.
@@ -125,7 +125,7 @@ def ctrl_c_held_back() -> Iterator[None]:
 
 
 def limit_memory(megabytes: int) -> None:
-    """Limit the memory of this process and its future children, in MB; 0 is no limit.
+    """Limit the memory of this process and its future children, in MB; 0 means no limit.
 
     On Linux only, where memory requested and never touched counts as well; no effect on other systems.
     """

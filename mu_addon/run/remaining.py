@@ -1,4 +1,4 @@
-"""What is left of a run's plan in a folder where the same inputs ran before."""
+"""Remaining part of a run's plan, in a folder where the same inputs ran before."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def format_of(data: bytes, whole: bool, enough: int, last: str | None) -> str | 
 
 
 def whole_lines(data: bytes, whole: bool) -> list[str | None]:
-    """The lines of some bytes that are not blank, None for one that is no text; see `format_of`."""
+    """The lines of some bytes that are not blank, None for one that is not text; see `format_of`."""
     lines = [text_of(p) for p in data.split(b"\n")[0 if whole else 1 : -1]]
     return [line for line in lines if line != ""]
 

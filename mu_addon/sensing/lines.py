@@ -68,7 +68,7 @@ def pairs_of(line: str) -> Pairs | None:
 
 
 def _pairs_until(line: str) -> tuple[Pairs | None, str]:
-    """The pairs of a line and nothing, or None and the rest that is no pair or names one again."""
+    """The pairs of a line and nothing, or None and the rest that is not a pair or names one again."""
     line = line.translate(_SAME_SIGNS).removeprefix(">")
     if ";" in line:
         line = _DECIMAL_COMMA.sub(".", line)
@@ -95,14 +95,14 @@ def why_unread(line: str) -> str:
     if not any(character.isdigit() for character in line):
         return "it holds no number"
     if line.startswith("{"):
-        return "it is no whole JSON object of numbers"
+        return "it is not a whole JSON object of numbers"
     if ":" in line or "=" in line:
         found, rest = _pairs_until(line)
         if found:
             return "a number in it is too large"
         return f"{rest[:40]!r} is no `label:value`" if found is None else "no value in it is a number"
     cell = next((cell for cell in _cells(line) if not _VALUE.match(cell)), "")
-    return f"{cell[:40]!r} is no number, and has no label before it" if cell else "a number is too large"
+    return f"{cell[:40]!r} is not a number, and has no label before it" if cell else "a number is too large"
 
 
 def json_of(line: str) -> Pairs | None:
@@ -155,7 +155,7 @@ def header_of(line: str) -> list[str] | None:
 
 
 def row_of(line: str) -> list[float] | None:
-    """Numbers of a CSV row, in the device's units, or None where a field is no number or is infinite.
+    """Numbers of a CSV row, in the device's units, or None where a field is not a number or is infinite.
 
     >>> row_of("1.5,2"), row_of("time,light")
     ([1.5, 2.0], None)

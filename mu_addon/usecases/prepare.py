@@ -61,7 +61,7 @@ def read_job(folder: Path) -> Job:
     values, _ = read_inputs(path)
     what = values.pop("what", "")
     if what not in MAKERS:
-        raise InputError(f"{what!r} is nothing that is prepared", str(path), f"one of {', '.join(MAKERS)}")
+        raise InputError(f"{what!r} cannot be prepared", str(path), f"one of {', '.join(MAKERS)}")
     unit, body = folder / UNIT, folder / BODY
     return Job(
         what, values, read_unit(unit) if unit.is_file() else None, read_body(body) if body.is_file() else None

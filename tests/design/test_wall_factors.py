@@ -43,9 +43,9 @@ def test_a_text_has_one_form_and_comes_back(factors):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("2", "no chamber and factor"),
-        ("2: thin", "no chamber and factor"),
-        ("2: nan", "no chamber and factor"),
+        ("2", "not a chamber and a factor"),
+        ("2: thin", "not a chamber and a factor"),
+        ("2: nan", "not a chamber and a factor"),
         ("2: 0.8; 2: 0.9", "two factors"),
         ("2: 2.5", "out of bounds"),
         ("7: 0.8", "no chamber 7"),

@@ -62,7 +62,7 @@ REFUSED = {
         ("stream", "--simulate", "--seconds", "1", "--calibration", "none.toml"),
         ("calibration: No such file or directory", "where: none.toml", "that `calibrate` writes"),
     ),
-    "a calibration that is no text": (
+    "a calibration that is not text": (
         ("stream", "--simulate", "--seconds", "1", "--calibration", "noise.toml"),
         ("it is not UTF-8 text", "where: noise.toml", "that `calibrate` writes"),
     ),

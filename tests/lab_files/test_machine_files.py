@@ -116,7 +116,7 @@ GROUPED = lines(
 def test_a_decimal_sign_that_is_answered_wrongly_is_refused_with_the_line(tmp_path):
     p, _ = one(tmp_path, GROUPED, {"decimal": ".", "kind": "unit_pressure"})
     assert [values[-1] for values in p.columns.values()] == pytest.approx([2.9, 58.0, 14.5])
-    with pytest.raises(InputError, match=r"'0\.000' is no number") as caught:
+    with pytest.raises(InputError, match=r"'0\.000' is not a number") as caught:
         understood(tmp_path, GROUPED, {"decimal": ",", "kind": "unit_pressure"})
     assert caught.value.where.endswith("line 2")
 
@@ -136,8 +136,8 @@ def test_thousands_as_countries_write_them(tmp_path, sign):
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("6.0,OVERLOAD,6.00", "line 62: 'OVERLOAD' in column 'Load (N)' is no number"),
-        ("6.0,#DIV/0!,6.00", "line 62: '#DIV/0!' in column 'Load (N)' is no number"),
+        ("6.0,OVERLOAD,6.00", "line 62: 'OVERLOAD' in column 'Load (N)' is not a number"),
+        ("6.0,#DIV/0!,6.00", "line 62: '#DIV/0!' in column 'Load (N)' is not a number"),
         ("6.0,,6.00", "line 62: no number in column 'Load (N)'"),
         ("*** valve opened ***", "line 62: '*** valve opened ***': no row of numbers, within the table"),
         ("6.0,OVERLOAD,OVERLOAD", "line 62: '6.0 OVERLOAD OVERLOAD': no row of numbers, within the table"),
@@ -321,7 +321,7 @@ def test_cells_as_programs_fill_them(tmp_path, written):
 
 def test_commas_between_columns_and_in_numbers_are_refused(tmp_path):
     text = lines("Time,Load,Extension", *(f"{i},5,{2 * i},5,0,{i:02d}" for i in range(40)))
-    with pytest.raises(InputError, match="commas divide columns and decimals alike") as caught:
+    with pytest.raises(InputError, match="commas separate columns as well as decimals") as caught:
         understood(tmp_path, text)
     assert "line 2" in caught.value.where
 
@@ -432,7 +432,7 @@ def test_the_terminal_shows_what_was_understood(tmp_path):
     shown = terminal_lines(understood(tmp_path, lines(TITLES, *body)))
     assert shown[0] == "a: coupon, 99 rows, a.csv, lines 2 to 101"
     assert any(line.split()[:1] == ["force_N"] and "49.5" in line and "\u2588" in line for line in shown)
-    assert "  not read: line 62: 'OVERLOAD' in column 'Load (N)' is no number" in shown
+    assert "  not read: line 62: 'OVERLOAD' in column 'Load (N)' is not a number" in shown
 
 
 REMARKS = [

@@ -224,7 +224,7 @@ def test_the_struts_of_single_cells_are_free_each_by_a_factor():
     unit = changed_unit(found.unit, found.freedoms, [0.8, 1.2])
     assert unit.grading.cells == "* 0 *: 1.1; 0 -1 *: 0.8; 0 2 3: 1.2"
     assert [f.value_of(unit) for f in found.freedoms] == [0.8, 1.2]
-    # A factor of 1 is no entry.
+    # A factor of 1 is not an entry.
     assert changed_unit(unit, found.freedoms, [1.0, 1.2]).grading.cells == "* 0 *: 1.1; 0 2 3: 1.2"
 
 
@@ -254,7 +254,7 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE, "no parameter is free", "freedom"),
         (HEAD + WALL, "no target is given", "target"),
         (HEAD + 'fidelty = "resolved"\n' + ANGLE + WALL, "did you mean 'fidelity'", "line 3"),
-        (HEAD + ANGLE + KIND, "no value of", "line 9"),
+        (HEAD + ANGLE + KIND, "not a value of", "line 9"),
         (
             HEAD
             + HOMOGENISED

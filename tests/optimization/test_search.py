@@ -95,7 +95,7 @@ def test_the_value_of_a_discrete_freedom_is_chosen_too():
 
 
 def test_what_stands_in_the_way_is_named():
-    """a <= 0.5 and a + b >= 3 cannot both be with b <= 2; the third is no obstacle."""
+    """a <= 0.5 and a + b >= 3 cannot both be with b <= 2; the third is not an obstacle."""
     functions = [lambda a, b: a, lambda a, b: a + b, lambda a, b: b]
     _, observe = observer(functions, TWO)
     asked = [

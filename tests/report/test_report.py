@@ -124,7 +124,7 @@ def test_every_path_and_rule_is_in_the_table(page):
 
 
 def test_assumptions_are_told_with_their_reason(page):
-    section = page.words[page.words.index("The paper does not print these values") :]
+    section = page.words[page.words.index("The paper does not give these values") :]
     assert "chambers.wall_mm0.8mmthe thinnest wall that this printer holds" in section
 
 

@@ -284,7 +284,7 @@ def test_toml_and_json() -> None:
 def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="folder"):
         file_text(tmp_path)
-    with pytest.raises(OSError, match="no name"):
+    with pytest.raises(OSError, match="not a file name"):
         file_text("a\0b")
     (tmp_path / "long").write_text("x" * 100)
     with pytest.raises(OSError, match="more than"):
@@ -310,7 +310,7 @@ def test_a_pipe_that_takes_a_files_place_is_not_waited_for(
         os.mkfifo(path)
 
     monkeypatch.setattr(reading, "require_readable", swap)
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="not a regular file"):
         file_bytes(path)
 
 
@@ -325,12 +325,12 @@ def test_a_pipe_in_a_folder_of_results(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["record", "--simulate", "--seconds", "nan", "--out", "OUT"], "nan is no number"),
-        (["record", "--simulate", "--seconds", "inf", "--out", "OUT"], "no time"),
-        (["record", "--simulate", "--seconds", "-1", "--out", "OUT"], "no time"),
+        (["record", "--simulate", "--seconds", "nan", "--out", "OUT"], "nan is not a number"),
+        (["record", "--simulate", "--seconds", "inf", "--out", "OUT"], "not a valid duration"),
+        (["record", "--simulate", "--seconds", "-1", "--out", "OUT"], "not a valid duration"),
         (["record", "--port", "x", "--baud", "0", "--out", "OUT"], "baud = 0 is out of bounds"),
         (["design", "--preset", "mu-1.0x", "--out", "OUT\0x"], "NUL"),
-        (["design", "--preset", "mu-1.0x", "--out", "OUT\udcff"], "no UTF-8"),
+        (["design", "--preset", "mu-1.0x", "--out", "OUT\udcff"], "not UTF-8"),
         (["specimens", "--resin", "", "--out", "OUT"], "empty"),
         (["design", "--preset", "mu-1.0x", "--out", ""], "no output folder"),
         (["simulate", "--preset", "mu-1.0x", "--model", "", "--out", "OUT"], "empty"),

@@ -298,8 +298,8 @@ def test_a_line_in_no_known_format_is_complained_about_once():
     [
         ("Sensor ready", "it holds no number"),
         ("light:5a2,dark:1", "'light:5a2,dark:1' is no `label:value`"),
-        ("light 512 of 1023", "'light' is no number"),
-        ('{"light": 512', "no whole JSON object"),
+        ("light 512 of 1023", "'light' is not a number"),
+        ('{"light": 512', "not a whole JSON object"),
     ],
 )
 def test_the_first_line_that_is_not_understood_is_shown(line, why):

@@ -121,7 +121,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     assert context.status == 0
     assert set(context.summary["untested"]) == {"equibiaxial", "pure_shear"}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Equibiaxial was not tested. Laws that fit the other modes differ there by a factor of" in html
+    assert "Equibiaxial was not tested. There, laws that fit the other modes differ by a factor of" in html
     assert "relative" in (tmp_path / "out" / "fit.toml").read_text()
 
 

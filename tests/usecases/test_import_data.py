@@ -199,8 +199,8 @@ def test_another_experiment_of_the_name_is_kept(tmp_path):
         ({"knd": "coupon"}, "answers no question"),
         ({"two.kind": "coupon"}, "answers no question"),
         ({"unit.Krft": "N"}, "answers no question"),
-        ({"unit.Kraft": "mm"}, "is no unit of force"),
-        ({"column.Kraft": "weight"}, "is no quantity"),
+        ({"unit.Kraft": "mm"}, "is not a unit of force"),
+        ({"column.Kraft": "weight"}, "is not a quantity"),
         ({"decimal": "p"}, "is not known"),
         (COUPON | {"unit.Weg": "mm", "unit.Kraft": "N", "section_mm": "12.5"}, "2 numbers"),
         (COUPON | {"unit.Weg": "mm", "unit.Kraft": "N", "length_mm": "-4"}, "not above 0"),
@@ -255,7 +255,7 @@ def test_the_command_line(tmp_path):
     done = subprocess.run([*run, *given], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "out/summary.json").read_text())
-    assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': no quantity that is read"]
+    assert summary["experiments"]["one"]["not_read"] == ["column 'Nr': not a quantity that is read"]
     assert modulus_kPa(read_folder(tmp_path / "out").experiments[0]) == pytest.approx(2500.0, rel=1e-4)
 
 

@@ -101,8 +101,8 @@ def test_a_point_to_reach_and_what_is_wrong_with_a_chain(tmp_path):
     for settings, words in (
         ({}, "neither a protocol nor a target"),
         ({"copies": 8, "turns_deg": "0 1"}, "2 turns for 8 units"),
-        ({"reach_mm": "0 a 1"}, "are no numbers"),
-        ({"reach_mm": "0 1"}, "is no point"),
+        ({"reach_mm": "0 a 1"}, "are not numbers"),
+        ({"reach_mm": "0 1"}, "is not a point"),
         ({"protocol": str(tmp_path / "none.csv")}, "cannot read the protocol"),
     ):
         with pytest.raises(InputError, match=words):

@@ -60,7 +60,7 @@ def test_what_cannot_be_compared_is_said(runs, tmp_path):
     with pytest.raises(InputError, match="different pressures"):
         difference(own, MODEL_A, skin, read_motion(tmp_path / "fewer"), MODEL_A)
     write_bent_motion(tmp_path / "larger", unit=load_preset("mu-1.5x"))
-    with pytest.raises(InputError, match="surface in common"):
+    with pytest.raises(InputError, match="of their surface"):
         difference(read_motion(tmp_path / "larger"), MODEL_A, skin_of(tmp_path / "larger"), own, MODEL_A)
     # A motion with memory has more states than pressures: its sample at 20 kPa is not that on the way back.
     twice = attrs.evolve(own, state=own.state[::-1].copy())

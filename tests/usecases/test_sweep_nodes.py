@@ -86,8 +86,8 @@ def test_how_many_studies_at_a_time_decides_no_key_and_a_step_more_does():
     [
         ({"low": 1.0, "high": 0.8}, "not below"),
         ({"low": -1.0, "log": True}, "no logarithm"),
-        ({"values": "0.8 thick"}, "no values"),
-        ({"parameter": "chambers.count", "low": 2.5, "high": 4.0}, "no whole number"),
+        ({"values": "0.8 thick"}, "not values"),
+        ({"parameter": "chambers.count", "low": 2.5, "high": 4.0}, "not a whole number"),
     ],
 )
 def test_ranges_that_are_none_are_refused(settings, words):

@@ -137,7 +137,7 @@ def test_lost_markers_leave_empty_rows_that_diagnose_may_read(tmp_path):
 
 def test_never_at_rest_is_told():
     found = filmed(clip(20, 2.0), Bench(VIEW, MarkerSettings({}), starts_s=2.0), PRESSURE)
-    assert "no frame shows the unit at rest; the angle is relative to 20 kPa at 2 s" in found.remarks[0].what
+    assert "no frame shows the unit at rest; angles are relative to 20 kPa at 2 s" in found.remarks[0].what
     assert found.motion.angle_deg[0] == pytest.approx(0.0, abs=1e-9)
 
 

@@ -92,12 +92,12 @@ def test_columns_for_each_marker(tmp_path, text, names, time_s):
         ("t,A x (mm),A y (mm)\n0,1,2\n1,1,2\n", "'A x (mm)' is in mm", "line 1", "in pixels"),
         ("t,A x,A y\n0,1,-20\n1,1,-30\n", "positions are negative", "a.csv", "upper left corner"),
         ("frame,A x,A y\n0,1,2\n1,1,lost\n", "not a number", "row 3", "correct"),
-        ("frame,A x,A y\n0,1,2\n0,1,2\n", "not after the one before", "row 3", "one animal or track"),
+        ("frame,A x,A y\n0,1,2\n0,1,2\n", "does not increase", "row 3", "one animal or track"),
         ("frame,id,x,y\n0,1,1,2\n0,1,1,2\n", "two rows for one frame", "row 3", "keep the row"),
         ("id,x,y\n1,1,2\n1,1,2\n", "no column of frames", "a.csv", "frame, id, x and y"),
         ("A x,A y,A x,A y\n1,2,3,4\n1,2,3,4\n", "two columns hold the x of A", "line 1", "a name of its own"),
         ("a,b\n1,2\n3,4\n", "no tracked markers", "a.csv", "NAME right_px"),
-        (DEEPLABCUT.replace("3,401", "2.5,401"), "no whole number", "row 6", "correct"),
+        (DEEPLABCUT.replace("3,401", "2.5,401"), "not a whole number", "row 6", "correct"),
     ],
 )
 def test_what_cannot_be_used_is_refused(tmp_path, text, what, where, remedy):
@@ -118,6 +118,6 @@ def test_a_tracker_s_own_file_is_told_what_to_export(tmp_path):
             "bench.toml",
         )
     )
-    with pytest.raises(InputError, match="no table in text") as caught:
+    with pytest.raises(InputError, match="not a text table") as caught:
         followed(table(tmp_path, "x", "net.h5"), bench, pressure, lambda clip, markers: None)
     assert "as CSV" in caught.value.remedy

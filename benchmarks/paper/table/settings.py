@@ -114,5 +114,5 @@ def read_set(name: str) -> dict[str, Any]:
     if set(tables) - {"values", "held_cells"} or not isinstance(values, dict):
         raise InputError("a set has held_cells and a table [values]", str(path), "leave out what else it has")
     if isinstance(held_cells, bool) or not isinstance(held_cells, int | float):
-        raise InputError(f"held_cells = {held_cells!r} is no number", str(path), "give a number of cells")
+        raise InputError(f"held_cells = {held_cells!r} is not a number", str(path), "give a number of cells")
     return {"values": values, "held_cells": float(held_cells)}

@@ -52,7 +52,7 @@ class MU_OT_take_asset(bpy.types.Operator):
             _take_printer(root, box)
         else:
             raise InputError(
-                f"{self.asset!r} is no resin and no printer", "assets", "drop one of this extension"
+                f"{self.asset!r} is neither a resin nor a printer", "assets", "drop one of this extension"
             )
         self.report({"INFO"}, words)
         return {"FINISHED"}

@@ -23,7 +23,7 @@ def selected_meshes(context):
 
 
 def selected_mesh(context):
-    """The selected mesh that is no part of a unit; raises InputError where there is none, or more."""
+    """The selected mesh that is not a part of a unit; raises InputError where there is none, or more."""
     found = selected_meshes(context)
     if len(found) > 1:
         raise InputError(

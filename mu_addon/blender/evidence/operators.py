@@ -72,7 +72,7 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
         for words in extended.left_out:
             self.report({"WARNING"}, f"Not applied: {words}")
         if not extended.applied:
-            self.report({"ERROR"}, "Nothing of the model has a counterpart in a unit")
+            self.report({"ERROR"}, "No part of the model corresponds to a parameter of a unit")
             return {"CANCELLED"}
         beside = extended.effects.words()
         own = [words for words in extended.applied if words not in beside]

@@ -33,9 +33,7 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
         found = evidence.measured_data(root)
         if found is None:
             wrapped(layout, "Choose a folder with experiments.toml and its CSV files", "INFO")
-            wrapped(
-                layout, "A video of the bench becomes one in the Movie Clip Editor, sidebar tab MU", "INFO"
-            )
+            wrapped(layout, "To make one from a video, use the Movie Clip Editor, sidebar tab MU", "INFO")
             return
         if found.measured is None:
             alert(layout, found.trouble)

@@ -87,7 +87,7 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         "cube_height": millimetres(
             10,
             name="Cube Height",
-            description="Of the middle of the cube above the plate",
+            description="Height of the cube's centre above the plate",
             get=_cube_height,
             set=_put_cube,
             options={"SKIP_SAVE"},
@@ -103,14 +103,14 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
                 (
                     "paths",
                     "Grasp and Sensor Paths",
-                    "Besides, every sensor path ranked in a finger that grasps",
+                    "Also rank every sensor path in a finger that grasps",
                 ),
                 ("part", "Part to Print", "Only the printable part as STL and 3MF"),
             ],
         ),
         "homogenised": BoolProperty(
             name="Homogenised Lattice",
-            description="Simulate a continuum in place of the printed struts: quicker, and its fingers press "
+            description="Simulate a continuum in place of the printed struts: quicker, but its fingers press "
             "more than twice as hard as printed ones",
         ),
         "self_contact": blender_property(SELF_CONTACT, name="Self-Contact"),

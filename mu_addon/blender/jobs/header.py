@@ -49,7 +49,7 @@ class MU_OT_job_cancel(bpy.types.Operator):
     def execute(self, context):
         child = start_child.child_of(self.key or next(iter(listed()), ""))
         if child is None:
-            raise InputError("no such job runs", "jobs", "start one first")
+            raise InputError("this job is not running", "jobs", "start one first")
         child.cancel()
         viewports.redraw()
         return {"FINISHED"}

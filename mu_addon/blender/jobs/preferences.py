@@ -15,9 +15,9 @@ class MU_AP_preferences(bpy.types.AddonPreferences):
 
     jobs_go_on: BoolProperty(
         name="Runs Go On When Blender Is Closed",
-        description="Simulations, grasps, diagnoses and node trees that run as Blender is closed go on by "
-        "themselves, and the next session shows them. Off: they end with Blender, and what they have "
-        "finished is kept. Jobs that only wait end either way",
+        description="Simulations, grasps, diagnoses and node trees continue when Blender is closed, and "
+        "the next session shows them. Off: they end with Blender, and finished stages are kept. Jobs "
+        "that are waiting end in either case",
         default=True,
     )
 

@@ -38,7 +38,7 @@ class ObstacleOperator(UnitOperator):
         if not chosen:
             names = ", ".join(o.name for o in found)
             raise InputError(
-                f"{self.name!r} is no obstacle of this unit", root.name, f"choose one of {names}"
+                f"{self.name!r} is not an obstacle of this unit", root.name, f"choose one of {names}"
             )
         return chosen
 

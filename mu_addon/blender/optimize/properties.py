@@ -101,7 +101,7 @@ class MU_PG_target(bpy.types.PropertyGroup):
     )
     gap_mm: FloatProperty(
         name="Gap (mm)",
-        description="From the tip as drawn to the wall",
+        description="Distance from the tip as drawn to the wall",
         default=0.0,
         min=0.0,
         max=200.0,
@@ -191,7 +191,7 @@ def title(name: str, d: Description) -> str:
 
 
 def scale_of(freedom) -> float:
-    """True millimetres in one of the parameter's; 1 if it is no length or the same at every scale."""
+    """True millimetres in one of the parameter's; 1 if it is not a length or the same at every scale."""
     d = FREE.get(freedom.parameter)
     return 1.0 if d is None or d.unit != "mm" else true_scale(freedom.id_data.mu_unit, d)
 
@@ -226,9 +226,9 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
         name="May Be",
         description="How the parameter may change",
         items=[
-            ("range", "Between", "Any value between two"),
+            ("range", "Between", "Any value between two bounds"),
             ("values", "One of", "One of some values"),
-            ("fixed", "Fixed at", "One value, which the search leaves"),
+            ("fixed", "Fixed at", "One value, which the search keeps"),
         ],
     )
     values: StringProperty(
@@ -277,15 +277,15 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     robust: blender_property(ROBUST)
     homogenised: BoolProperty(
         name="Homogenised Lattice",
-        description="Simulate a continuum in place of the printed struts: a third of the time, and angles up "
-        "to twice or half of the printed body's. A sensor's path or a lattice's modulus needs it, and then "
-        "the search takes it by itself",
+        description="Simulate a continuum in place of the printed struts: a third of the time, but angles "
+        "from half to twice those of the printed body. A sensor's path or a lattice's modulus needs it; "
+        "the search then uses it automatically",
         default=False,
     )
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     has_gravity: BoolProperty(
         name="Own Weight",
-        description="The unit bears its weight; then an angle may be asked for at 0 kPa",
+        description="The unit carries its weight; then an angle at 0 kPa can be a target",
         default=False,
     )
     # Horizontal, where weight matters most.

@@ -205,9 +205,9 @@ def write_inputs(root: Any, folder: Path) -> None:
         turned = effects.inputs(root).get("orientation_deg", 0.0)
         if turned != (job.design.orientation_deg or 0.0):
             raise InputError(
-                f"the unit is turned by {turned:g} degrees in Simulate and otherwise here",
+                f"the unit is turned by {turned:g} degrees in Simulate, but not here",
                 "Optimize, Own Weight",
-                "turn it alike in both",
+                "turn it equally in both",
             )
         texts[MODEL] = model
     write_run(folder, LAYOUT, texts)

@@ -171,7 +171,7 @@ def _directions(layout, settings, found) -> None:
         return
     chosen = [build for build in builds if _is_up(build, settings)]
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
-    wrapped(body, "None of these is better than another one in every figure", "INFO")
+    wrapped(body, "None of these is better than another in every figure", "INFO")
     for build in choice + [build for build in chosen if build not in choice]:
         box = body.box()
         row = box.split(factor=0.66)
@@ -277,13 +277,13 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         if settings.compensate == "gauge":
             layout.prop(settings, "gauge")
         if settings.compensate != "none" and settings.formats & {"3mf-beams", "step"}:
-            wrapped(layout, "Beams and STEP stay of nominal size", "INFO")
+            wrapped(layout, "Beams and STEP keep their nominal size", "INFO")
         layout.prop(settings, "vents")
         if settings.vents:
             along = " ".join(f"{round(x, 2):g}" for x in settings.up)
             wrapped(layout, f"For a build along Up, {along}", "INFO")
             if settings.formats & {"3mf-beams", "step"}:
-                wrapped(layout, "Beams and STEP stay without vents", "INFO")
+                wrapped(layout, "Beams and STEP have no vents", "INFO")
         path = root.mu_unit.path
         wrapped(
             layout,

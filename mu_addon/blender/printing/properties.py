@@ -22,7 +22,7 @@ OWN_PRINTER = "own"
 FORMATS = (
     ("stl", "STL", "The printable solid, mm"),
     ("3mf", "3MF", "The printable solid with its unit of length"),
-    ("3mf-beams", "Beams", "3MF with the struts as beams, nominal size: not every slicer knows them"),
+    ("3mf-beams", "Beams", "3MF with the struts as beams, nominal size: not every slicer supports them"),
     ("step", "STEP", "Cavity, membrane, envelope and waveguide for CAD, nominal size"),
     ("txt", "TXT", "Nodes of the lattice and the anchors"),
 )
@@ -37,7 +37,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
         description="Whose limits the check compares with",
         items=[
             *(
-                (name, name.replace("-", " ").title(), "Comes with the extension")
+                (name, name.replace("-", " ").title(), "Included in the extension")
                 for name in asset_names("printers")
             ),
             (
@@ -76,7 +76,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     quality: EnumProperty(
         name="Facets",
-        description="How finely round parts are cut into flat ones",
+        description="How finely round parts are divided into flat facets",
         items=[
             ("export", "Fine", "The quality to print"),
             ("interactive", "Coarse", "Quicker, smaller files"),
@@ -99,8 +99,8 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     vents: BoolProperty(
         name="Vents",
-        description="Vent what traps resin if the unit is built along Up: STL and 3MF get a hole through the "
-        "wall for each cup of the print check, and plug-1.stl .. close them",
+        description="Vent the cups that trap resin if the unit is built along Up: STL and 3MF get a hole "
+        "through the wall for each cup of the print check; plug-1.stl .. close the holes",
     )
     stl_file: StringProperty(
         name="File",
@@ -110,9 +110,9 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     repair: BoolProperty(
         name="Repair",
-        description="Repair the file before it is checked, where there is only one way to: flipped and "
-        "doubled faces, tiny gaps. part.stl is then the repaired part; what has more than one remedy is "
-        "refused",
+        description="Repair the file before the check, where only one remedy is possible: flipped and "
+        "doubled faces, tiny gaps. part.stl is then the repaired part; faults with more than one remedy "
+        "are refused",
     )
     against_unit: BoolProperty(
         name="Compare",
@@ -128,7 +128,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     layer: FloatProperty(
         name="Height",
-        description="Which layer is shown, as a share of the height from the platform's side",
+        description="Layer that is shown, as a share of the height, from the platform",
         default=0.5,
         min=0.0,
         max=1.0,

@@ -100,14 +100,14 @@ FIELDS = (
         "run_difference_mm",
         "Difference of Runs",
         "mm",
-        "Distance between where this run and the one that it is compared with have moved a point",
+        "Distance between the positions of a point in this run and in the run compared with it",
         amount=True,
     ),
     Field(
         "dJ_by_modulus_mm_per_MPa",
         "Sensitivity dJ/dE",
         "mm/MPa",
-        "How much stiffening the material there alone would disturb the motion; of Model A",
+        "How much the motion changes if only the material there is stiffened; of Model A",
     ),
 )
 BY_NAME = {field.name: field for field in FIELDS}

@@ -45,8 +45,8 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
         name="Body",
         description="What moves",
         items=[
-            (motion_parts.MESH, "Analysis Mesh", "The mesh that was solved, with its fields"),
-            (motion_parts.PRINT, "Printable Solid", "The body to print, carried along by the mesh"),
+            (motion_parts.MESH, "Analysis Mesh", "The analysis mesh with its fields"),
+            (motion_parts.PRINT, "Printable Solid", "The printable body, moved with the mesh"),
         ],
     )
     on: BoolProperty(name="Show", description="Show or hide it", default=True)

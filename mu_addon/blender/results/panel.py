@@ -45,7 +45,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         run_panel.draw_runs(layout, root)
         found = studies.findings(root)
         if found is None:
-            wrapped(layout, "Nothing simulated yet: the button at the top begins", "INFO")
+            wrapped(layout, "Nothing simulated yet: press the button at the top", "INFO")
             return
         if found.stale:
             alert(layout, "Stale: these results belong to other parameters. Simulate again")
@@ -108,7 +108,7 @@ def _look_buttons(layout, root, ranked: bool) -> None:
 
 
 class MU_PT_warnings(UnitPanel, bpy.types.Panel):
-    """What makes the shown results doubtful"""
+    """Warnings about the results shown"""
 
     bl_idname = "MU_PT_warnings"
     bl_label = "Warnings"

@@ -85,8 +85,8 @@ class MU_PG_motion(bpy.types.PropertyGroup):
     )
     cut: BoolProperty(
         name="Cut Open",
-        description="Show the half behind the bending plane, to see chambers and walls; where the analysis "
-        "mesh is a half",
+        description="Show only the half behind the bending plane, to see chambers and walls; if the "
+        "analysis mesh is a half",
         default=True,
         update=_surface,
     )
@@ -104,7 +104,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
     )
     apart: FloatProperty(
         name="Apart",
-        description="Distance between neighbours, in widths of the unit; 0 lays all in one place",
+        description="Distance between neighbours, in widths of the unit; 0 puts all in one place",
         default=1.5,
         min=0.0,
         max=10.0,

@@ -35,7 +35,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         description="Source of the samples",
         items=[
             ("port", "Serial Port", "The sensor at a port of this computer"),
-            ("simulated", "Simulated", "A sensor that is not there, bending by 45 degrees every 8 s"),
+            ("simulated", "Simulated", "A simulated sensor that bends by 45 degrees every 8 s"),
             ("replay", "Recording", "A recording as if it came from the sensor"),
         ],
     )
@@ -93,10 +93,13 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     sweep_from: FloatProperty(name="From (deg)", description="Where a sweep begins and ends", default=0.0)
     sweep_to: FloatProperty(name="To (deg)", description="Where a sweep turns", default=45.0)
     sweep_step: FloatProperty(
-        name="Step (deg)", description="From one angle held to the next", default=15.0, min=0.5
+        name="Step (deg)", description="From one held angle to the next", default=15.0, min=0.5
     )
     sweep_times: IntProperty(
-        name="Times", description="How often to and fro: two show how well it repeats", default=2, min=2
+        name="Times",
+        description="Number of sweeps back and forth: two show how well it repeats",
+        default=2,
+        min=2,
     )
     known_deg: FloatProperty(name="Angle (deg)", description="The angle at which the unit is held now")
 

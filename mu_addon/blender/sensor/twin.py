@@ -130,7 +130,7 @@ def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
     for part in parts(root):
         moved = shape.vertices[part[TWIN]]
         if len(part.data.vertices) != moved.shape[1]:
-            return WAITING, "the simulation is another one now: show the twin again"
+            return WAITING, "the simulation has changed: show the twin again"
         now = moved[first] + np.float32(share) * (moved[second] - moved[first])
         part.data.attributes["position"].data.foreach_set("vector", now.ravel())
         part.data.update()

@@ -26,13 +26,11 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             wrapped(
                 box,
                 f"Cannot simulate: {', '.join(missing)} not found in this Blender. Design, solid and export "
-                "work without. Install the extension built for this Blender and system.",
+                "still work. Install the extension built for this Blender and system.",
                 "ERROR",
             )
         elif root.mu_unit.study.detail == "full" and (lacking := missing_libraries()):
-            text = (
-                f"Without {', '.join(lacking)} of this system a unit is meshed more slowly and less exactly."
-            )
+            text = f"Without {', '.join(lacking)}, units are meshed more slowly and less accurately."
             wrapped(layout.box(), f"{text} To have it, {install_libraries(lacking)}", "ERROR")
         study = root.mu_unit.study
         layout.prop(study, "command")
@@ -48,7 +46,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         child = SIMULATION.child(root)
         start_button(layout, child, "mu.simulate", "PLAY", text=start_words(root))
         if child is None and not announced(root)[1]:
-            wrapped(layout, "Perhaps: no such run was timed on this machine yet", "TIME")
+            wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
         others = [key for key in start_child.running() if key != SIMULATION.key(root)]
         if others:

@@ -16,7 +16,7 @@ from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
 
 LEAST_SHARE = 0.05
-"""A stage that took less than this share of its earlier time was cached, and is no measurement."""
+"""A stage that took less than this share of its earlier time was cached, and is not a measurement."""
 
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
 

@@ -59,7 +59,11 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
             row.operator("mu.again", icon="FILE_REFRESH").step = step.name
         lacking = stack.muted(props)
         if lacking:
-            wrapped(layout, f"Not printed while muted: {', '.join(s for s in STEPS if s in lacking)}", "INFO")
+            wrapped(
+                layout,
+                f"Cannot be printed while muted: {', '.join(s for s in STEPS if s in lacking)}",
+                "INFO",
+            )
 
 
 CLASSES = (MU_UL_steps, MU_PT_stack)

@@ -54,12 +54,12 @@ class MU_PG_bench(bpy.types.PropertyGroup):
             (
                 "crosses",
                 "Crosses",
-                "Checks or crosses, which show how they turn: the tracker follows the turn",
+                "Checks or crosses, which show their rotation: the tracker follows it",
             ),
             (
                 "dots",
                 "Dots",
-                "Round dots look the same when they turn: the tracker follows their place alone",
+                "Round dots look the same when they turn: the tracker follows their position only",
             ),
         ],
     )
@@ -88,8 +88,8 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     follow_base: BoolProperty(
         name="Base Moves",
-        description="Measure against the base as it is in each frame, for a camera or clamp that moves; else "
-        "its mean place counts, which is quieter",
+        description="Measure relative to the base in each frame, for a camera or clamp that moves; otherwise "
+        "relative to its mean position, which gives less noise",
     )
     fps: FloatProperty(
         name="Frame Rate",
@@ -120,7 +120,11 @@ class MU_PG_bench(bpy.types.PropertyGroup):
         description="Use of the experiment",
         items=[
             (ROLES[0], "Fit", "The model may be fitted to it"),
-            (ROLES[1], "Held Out", "Never touched before the verdict: it shows what the verdict gains"),
+            (
+                ROLES[1],
+                "Held Out",
+                "Not used before the verdict: it shows how much the verdict improves the model",
+            ),
         ],
     )
     unit_scale: FloatProperty(
@@ -128,11 +132,11 @@ class MU_PG_bench(bpy.types.PropertyGroup):
     )
     orientation_deg: FloatProperty(
         name="Gravity about x (deg)",
-        description="Direction of gravity about x: 0 hangs with the tip down",
+        description="Direction of gravity about x: at 0 the unit hangs with the tip down",
         min=-360.0,
         max=360.0,
     )
-    specimen: StringProperty(name="Specimen", description="Which print it was, such as A; may be empty")
+    specimen: StringProperty(name="Specimen", description="Name of the print, such as A; may be empty")
 
 
 def missing(clip: Any) -> str:

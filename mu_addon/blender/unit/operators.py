@@ -133,7 +133,7 @@ class MU_OT_fit(UnitOperator, bpy.types.Operator):
             value = mending.get((self.section, self.name), found.fits.get((self.section, self.name)))
         if value is None:
             raise InputError(
-                f"{self.section}.{self.name} breaks no rule that another value of it would keep",
+                f"{self.section}.{self.name} breaks no rule that another value would satisfy",
                 "design",
                 "change another field",
             )
@@ -159,7 +159,7 @@ class MU_OT_fit_all(UnitOperator, bpy.types.Operator):
     def act(self, context, root):
         found = broken(root)
         if found is None or not found.repairs:
-            raise InputError("no rule is broken", "design", "nothing is to be done")
+            raise InputError("no rule is broken", "design", "there is nothing to do")
         changes = _repairs_in_words(root, found)
         with updates.paused():
             for repair in found.repairs:

@@ -98,7 +98,7 @@ def _untrue_size(root, scene) -> str:
         help_ = "A parent is scaled by other factors along other axes: apply its scale"
     else:
         help_ = "Its scale is unlocked: lock it, and it gets its true size"
-    return f"Seen {times} times its true size. {help_}"
+    return f"Appears at {times} times its true size. {help_}"
 
 
 def _head(layout, root) -> None:

@@ -76,19 +76,19 @@ class MU_PG_study(bpy.types.PropertyGroup):
             (
                 "graph",
                 "Whole Lattice",
-                "Besides, the path along any struts that disturbs the motion least: minutes to hours more",
+                "Also the path along any struts that disturbs the motion least: takes minutes to hours more",
             ),
         ],
     )
     detail: EnumProperty(
         name="Detail",
-        description="What is simulated, how fine its mesh is, and of which order its elements",
+        description="Model of the lattice, fineness of the mesh and order of its elements",
         items=[
             (
                 "resolved",
                 "Printed Struts",
-                "The printed body strut by strut; paths are ranked by the waveguide itself. Minutes for the "
-                "motion, longer for the paths",
+                "The printed body with every strut; paths are ranked by the printed waveguide. Minutes for "
+                "the motion, longer for the paths",
             ),
             (
                 "full",
@@ -195,8 +195,8 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         ),
         "candidates": BoolProperty(
             name="Show Candidates",
-            description="Draw every candidate path on the lattice of the unit at rest, to compare and to "
-            "choose one by a click. Result hides them, since there the unit is bent",
+            description="Draw every candidate path on the lattice of the unit at rest, to compare them "
+            "and choose one by a click. Result hides them, because the unit is bent there",
             update=_candidates_changed,
         ),
         "show": EnumProperty(

@@ -65,7 +65,7 @@ def against_nominal(
         "ml",
         source=f"the unit's own solid, within {VOLUME_TOLERANCE:.0%}",
         count=int(not same),
-        remedy="" if same else "see whether the print offset was taken off, or export the unit again",
+        remedy="" if same else "check whether the print offset was subtracted, or export the unit again",
     )
     return [tunnels, size]
 
@@ -75,8 +75,8 @@ def _difference(more: int) -> str:
     if not more:
         return ""
     if more < 0:
-        return f": {-more} less, as where struts are missing or openings are closed"
-    return f": {more} more, as where there is a hole or a strut too many"
+        return f": {-more} less, as if struts were missing or openings closed"
+    return f": {more} more, as if there were a hole or a strut too many"
 
 
 Array = NDArray[np.float64]
@@ -322,9 +322,7 @@ def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
             what += f": the file may be in {' or '.join(units.values())}"
             remedy = f"scale it by {' or '.join(f'{factor:g}' for factor in units)}"
     elif bad and 3.0 < share < INCH:
-        what += (
-            "; it would fit at 1/25.4 of its size: it may have been scaled from inches though it was in mm"
-        )
+        what += "; it would fit at 1/25.4 of its size: it may have been in mm and scaled as if in inches"
     return Finding(
         "build volume",
         "error" if bad else "pass",

@@ -220,7 +220,7 @@ def _single_holes(triangles: Triangles) -> Triangles:
     count = np.bincount(e.of_side)
     m = len(triangles)
     is_open = count[e.of_side] == 1
-    # A triangle on its own is no hole, though three open edges bound it.
+    # A triangle on its own is not a hole, though three open edges bound it.
     open_sides = np.flatnonzero(is_open & ~np.tile(is_open.reshape(3, m).all(axis=0), 3))
     a = triangles[open_sides % m, open_sides // m]
     b = triangles[open_sides % m, (open_sides // m + 1) % 3]
@@ -273,7 +273,9 @@ def _remaining(vertices: Vertices, triangles: Triangles) -> list[str]:
     if crowded := int((count > 2).sum()):
         found.append(f"{crowded} edges of more than two faces: remove inner faces, or unite the parts")
     if against := int((agree & (count == 2)).sum()):
-        found.append(f"{against} edges whose faces cannot all be turned alike: the surface has one side")
+        found.append(
+            f"{against} edges whose faces cannot all be turned the same way: the surface has one side"
+        )
     if cut := len(crossings(vertices, triangles)):
         more = " or more" if cut == MOST_CROSSINGS else ""
         found.append(f"{cut}{more} edges that pass through other triangles: unite the parts")

@@ -25,7 +25,7 @@ class Slice:
 
     outlines: closed polygons (n, 2) in mm, in the plane of the section, counter-clockwise around material and
     clockwise around holes. area_mm2: of the material; enclosed_mm2: of the holes, whose resin can leave only
-    along the build, as in a chamber. open_chamber: polygons, likewise, of a chamber that is no hole of this
+    along the build, as in a chamber. open_chamber: polygons, likewise, of chambers that are not holes of this
     section because its inlet opens it here; open_mm2: their area.
     """
 

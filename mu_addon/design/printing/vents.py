@@ -128,7 +128,7 @@ def vented(vertices: Vertices, triangles: Triangles, direction: Sequence[float],
     after = float(_cups(drilled, up, printer).volume[:1].sum()) / 1e3
     if after > limit:
         raise GateError(
-            f"with {len(vents)} vents {after:.3g} ml are trapped still, of {before:.3g} ml",
+            f"with {len(vents)} vents {after:.3g} ml are still trapped, of {before:.3g} ml",
             "vents",
             "choose another build direction: see the build directions of `check`",
         )

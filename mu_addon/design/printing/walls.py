@@ -64,7 +64,7 @@ def _measured(
         f"{least:.3g} mm {adjective} at least"
         + (f", in {len(places)} places below the limit" if bad.any() else "")
         + (
-            ", of flat facets; no thinner than the limit as drawn"
+            ", due to flat facets; not below the limit as drawn"
             if least < limit.value and not bad.any()
             else ""
         ),

@@ -46,7 +46,7 @@ class ChainUnit:
     def __attrs_post_init__(self) -> None:
         self.unit.wall.require_without_memory("a chain")
         if not np.isfinite(self.turn_deg):
-            raise InputError("turn_deg is no number", "[[unit]]", "give degrees about the axis")
+            raise InputError("turn_deg is not a number", "[[unit]]", "give degrees about the axis")
         if self.pressure_kPa is not None:
             low, high = self.pressure_kPa
             if not -100.0 < low <= high <= 1000.0:
@@ -65,7 +65,7 @@ class Target:
 
     def __attrs_post_init__(self) -> None:
         if not np.isfinite(self.reach).all():
-            raise InputError("the point has a coordinate that is no number", "[target] reach", "give mm")
+            raise InputError("the point has a coordinate that is not a number", "[target] reach", "give mm")
 
 
 @attrs.frozen(eq=False)
@@ -125,13 +125,13 @@ class Job:
             raise InputError(both, "chain.toml", 'give protocol = "FILE.csv", or [target] reach = [x, y, z]')
         if self.target is not None and all(one.pressure_kPa is None for one in self.units):
             raise InputError(
-                "no unit says what pressures it may have",
+                "no unit has a pressure range",
                 "[[unit]] pressure_kPa",
                 "give pressure_kPa = [low, high] to each unit that is to move",
             )
         numbers = (self.orientation_deg, *self.tip_force_N, *self.tip_couple_N_mm)
         if not np.isfinite(numbers).all():
-            raise InputError("a load or the orientation is no number", "chain.toml", "give finite numbers")
+            raise InputError("a load or the orientation is not a number", "chain.toml", "give finite numbers")
         if self.mesh.fraction != "full":
             raise InputError(
                 f"fraction = {self.mesh.fraction!r}", "[mesh] fraction", 'a joint needs the "full" unit'
@@ -184,7 +184,7 @@ def read_chain(path: Path, changes: Mapping[str, Any] | None = None) -> Job:
     values |= changes or {}
     entries = values.pop("unit", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise InputError("unit is no list of tables", str(path), "write each unit as a table [[unit]]")
+        raise InputError("unit is not a list of tables", str(path), "write each unit as a table [[unit]]")
     units = tuple(_unit(entry, path, n) for n, entry in enumerate(entries, 1))
     protocol = None
     if changes is not None and "target" in changes:
@@ -215,7 +215,7 @@ def _unit(entry: dict[str, Any], path: Path, number: int) -> ChainUnit:
         raise InputError("a unit is named by preset or by file", where, 'give preset = "mu-1.0x", or file')
     named = entry.get("preset", entry.get("file"))
     if not isinstance(named, str):
-        raise InputError(f"{named!r} is no name", where, "give text in quotes")
+        raise InputError(f"{named!r} is not a name", where, "give text in quotes")
     unit = load_preset(named) if "preset" in entry else read_unit(path.parent / named)
     rest = {key: entry[key] for key in ("turn_deg", "pressure_kPa") if key in entry}
     return structured(ChainUnit, rest, where, unit=unit)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 FILES = {
     "chain.toml": "inputs of this run; unit_N.toml and protocol.csv belong to it",
     "tip.csv": "pressures, place and rotation of the tip over time, with half widths of 95 % intervals",
-    "joints.csv": "every joint at states that took no part in its fit",
+    "joints.csv": "every joint at states left out of its fit",
     "target.csv": "pressures that bring the tip to the target, if there is one",
     "chain.pvd": "motion of the units, for ParaView",
     "chain_*.png": "the chain at its start, most bent and at its end",
@@ -90,7 +90,7 @@ def _tip(run: Running) -> str:
     html = figure(
         charts.tip_way(run),
         "Grey: lines through the plates; bar: 95 % at the end.",
-        "way of the tip",
+        "path of the tip",
         "chart",
     )
     html += figure(
@@ -113,8 +113,8 @@ def _target(run: Running) -> str:
     at = ", ".join(f"{v:g}" for v in run.job.target.reach)
     words = (
         f"Target ({signed(at)}) mm in the base's frame, missed by {run.reach.miss_mm:.3g} mm after "
-        f"{run.reach.iterations} steps. Of many answers the one with low pressures is taken; a pressure at "
-        "its bound cannot go further."
+        f"{run.reach.iterations} steps. Of several solutions one with low pressures is taken; a "
+        "pressure at its bound cannot change further."
     )
     return f"<p>{escape(words)}</p>" + table("", [("unit", ""), ("kPa", "n"), ("at its bound", "")], rows)
 
@@ -131,7 +131,7 @@ def _joints(run: Running) -> str:
         cells += [f"{joint['error_deg']:.2f}", f"{joint['error_mm']:.2f}"]
         rows.append((cells, False))
     words = (
-        "Stiffness without pressure of a unit about its free state. Error: root mean square over the states "
-        "that took no part in the fit of the placement that the joint's wrong load would make (joints.csv)."
+        "Stiffness without pressure of a unit about its free state. Error: root mean square, over the states "
+        "left out of the fit, of the displacement caused by the error in the joint's load (joints.csv)."
     )
     return f"<p>{escape(words)}</p>" + table("", head, rows)

@@ -189,8 +189,8 @@ class Running:
             )
         if learned.missed:
             self.warn(
-                f"{unit.name}: {len(learned.missed)} loaded states were not reached, the first is "
-                f"{learned.missed[0]}; the joint is less sure there"
+                f"{unit.name}: {len(learned.missed)} loaded states were not reached, first "
+                f"{learned.missed[0]}; the joint is less accurate there"
             )
         return mesh, learned
 
@@ -215,7 +215,7 @@ class Running:
         used = max(float(state.used_range.max()) for state in self.states)
         if used > 1.0:
             self.warn(
-                f"a unit is loaded {used:.2f} times as far as its joint was learned: widen [joint] bend_deg, "
+                f"a unit is loaded to {used:.2f} times its joint's learned range: widen [joint] bend_deg, "
                 "twist_deg, shear or stretch, or read these states with care"
             )
         last = self.states[-1]

@@ -83,7 +83,7 @@ def report(
     notes = [
         (
             f"{assumed} of {len(MEANING)} limits are assumed, because no published values were found for "
-            "this resin. Print the parts of `specimens` named limit-..., and give what they show by --limits."
+            "this resin. Print the parts limit-... of `specimens`, and give the measured limits by --limits."
         )
     ]
     measured = [MEANING[name] for name, limit in job.printer.limits.items() if limit.measured]
@@ -219,8 +219,8 @@ def _layers(job: Job, vertices: Vertices, triangles: Triangles) -> str:
     if not found:
         return "<p>The surface encloses no volume: it has no layers.</p>"
     caption = (
-        "Layers by their height above the part's lowest point: material in grey, what a layer encloses in "
-        "blue, such as a chamber, with its area. A unit's chamber is blue where its inlet opens it, too."
+        "Layers by their height above the part's lowest point: material in grey; areas that a layer "
+        "encloses, such as a chamber, in blue with its size. A unit's chamber is also blue at its inlet."
     )
     return figure(layer_pictures(found), caption, "Sections of the part at several heights")
 

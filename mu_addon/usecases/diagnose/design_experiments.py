@@ -257,7 +257,7 @@ def _report(found: Plan, name: str, remarks: Sequence[str], versions: Mapping[st
         ("not absorbed", "n"),
         ("reason if not", "text"),
         ("similar to", "text"),
-        ("best experiment for it", "text"),
+        ("best experiment to detect it", "text"),
     ]
     html = (
         "<p>An effect of the given size is detected in nearly every set of such data (χ² of 16). "

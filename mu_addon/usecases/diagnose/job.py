@@ -104,7 +104,7 @@ def read_job(folder: Path) -> Job:
     path = folder / LAYOUT.inputs
     values, run = read_inputs(path)
     if "settings" in values:
-        raise InputError("it was made with settings given in Python", str(path), "make it there again")
+        raise InputError("this run was made with settings given in Python", str(path), "run it there again")
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))
     require_same_data(measured, values.get("data"), described(measured))
     unit, known = folder / UNIT, folder / KNOWN

@@ -174,8 +174,14 @@ def _known_before(job: Job, simulator: Composite) -> list[str]:
         readable(name): ", ".join(f"{readable(p)} {f.value:.3g} {f.unit}".rstrip() for p, f in values.items())
         for name, values in job.known.effects.items()
     }
-    words = [f"known before and in the model from the start: {n} ({v})" for n, v in effects.items()]
-    unseen = (f"of {readable(n)}, known before, these experiments show nothing" for n in simulator.unseen)
+    words = [
+        f"known from an earlier diagnosis and in the model from the start: {n} ({v})"
+        for n, v in effects.items()
+    ]
+    unseen = (
+        f"these experiments do not show {readable(n)}, known from an earlier diagnosis"
+        for n in simulator.unseen
+    )
     return [*words, *unseen]
 
 
@@ -208,10 +214,10 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
         f"the noise of {column}, up to {sd:.2g}, was averaged out over straight stretches, and no "
-        "effect is named for the rest of it"
+        "effect is named for what remains of it"
         for column, sd in noise.items()
     ] + [
-        f"{column} was read in steps of {step:.2g}; the model is driven by lines from change to change"
+        f"{column} was read in steps of {step:.2g}; the model takes straight lines between the changes"
         for column, step in stepped.items()
     ]
 

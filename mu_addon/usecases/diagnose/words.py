@@ -170,7 +170,7 @@ def _error(verdict: Verdict) -> str:
 
 
 def _shown(verdict: Verdict) -> str:
-    """What shows the noise, and bounds it, in words."""
+    """Source of the noise estimate, and its bound, in words."""
     series = [s for s in verdict.record.series if s.group != KNOWN]
     stated = any(noise_limit(verdict.record, s)[1] == STATED for s in series)
     return f"the readings show and the {STATED} allows" if stated else "the readings themselves show"
@@ -211,8 +211,8 @@ def _what_remains(verdict: Verdict) -> str:
     rest = listed([readable(n) for n in verdict.selection.left])
     return (
         f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
-        f"depends on {rest}: the effect may follow another law, or something small acts beside it, so "
-        "the intervals are too narrow."
+        f"depends on {rest}: the effect may follow another law, or a small second cause may act as "
+        "well, so the intervals are too narrow."
     )
 
 
@@ -251,7 +251,7 @@ def _asked(verdict: Verdict) -> str:
         what = what.replace("; or ", " or ").replace("; ", ", ")
         words.append(f"{what} ({listed([readable(n) for n in dict.fromkeys(names)])})")
     rest = len({s.effect.name for s in hidden} - {n for _, names in some for n in names})
-    more = f" Hidden, too: {rest} more, see “Identifiability of each effect” in the report." if rest else ""
+    more = f" {rest} more are hidden, see “Identifiability of each effect” in the report." if rest else ""
     return f"To see effects that these data hide: {'; '.join(words)}.{more}"
 
 

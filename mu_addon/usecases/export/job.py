@@ -151,7 +151,7 @@ def path_of(unit: Unit, name: str | None, row: str | None = None) -> tuple[Windo
     """A path and its name: a window, alpha1 .., or one of a paths.csv of `place`, its first by default."""
     if row is not None and not (name or "").endswith(".csv"):
         raise InputError(
-            f"--path-row {row} names a row of a paths.csv, and --path gives none",
+            f"--path-row {row} names a row of a paths.csv, but --path does not give that file",
             "--path-row",
             "give the paths.csv of `place --paths graph` with --path, or leave --path-row out",
         )

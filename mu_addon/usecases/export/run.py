@@ -89,7 +89,7 @@ class Export:
         found = self.vented = vented(solid.vertices, solid.triangles, direction, load_printer())
         for name in self.job.formats:
             if name in ("3mf-beams", "step"):
-                self.progress.warning(f"{name} has no vents: it stays of nominal shape", "--vent-along")
+                self.progress.warning(f"{name} has no vents: it keeps its nominal shape", "--vent-along")
         if not found.vents:
             self.progress.warning(
                 f"no vent is needed: {found.before_ml:.3g} ml are trapped at most", "--vent-along"

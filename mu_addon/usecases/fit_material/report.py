@@ -74,8 +74,8 @@ def _warnings(found: Fitting) -> list[str]:
     for mode, (stretch, ratio) in found.apart.items():
         i = int(np.argmax(ratio > 1.1)) if (ratio > 1.1).any() else len(ratio) - 1
         warnings.append(
-            f"{TITLES[mode].capitalize()} was not tested. Laws that fit the other modes differ there "
-            f"by a factor of {ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
+            f"{TITLES[mode].capitalize()} was not tested. There, laws that fit the other modes "
+            f"differ by a factor of {ratio[i]:.3g} at a stretch of {stretch[i]:.3g}"
             + (f" and {_factor(ratio[-1])} at {stretch[-1]:.3g}." if i < len(ratio) - 1 else ".")
             + (" Test this mode before using any of them in it." if ratio[-1] > 1.1 else "")
         )

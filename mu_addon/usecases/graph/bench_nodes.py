@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ...graph.evaluation import Finished, Order
 
 BENCH = "Bench"
-_LEFT_OUT = "neither this nor what needs it is computed"
+_LEFT_OUT = "this node and those that need it are not computed"
 
 
 def _recording(call: Call) -> Outputs:
@@ -62,7 +62,9 @@ def _calibrate(call: Call) -> Order:
     s = call.settings
     places = tuple(v.folder if isinstance(v, Measured) else Path(v) for _, v in call.inputs["bending"])
     if not places:
-        raise InputError("nothing is linked to calibrate by", "bending", "link recordings, or measured data")
+        raise InputError(
+            "nothing to calibrate from is linked", "bending", "link recordings, or measured data"
+        )
     job = calibrate.Job(
         places,
         channel=s["channel"] or None,
@@ -104,10 +106,12 @@ def bench_nodes() -> tuple[Definition, ...]:
             settings=(
                 setting("port", "", "serial port, or usb:VID:PID; empty: the only USB one"),
                 Setting(BAUD),
-                setting("simulated", False, "a simulated sensor that bends to and fro, in place of a port"),
+                setting(
+                    "simulated", False, "a simulated sensor that bends back and forth, in place of a port"
+                ),
                 setting("seconds", 10.0, "duration", unit="s", low=0.1, high=86_400),
                 setting(
-                    "take", 1, "raise it to record once more; earlier takes are kept", low=1, high=10_000
+                    "take", 1, "raise it to record again; earlier recordings are kept", low=1, high=10_000
                 ),
             ),
             order=_record,

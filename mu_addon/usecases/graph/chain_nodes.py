@@ -44,7 +44,7 @@ def _chain(call: Call) -> Order:
         )
     reach = _numbers(s["reach_mm"], "reach_mm")
     if reach and len(reach) != 3:
-        raise InputError(f"{s['reach_mm']!r} is no point", "reach_mm", "give x, y and z in mm")
+        raise InputError(f"{s['reach_mm']!r} is not a point", "reach_mm", "give x, y and z in mm")
     bounds = (s["low_kPa"], s["high_kPa"]) if reach else None
     job = Job(
         units=tuple(ChainUnit(d.unit, turn, bounds) for d, turn in zip(designs, turns, strict=True)),
@@ -64,7 +64,7 @@ def _numbers(text: str, where: str) -> list[float]:
     try:
         return [float(word) for word in text.split()]
     except ValueError:
-        raise InputError(f"{text!r} are no numbers", where, "give numbers, such as 0 0 180") from None
+        raise InputError(f"{text!r} are not numbers", where, "give numbers, such as 0 0 180") from None
 
 
 def _solved(call: Call, done: Finished) -> Outputs:
@@ -84,18 +84,23 @@ def chain_nodes() -> tuple[Definition, ...]:
             (Input("units", ("unit",), "link units, the one at the base first", many=True),),
             (
                 Output("tip", "file", "tip.csv, or target.csv with a point to reach"),
-                Output("angle", "number", "angle of the tip against the base, degrees"),
+                Output("angle", "number", "angle of the tip relative to the base, degrees"),
             ),
             (
-                setting("copies", 1, "how often the linked units follow each other", low=1, high=8),
+                setting("copies", 1, "number of times that the linked units are repeated", low=1, high=8),
                 setting("turns_deg", "", "turn of each unit about the axis, such as 0 0 180; empty: none"),
                 setting(
-                    "protocol", "", "CSV of time_s, pressure_1_kPa and so on, a column a unit", path=FILE
+                    "protocol",
+                    "",
+                    "CSV of time_s, pressure_1_kPa and so on, a column for each unit",
+                    path=FILE,
                 ),
                 setting(
                     "reach_mm", "", "point that the tip is to reach, such as 0 -25 405; no protocol then"
                 ),
-                setting("low_kPa", 0.0, "lowest pressure to reach it by", unit="kPa", low=-99.0, high=1000.0),
+                setting(
+                    "low_kPa", 0.0, "lowest pressure allowed to reach it", unit="kPa", low=-99.0, high=1000.0
+                ),
                 setting("high_kPa", 30.0, "highest pressure", unit="kPa", low=-99.0, high=1000.0),
                 Setting(chain.GRAVITY),
                 setting(
@@ -110,7 +115,7 @@ def chain_nodes() -> tuple[Definition, ...]:
             ),
             order=_chain,
             read=_solved,
-            muting="neither this nor what needs it is computed",
+            muting="this node and those that need it are not computed",
             remark=_remark,
         ),
     )

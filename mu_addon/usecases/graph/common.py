@@ -1,4 +1,4 @@
-"""What several kinds of nodes share: settings, and functions of modules that load the solver."""
+"""Settings that several kinds of nodes share, and functions of modules that load the solver."""
 
 from __future__ import annotations
 

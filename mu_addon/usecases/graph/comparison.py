@@ -55,7 +55,7 @@ class Comparison:
 def compare(items: Sequence[tuple[str, Any]]) -> Comparison:
     """The comparison of named designs, studies or runs; InputError for one alone, or of two kinds."""
     if len(items) < 2:
-        raise InputError("one alone cannot be compared", "items", "link two or more")
+        raise InputError("only one is linked", "items", "link two or more")
     kinds = {_kind(value) for _, value in items}
     if len(kinds) > 1:
         raise InputError(

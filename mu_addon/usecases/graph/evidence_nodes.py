@@ -65,10 +65,10 @@ def evidence_nodes() -> tuple[Definition, ...]:
             "diagnose",
             "Diagnose",
             DATA,
-            "the effects that measured data say the model lacks",
+            "the effects that the model lacks, by measured data",
             (
                 Input("data", ("data",), "link a node Measured Data"),
-                Input("unit", ("unit",), "the unit that the data are of", needed=False),
+                Input("unit", ("unit",), "the unit on which the data were measured", needed=False),
             ),
             (
                 Output("diagnosis", "diagnosis", "the verdict"),
@@ -77,7 +77,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
             (Setting(DIAGNOSED), SELF_CONTACT),
             order=of_orders("diagnose_order"),
             read=lambda call, done: {"diagnosis": done, "model": done.folder / "model.toml"},
-            muting="neither this nor what needs it is computed",
+            muting="this node and those that need it are not computed",
             remark=lambda outputs: "{verdict}: {headline}".format(**outputs["diagnosis"].summary),
         ),
         Definition(

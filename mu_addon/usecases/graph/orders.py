@@ -108,8 +108,7 @@ def _study_of_place(call: Call, what: str) -> Study:
     study: Study = call.inputs["study"]
     if what not in study.summary:
         raise InputError(
-            f"the study has no {what}: it is of a node that ranks no paths, or of a unit whose state depends "
-            "on its history",
+            f"the study has no {what}: its node ranks no paths, or its unit's state depends on history",
             "study",
             "link a node Rank Paths",
         )
@@ -206,7 +205,7 @@ def grip_order(call: Call) -> Order:
         sides = [float(word) for word in s["cubes_mm"].split()]
     except ValueError:
         raise InputError(
-            f"{s['cubes_mm']!r} are no side lengths", "cubes_mm", "give numbers in mm, such as 12.5 25"
+            f"{s['cubes_mm']!r} are not side lengths", "cubes_mm", "give numbers in mm, such as 12.5 25"
         ) from None
     job = GripJob(
         gripper=call.inputs["gripper"],

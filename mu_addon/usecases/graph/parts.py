@@ -152,7 +152,9 @@ def solid_of(call: Call) -> tuple[Unit, StepInputs, str]:
 def refuse_body(design: Design, what: str) -> None:
     """Raise InputError for a unit with a body in place of the lattice's box."""
     if design.body is not None:
-        raise InputError(f"{what} knows no body in place of the lattice's box", "unit", "leave the body out")
+        raise InputError(
+            f"{what} does not support a body in place of the lattice's box", "unit", "leave the body out"
+        )
 
 
 def known_path(unit: Unit, path: str) -> str:

@@ -69,7 +69,7 @@ FIGURES = (
 _TAKES_UNIT = Input("unit", ("unit",), "link a unit")
 _TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
 # A run that a muted node does not start; what follows it is left out with it.
-_LEFT_OUT = "neither this nor what needs it is computed"
+_LEFT_OUT = "this node and those that need it are not computed"
 
 
 def study_nodes() -> tuple[Definition, ...]:

@@ -39,7 +39,7 @@ def _range(call: Call) -> Outputs:
             found = [float(word) for word in s["values"].split()]
         except ValueError:
             raise InputError(
-                f"{s['values']!r} are no values", "values", "give numbers, such as 0.8 0.9 1.0"
+                f"{s['values']!r} are not values", "values", "give numbers, such as 0.8 0.9 1.0"
             ) from None
         return {"range": (s["parameter"], {"values": [_number(v, whole) for v in found]})}
     if not s["low"] < s["high"]:
@@ -61,7 +61,7 @@ def _number(value: float, whole: bool) -> float | int:
     if not whole:
         return value
     if not value.is_integer():
-        raise InputError(f"{value:g} is no whole number", "low, high, values", "give whole numbers")
+        raise InputError(f"{value:g} is not a whole number", "low, high, values", "give whole numbers")
     return int(value)
 
 
@@ -107,7 +107,7 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 Input("unit", ("unit",), "link a unit"),
                 Input("ranges", ("range",), "link one or more nodes Range", many=True),
             ),
-            (Output("table", "study table", "a row a study"),),
+            (Output("table", "study table", "a row for each study"),),
             (
                 Setting(study.LAST_STAGE),
                 # A range has steps.
@@ -121,13 +121,13 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 FIDELITY,
                 SELF_CONTACT,
                 SELF_FRICTION,
-                setting("minimize", "", "columns of the table to make small, for Pareto fronts"),
-                setting("maximize", "", "columns of the table to make large"),
+                setting("minimize", "", "columns of the table to minimise, for Pareto fronts"),
+                setting("maximize", "", "columns of the table to maximise"),
                 *map(Setting, (study.MEMORY, study.MINUTES, study.WORKERS)),
             ),
             order=of_orders("sweep_order", _ORDERS),
             read=of_orders("table_of", _ORDERS),
-            muting="neither this nor what needs it is computed",
+            muting="this node and those that need it are not computed",
             remark=lambda outputs: outputs["table"].remark(),
         ),
         Definition(

@@ -108,7 +108,9 @@ def table_of(call: Call, done: Finished) -> Outputs:
     found = StudyTable(_plan_of(call), done.folder, rows)
     if not found.done:
         why = next((row.get("what", "") for row in rows if row.get("what")), "see its table")
-        raise InputError(f"every study failed: {why}", str(path), "see points.csv; vary less, or otherwise")
+        raise InputError(
+            f"every study failed: {why}", str(path), "see points.csv; vary less, or other inputs"
+        )
     return {"table": found}
 
 

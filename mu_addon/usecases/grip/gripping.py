@@ -161,10 +161,10 @@ class Gripping:
         if found.snapped_mm.any():
             first = int(np.flatnonzero(found.snapped_mm)[0])
             self.warn(
-                f"Closing on {cube.side_mm:g} mm parts of the finger snap, first before "
-                f"{found.time_s[first]:g} s ({found.pressure_kPa[first]:.4g} kPa), by "
-                f"{found.snapped_mm.max():.2g} mm at most: from there on the states are those that damped "
-                "motion leads to."
+                f"Closing on {cube.side_mm:g} mm parts of the finger snap, for the "
+                f"first time before {found.time_s[first]:g} s ({found.pressure_kPa[first]:.4g} kPa), by "
+                f"{found.snapped_mm.max():.2g} mm at most: later states are those that a damped motion "
+                "reaches."
             )
         if not found.lift.held:
             self.warn(

@@ -269,7 +269,7 @@ def _assumed(run: Gripping) -> str:
     for name, value in attrs.asdict(grip).items():
         rows.append(([f"grip.{name}", f"{value:g}", "", reason[name]], False))
     words = (
-        "The paper does not print the size of its gripper, the pressures of its grasp other than 0, −20 and "
+        "The paper does not give the size of its gripper, the pressures of its grasp other than 0, −20 and "
         "40 kPa, or the mass of its cubes. The plate is clamped, the weight of the fingers is neglected, "
         "and both fingers are equal. "
     )

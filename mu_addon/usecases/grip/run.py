@@ -55,7 +55,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     for rule, found in summary.get("J_hat_mm", {}).items():
         for on, one in found.items():
             lines.append(
-                f"paths ({rule}, on {on}): {one['chosen']} has the least deviation, rank correlation with "
+                f"paths ({rule}, on {on}): {one['chosen']} has the smallest deviation, rank correlation with "
                 f"the paper's column {one['rank_correlation_with_paper']:.2f}"
             )
     return lines

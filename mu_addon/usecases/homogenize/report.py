@@ -168,7 +168,7 @@ def _test(study: Homogenisation) -> str:
     )
     words = "".join(f"<p>Between {FRICTION[f]}: {escape(t.why)}.</p>" for f, t in study.tests.items())
     moduli_table = table(
-        "Modulus by evaluation procedure; the paper does not print its procedure, the marked one is used "
+        "Modulus by evaluation procedure. The paper does not give its procedure; the marked one is used "
         "here.",
         [("procedure", ""), ("plates", ""), ("modulus [kPa]", "n"), ("", "")],
         rows,

@@ -77,7 +77,7 @@ def terminal_lines(found: Understood) -> list[str]:
         kind = p.keys.get("kind", "kind not known yet")
         lines.append(f"{p.name}: {kind}, {len(p.lines)} rows, {p.place}")
         rows = [(name, p.origin[name], *_extent(v), _trace(v)) for name, v in p.columns.items()]
-        rows.insert(0, ("column", "from", "least", "most", "course"))
+        rows.insert(0, ("column", "from", "least", "most", "curve"))
         widths = [max(len(row[k]) for row in rows) for k in range(4)]
         for row in rows:
             cells = [row[k].ljust(w) if k < 2 else row[k].rjust(w) for k, w in enumerate(widths)]

@@ -53,7 +53,7 @@ def trouble_of(study: Study) -> str:
     if study.in_time:
         return "a wall with memory is bent by Simulate only"
     if not is_half_diagonal(study.unit.printed):
-        return "live bending knows body-centred lattices only"
+        return "live bending supports body-centred lattices only"
     return ""
 
 

@@ -83,7 +83,7 @@ class _Drawn:
 
     @cached_property
     def morph(self) -> PrintedMorph:
-        """What moves the mesh."""
+        """Morph that adapts the mesh to another design."""
         return PrintedMorph(self.mesh, self.study.unit, self.study.mesh_settings(self.study.mesh))
 
 
@@ -100,7 +100,7 @@ class _Solved:
 
     @cached_property
     def looked(self) -> SurfaceFields:
-        """What finds stress and stretch at the surfaces."""
+        """Fields of stress and stretch at the surfaces."""
         return SurfaceFields(self.mesh, {name: surface.node for name, surface in self.drawn.surfaces.items()})
 
 

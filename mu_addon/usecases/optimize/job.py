@@ -97,8 +97,8 @@ def mechanics_of(
         effects, left_out = _with_weight(first.effects, design), list(first.left_out)
     if effects.in_time:
         left_out.append(
-            "effects in time (viscoelasticity, lag, leak, softening): targets are of the unit at rest under "
-            "its pressure"
+            "effects in time (viscoelasticity, lag, leak, softening): targets apply to the unit at rest "
+            "under its pressure"
         )
 
     def printed(unit: Unit) -> Unit:

@@ -16,5 +16,7 @@ SEED = described("seed", 0, "seed of a method that draws", low=0, high=2**31)
 MEMORY = described("memory_MB", 4000, "largest memory of a study", unit="MB", low=300, high=10_000_000)
 MINUTES = described("minutes", 60.0, "longest time of a study", unit="min", low=0.01, high=1e5)
 RESIN = described("resin", USUAL_RESIN, "material whose density gives the mass")
-WORKERS = PROCESSES._replace(text="number of studies run in parallel on this machine; it decides no result")
+WORKERS = PROCESSES._replace(
+    text="number of studies run in parallel on this machine; results do not depend on it"
+)
 ADD = described("add", 0, "number of points to add to the study", low=0, high=MOST_POINTS)

@@ -125,9 +125,9 @@ def read_job(folder: Path) -> Job:
     job = structured(Job, asked, str(path), data=tuple(data), angles=angles)
     if values.get("samples", job.sweeps.digest()) != job.sweeps.digest():
         raise InputError(
-            "the samples are not those that the calibration was made with",
+            "these samples are not those of the earlier calibration",
             ", ".join(map(str, data)),
-            "put those back, or calibrate these in a separate folder",
+            "restore those, or calibrate these in a separate folder",
         )
     return job
 

@@ -81,7 +81,9 @@ def _columns(job: Job) -> dict[str, Array]:
         raise InputError("the recording contains no samples", str(job.recording), "choose another recording")
     recording = recordings[-1]
     if not 0.0 < job.rate_hz < float("inf"):
-        raise InputError(f"rate_hz = {job.rate_hz:g} is no rate", "rate_hz", "give rows a second, such as 10")
+        raise InputError(
+            f"rate_hz = {job.rate_hz:g} is not a rate", "rate_hz", "give rows a second, such as 10"
+        )
     if job.pressure not in recording.columns:
         raise InputError(
             f"the recording has no channel {job.pressure!r} of the pressure",
@@ -97,7 +99,7 @@ def _columns(job: Job) -> dict[str, Array]:
         raise InputError(
             "the calibration gives no angle for any of the voltages",
             str(job.calibration),
-            "calibrate this sensor, or set its zero anew",
+            "calibrate this sensor, or set its zero again",
         )
     return {
         "time_s": means["time_s"],
@@ -129,9 +131,9 @@ def read_job(folder: Path) -> Job:
     job = structured(Job, values, str(path), recording=recording, calibration=calibration)
     if before != digest(csv_text(job.columns)):
         raise InputError(
-            "recording or calibration are not those that this was made with",
+            "recording or calibration has changed since this was made",
             f"{recording}, {calibration}",
-            "put those back, or measure these in a separate folder",
+            "restore them, or use a separate folder for these",
         )
     return job
 

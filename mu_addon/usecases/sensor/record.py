@@ -43,7 +43,7 @@ class Job:
     def __attrs_post_init__(self) -> None:
         if not 0 < self.seconds < float("inf"):
             raise InputError(
-                f"{self.seconds:g} s is no time to record", "seconds", "give a number above zero"
+                f"{self.seconds:g} s is not a valid duration", "seconds", "give a number above zero"
             )
 
     def texts(self) -> dict[str, str]:
@@ -84,7 +84,7 @@ def record(job: Job, folder: Path, context: RunContext) -> Path:
         raise _Stopped(
             f"the recording was stopped {short:.1f} s before its end",
             str(place),
-            "evaluate again for a new recording; the existing one stays in that folder",
+            "evaluate again to record again; the existing recording stays in that folder",
         )
     require_samples(status, place)
     return place

@@ -74,7 +74,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
     overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
     moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
     drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for are
-    for its simulation, see `NamedEffects`, but those of a kind of experiment that is no whole unit.
+    for its simulation, see `NamedEffects`, but those of a kind of experiment that is not a whole unit.
     """
     applied: list[str] = []
     left_out: list[str] = []

@@ -149,7 +149,7 @@ def search_graph(study: Study) -> LatticeSearch:
         )
     if len(outcome.left_out):
         study.warn(
-            f"{len(outcome.left_out)} paths that the search came to are left out: no waveguide can be "
+            f"{len(outcome.left_out)} paths that the search found are left out: no waveguide can be "
             "printed along them."
         )
     best = set(front(lengths, outcome.exact_mm).tolist())

@@ -124,7 +124,7 @@ class Job:
         yield graph and bool(self.obstacles), f"{without} obstacles", "obstacles, paths", one
         yield (
             bool(self.self_friction) and not self.self_contact,
-            "walls and struts that may pass through each other have no friction",
+            "friction between walls and struts needs self-contact",
             "--self-friction",
             "give --self-contact, too, or leave it out",
         )
@@ -132,7 +132,7 @@ class Job:
         yield friction, f"{without} friction", "--self-friction, --paths graph", one
         yield (
             graph and self.unit.wall.has_memory,
-            "the search of the whole lattice knows a unit whose wall remembers nothing",
+            "the search of the whole lattice does not support a wall with memory",
             "[wall], paths",
             "rank the windows of anchors, or use an elastic law",
         )
@@ -147,13 +147,13 @@ class Job:
         yield clogged, f"{without} a clogged chamber", "clogged_chamber, paths", one
         yield (
             two_levels and places and self.solver.device in ("auto", "cpu"),
-            "on the CPU all paths are solved with one factor, which two levels do not make",
+            "on the CPU all paths share one factorisation, which the iterative solver does not have",
             "--solver",
             "give --solver direct or auto, or a CUDA device with --device",
         )
         yield (
             two_levels and simulates and self.mesh.order == 1,
-            "two levels need quadratic elements",
+            "the iterative solver needs quadratic elements",
             "--solver, --order",
             "give --order 2 or --solver direct",
         )

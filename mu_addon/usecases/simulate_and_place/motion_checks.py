@@ -1,4 +1,4 @@
-"""What makes a study's results doubtful: each check gives a summary's figures and warnings in words."""
+"""Checks for doubtful results of a study: each gives figures for the summary, and warnings in words."""
 
 from __future__ import annotations
 
@@ -112,8 +112,8 @@ def _snaps(job: Job, states: Sequence[State]) -> Iterator[str]:
         for first in way[:1]:
             yield (
                 f"Before {first.pressure_kPa:.4g} kPa parts of the unit snap, by {first.snapped_mm:.2g} "
-                "mm at most: states from there on are those that damped motion leads to, and the way "
-                "back differs."
+                "mm at most: later states are those that a damped motion reaches, and unloading "
+                "takes a different path."
             )
 
 

@@ -341,9 +341,9 @@ def _stretch(r: ReportData) -> str:
     head = [("pressure [kPa]", "n"), ("part", ""), *((name, "n") for name in columns)]
     rows = [([signed(row[0]), row[1], *map(signed, row[2:])], False) for row in r.stretch]
     return html + table(
-        "Largest principal stretch of each part without a sensor, and where it is at rest; what 1 % of the "
-        "part's volume, or of the joints, exceeds, and its share of the elongation at break. The largest "
-        "value depends on the mesh where a strut meets a wall. Joints: by the loads on their struts' ends.",
+        "Largest principal stretch of each part without a sensor, and where it is at rest; the stretch "
+        "that 1 % of the part's volume, or of the joints, exceeds; its share of elongation at break. Largest "
+        "values depend on the mesh where a strut meets a wall. Joints: by the loads on their struts' ends.",
         head,
         rows,
     )
@@ -484,7 +484,7 @@ def _assumed(r: ReportData) -> str:
     if not rows:
         return ""
     head = [("parameter", ""), ("value", "n"), ("unit", ""), ("why", "text")]
-    return "<p>The paper does not print these values. The results depend on them.</p>" + table(
+    return "<p>The paper does not give these values. The results depend on them.</p>" + table(
         "", head, rows, css="stack"
     )
 

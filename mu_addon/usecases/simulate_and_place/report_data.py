@@ -95,7 +95,7 @@ def _panel_pictures(study: Study) -> None:
 
 
 def _of_model(study: Study) -> list[str]:
-    """What an extended model changed in the unit, and what of it is left out, in words."""
+    """Changes that an extended model made to the unit, and those that were left out, in words."""
     model = study.context.summary.get("model", {})
     return [
         *(f"Applied of the extended model: {words}." for words in model.get("applied", ())),
@@ -187,13 +187,11 @@ def _parameters(study: Study) -> list[Parameter]:
     rows += _effects(study.job.effects)
     m, k, j = study.job.mesh, study.job.times, study.job.stations
     rows += [
-        Parameter("study.times", k, "", "samples of the protocol; the paper prints none", True),
-        Parameter("study.stations", j, "", "stations along the backbone; the paper prints none", True),
+        Parameter("study.times", k, "", "samples of the protocol; the paper gives none", True),
+        Parameter("study.stations", j, "", "stations along the backbone; the paper gives none", True),
         Parameter("mesh.order", m.order, "", "1: linear elements, which lock in thin walls; 2: quadratic"),
         Parameter("mesh.refine", m.refine, "", "divides every element size"),
-        Parameter(
-            "protocol", "protocol.csv", "", "between the paper's pressures, times are not printed", True
-        ),
+        Parameter("protocol", "protocol.csv", "", "between the paper's pressures; it gives no times", True),
     ]
     return rows
 

@@ -47,7 +47,7 @@ def difference(one: Motion, name: str, skin: Skin, other: Motion, other_name: st
     known = embedding.outside_mm <= FARTHEST * extent
     if known.mean() < _LEAST_SHARE:
         raise InputError(
-            f"the two units have only {known.mean():.0%} of the surface in common",
+            f"the two units share only {known.mean():.0%} of their surface",
             str(other.folder.parent),
             "compare runs of units of about the same size",
         )

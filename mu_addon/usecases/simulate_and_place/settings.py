@@ -17,15 +17,15 @@ PROTOCOL = described(
 MESHER = described("mesher", "auto", "mesh generator", choices=("auto", "gmsh", "pytetwild"))
 TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=1001)
 STATIONS = described("stations", 51, "number of stations along the backbone", low=2, high=10_001)
-WORKERS = described("workers", 2, "number of worker processes; it decides no result", low=1, high=256)
+WORKERS = described("workers", 2, "number of worker processes; results do not depend on it", low=1, high=256)
 MESH_CHECK = described(
     "mesh_check", True, "solve a second mesh, from which the mesh uncertainty of the ranking is estimated"
 )
 PATHS = described(
     "paths",
     "windows",
-    "candidate paths: windows of consecutive anchors, or graph, every path through the lattice besides, bent "
-    "ones included",
+    "candidate paths: windows of consecutive anchors; graph adds every path through the lattice, bent ones "
+    "included",
     choices=("windows", "graph"),
 )
 CHECKS = described(
@@ -35,7 +35,7 @@ SELF_FRICTION = described(
     "self_friction",
     0.0,
     "Coulomb friction coefficient of walls and struts on each other, with self-contact; above 0 the motion "
-    "is solved in order of time",
+    "is solved in time order",
     low=0,
     high=5,
 )

@@ -110,7 +110,7 @@ def parse(text: str, folder: Path) -> Tables:
     if found != FORMAT or isinstance(found, bool):
         newer = isinstance(found, int) and not isinstance(found, bool) and found > FORMAT
         raise InputError(
-            f"study.toml is of format {found!r}, and this version knows {FORMAT}",
+            f"study.toml is of format {found!r}, and this version reads {FORMAT}",
             where,
             "use the newer version that wrote it" if newer else "choose another folder",
         )

@@ -247,7 +247,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
         if bench.fps is not None:
             remarks.append(
                 Remark(
-                    f"the markers have their own time_s, which is taken; fps = {bench.fps:g} is not used",
+                    f"the markers' own time_s is used; fps = {bench.fps:g} is not used",
                     where,
                     "leave fps out, or remove the column time_s where it is wrong",
                 )
@@ -284,7 +284,7 @@ def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: s
         rest[first] = True
         remarks.append(
             Remark(
-                f"no frame shows the unit at rest; the angle is relative to {p[first]:.4g} kPa at "
+                f"no frame shows the unit at rest; angles are relative to {p[first]:.4g} kPa at "
                 f"{time[first]:.4g} s",
                 where,
                 "begin the clip at zero pressure; `diagnose` fits the zero of the angle in any case",
@@ -360,7 +360,7 @@ def followed(clip: Path, bench: Bench, pressure: Path, follow: Tracker) -> Filme
         tracks = read_pixels(clip)
     elif Path(clip).suffix.lower() in PROJECTS:
         raise InputError(
-            "the file is no table in text", str(clip), "export the tracked positions in pixels as CSV"
+            "the file is not a text table", str(clip), "export the tracked positions in pixels as CSV"
         )
     else:
         unplaced = {*bench.view.base, *(bench.view.tip or ()), *(bench.view.ruler or ())} - {

@@ -30,7 +30,7 @@ Cells = tuple[int, list[str]]
 
 SUFFIXES = (".csv", ".tsv", ".txt")
 PROJECTS = (".h5", ".hdf5", ".slp", ".xml", ".trk", ".kva", ".xlsx")
-"""Files of trackers that are no tables in text."""
+"""Files of trackers that are not text tables."""
 SURE = 0.6
 """Likelihood below which DeepLabCut itself takes a marker as lost."""
 _MOST_PLACES = 20_000_000
@@ -233,7 +233,7 @@ class _Table:
         if len(later):
             raise self._wrong(
                 int(later[0]) + 1,
-                "its frame is not after the one before",
+                "its frame number does not increase",
                 "export one row a frame, sorted: one animal or track",
             )
         place = self._place_of(frames, len(names))
@@ -295,7 +295,7 @@ class _Table:
                 Remark(
                     "x is taken as pixels to the right and y as pixels downward from the upper left corner",
                     self.where,
-                    "if y grows upward, export it the other way, else the angle has the wrong sign",
+                    "if y grows upward, export it inverted, or the angle has the wrong sign",
                 )
             )
         return Tracks(names, pixels, time_s=time_s, remarks=tuple(self.remarks))
@@ -357,7 +357,7 @@ class _Table:
         frames = self._numbers(self.layout.frame)
         wrong = np.flatnonzero(~np.isfinite(frames) | (frames != np.round(frames)))
         if len(wrong):
-            raise self._wrong(int(wrong[0]), "its frame is no whole number", "correct that row")
+            raise self._wrong(int(wrong[0]), "its frame is not a whole number", "correct that row")
         return frames
 
     def _place_of(self, frames: Array, markers: int) -> Array:

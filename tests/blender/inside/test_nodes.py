@@ -281,7 +281,9 @@ def test_a_resin_and_a_printer_dropped_on_a_unit_become_its_parameters():
     assert not [o for o in bpy.data.objects if o.get(dropped.PRINTER)]
     assert bpy.context.object == near
     assert dropped.waiting() is None
-    assert "no resin and no printer" in refused(bpy.ops.mu.take_asset, unit=near.mu_unit.uuid, asset="Cube")
+    assert "neither a resin nor a printer" in refused(
+        bpy.ops.mu.take_asset, unit=near.mu_unit.uuid, asset="Cube"
+    )
 
 
 def test_presets_and_groups_become_an_asset_library_of_the_users():

@@ -66,7 +66,7 @@ def test_what_a_simulation_is_given():
     assert bpy.ops.mu.obstacle_remove(name="Far") == {"FINISHED"}
     assert len(asked().obstacles) == 1
     assert "Far" in bpy.data.objects
-    assert "is no obstacle" in refused(bpy.ops.mu.obstacle_remove, name="Far")
+    assert "is not an obstacle" in refused(bpy.ops.mu.obstacle_remove, name="Far")
     bpy.ops.mu.obstacle_remove()
     assert asked().obstacles == ()
     assert not bpy.ops.mu.obstacle_check.poll()

@@ -308,9 +308,9 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     assert "Up is not a direction" in refused(bpy.ops.mu.print_export)
     settings.up = (0.0, 0.0, -1.0)
     assert "For a build along Up, 0 0 -1" in drawn()
-    assert "without vents" not in drawn()
+    assert "have no vents" not in drawn()
     settings.formats = {"stl", "step"}
-    assert "STEP stay without vents" in drawn()
+    assert "STEP have no vents" in drawn()
     settings.formats = {"stl"}
     assert bpy.ops.mu.print_export() == {"FINISHED"}
     done(root)

@@ -101,7 +101,7 @@ def test_a_missing_system_library_is_told_before_a_run(monkeypatch):
     monkeypatch.setitem(gmsh_libraries.SYSTEM_LIBRARIES, "libnone.so.1", "libnone1")
     assert "apt install" not in drawn(), "the grid of the printed body needs no gmsh"
     root.mu_unit.study.detail = "full"
-    assert "Without libnone.so.1 of this system" in drawn()
+    assert "Without libnone.so.1, units are meshed" in drawn()
     assert "apt install libnone1" in drawn()
 
 

@@ -273,7 +273,7 @@ def test_a_missing_strut_is_a_missing_tunnel():
     surface, _ = without_a_strut()
     found = {f.check: f for f in check(*surface, load_printer(), stages=(), nominal=nominal).findings}
     assert found["tunnels"].severity == "error"
-    assert ": 1 less, as where struts are missing" in found["tunnels"].what
+    assert ": 1 less, as if struts were missing" in found["tunnels"].what
     assert found["volume"].severity == "pass"
 
 

@@ -37,7 +37,7 @@ def test_the_build_direction_is_the_way_up():
 
 
 def test_a_chamber_is_seen_where_its_inlet_opens_it():
-    """Along the bore's axis the bottle's chamber is no hole of the section, as it is beside the bore."""
+    """Along the bore's axis the bottle's chamber is not a hole of the section, as it is beside the bore."""
     room = printable(shapes.box([-5, -5, 2], [5, 5, 12]))
     opened, enclosed = slices(*bottle(), (1.0, 0.0, 0.0), [7.0, 3.0], room)
     assert (opened.enclosed_mm2, opened.open_mm2) == pytest.approx((0.0, 100.0), abs=1e-6)
