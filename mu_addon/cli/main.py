@@ -138,7 +138,7 @@ def main(arguments: list[str]) -> int:
     if context.status == 0 and not getattr(options, "json", False):
         results = [f"results: {context.folder}"] if context.folder is not None else []
         applied = context.summary.get("model", {}).get("applied", ())
-        results += [f"applied of {options.model}: {words}" for words in applied]
+        results += [f"applied from {options.model}: {words}" for words in applied]
         lines = [*results, *context.console_summary(context.summary)]
         sys.stdout.write(printable("\n".join(lines), sys.stdout) + "\n")
     return context.status

@@ -74,7 +74,9 @@ def scaled_by(effect: Effect, owners: Sequence[Sequence[str]], experiments: Sequ
         return effect
     of = {e.name: e.specimen or e.name for e in experiments}
     apart = [{of[name] for name in names} for names in owners]
-    causes = "load cell or clamping"
+    # A test may have been of another specimen than was noted.
+    several = len(set(of.values())) > 1
+    causes = "load cell, clamping or a mix-up of specimens" if several else "load cell or clamping"
     if sum(map(len, apart)) == len(set().union(*apart)):
         causes = "load cell, section as typed, clamping or specimen"
     return attrs.evolve(effect, mechanism=f"the force is scaled: {causes}")

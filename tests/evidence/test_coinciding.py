@@ -74,7 +74,7 @@ def test_fast_tests_that_are_the_soft_ones_are_told_by_their_rate():
 
 
 def test_a_scale_of_force_is_called_by_what_can_differ_so():
-    cell = "the force is scaled: load cell or clamping"
+    cell = "the force is scaled: load cell, clamping or a mix-up of specimens"
     every = "the force is scaled: load cell, section as typed, clamping or specimen"
     made = [
         pressed(name="a", specimen="S0"),
@@ -90,12 +90,15 @@ def test_a_scale_of_force_is_called_by_what_can_differ_so():
     apart = [pressed(name=n, specimen=n, session=n) for n in "abc"]
     (among,) = (e for e in pooled_effects(scales, apart) if e.name == FORCE_SCALE)
     assert among.mechanism == every
+    alone = [pressed(name=n, specimen="S") for n in "abc"]
+    (among,) = (e for e in pooled_effects(scales, alone) if e.name == FORCE_SCALE)
+    assert among.mechanism == "the force is scaled: load cell or clamping"
 
 
 def test_one_scaled_test_of_a_specimen_is_no_matter_of_its_section():
     made = [pressed(name=f"b{i}", modulus=44.0 if i == 2 else 40.0, specimen="S", seed=i) for i in range(5)]
     found = diagnose(made, Composite(bench_simulators(made)))
-    assert "force scale of experiment b2 (load cell or clamping)" in sentence(found)[0]
+    assert "force scale (load cell or clamping) of experiment b2" in sentence(found)[0]
     # And where each test has its own specimen it may be.
     made = [attrs.evolve(e, specimen=e.name) for e in made]
     found = diagnose(made, Composite(bench_simulators(made)))

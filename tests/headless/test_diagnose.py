@@ -58,7 +58,7 @@ def test_homogenize_takes_the_model(overcured, tmp_path):
             *more,
         )
         done = run("homogenize", *words)
-        assert (f"applied of {model}: " in done.stdout) == bool(more)
+        assert (f"applied from {model}: " in done.stdout) == bool(more)
         assert done.returncode == 0, done.stderr
         stiff[name] = json.loads((out / "summary.json").read_text())["moduli_kPa"]["E100"]
     assert read_unit(tmp_path / "printed" / "unit.toml").print.offset_xy_mm == pytest.approx(0.09, rel=0.2)

@@ -13,7 +13,7 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
-from mu_addon.evidence.effect import LIBRARY
+from mu_addon.evidence.effect import LIBRARY, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
 from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.evidence.prediction.unit import UnitPressure
@@ -26,6 +26,7 @@ from mu_addon.usecases.diagnose import run as diagnosing
 from mu_addon.usecases.diagnose.job import Job, read_job
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
+from mu_addon.usecases.diagnose.words import alternatives, bare
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
 
@@ -320,6 +321,24 @@ def test_a_softening_is_stated_with_the_pressure_it_is_relative_to():
     values = {"mullins_softening.reference_kPa": reference, **model.values}
     np.testing.assert_allclose(found.predict(e, {}), stiffer["unit_pressure"].predict(e, values))
     assert not np.allclose(found.predict(e, {}), stiffer["unit_pressure"].predict(e, model.values), rtol=1e-3)
+
+
+def test_causes_of_one_owner_are_told_together():
+    several = ["strut_thickness among specimens", "overcure among specimens"]
+    later = "step_change of tests from d 0.9, fast on"
+    assert alternatives(several) == "strut thickness or overcure among specimens"
+    assert alternatives([*several, later]) == (
+        "strut thickness or overcure among specimens; or step change of tests from “d 0.9, fast” on"
+    )
+    assert alternatives(["anisotropy", "leak of specimen B", "self_heating"]) == (
+        "anisotropy or self-heating; or leak of specimen B"
+    )
+    assert alternatives(["overcure", later]) == "overcure or step change of tests from “d 0.9, fast” on"
+
+
+def test_a_parameter_of_one_specimen_is_told_without_its_unit():
+    size = Parameter("thicker_mm of specimen d_1", "mm", -0.4, 0.6, 0.0, (), "")
+    assert bare(size) == "thicker of specimen d_1"
 
 
 def test_there_is_something_to_do_about_every_cause():

@@ -26,7 +26,10 @@ TO_DO = {
         f"compare the gauge with another one in steps up to the largest pressure; {_INSTRUMENT}"
     ),
     "pressure_drift": f"let the gauge warm up, and read its zero before and after; {_INSTRUMENT}",
-    "force_scale": "hang a dead weight from the load cell, measure the section, and clamp the specimen again",
+    "force_scale": (
+        "check which specimen was in each test, hang a dead weight from the load cell, measure the section, "
+        "and clamp the specimen again"
+    ),
     "force_nonlinearity": f"calibrate the load cell by dead weights up to its largest force; {_INSTRUMENT}",
     "geometry_as_typed": "measure the specimen and correct the height that was entered",
     "step_change": "look up what was changed between these tests, and make the first one again",

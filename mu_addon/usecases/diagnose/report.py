@@ -24,7 +24,7 @@ from ...run.context import RunContext
 from ...run.versions import package_versions
 from . import charts as pictures
 from .diagnosis import Curve, Diagnosis, curves
-from .words import advice, bare, between, in_a_table, listed, readable, sentence, to_do
+from .words import advice, alternatives, bare, between, called, in_a_table, listed, readable, sentence, to_do
 
 FILES = {
     "diagnose.toml": "inputs of this run",
@@ -185,10 +185,6 @@ def _causes(found: Diagnosis) -> str:
         for i, (key, p) in enumerate(zip(cause.effect.keys, cause.effect.parameters, strict=True)):
             low, high = verdict.intervals.get(key, (math.nan, math.nan))
             first = [readable(cause.effect.name), cause.effect.mechanism] if i == 0 else ["", ""]
-            last = [
-                _p_value(cause.p_value),
-                listed([readable(r) for r in cause.rivals], "or") if cause.rivals else "none",
-            ]
             value = verdict.selection.chosen.values[key]
             rows.append(
                 (
@@ -199,7 +195,7 @@ def _causes(found: Diagnosis) -> str:
                         signed(between(low, high)),
                         p.unit,
                         _at_bound(p, low, high),
-                        *(last if i == 0 else ["", ""]),
+                        "" if i else _p_value(cause.p_value),
                     ],
                     i == 0 and bool(verdict.names),
                 )
@@ -213,8 +209,12 @@ def _causes(found: Diagnosis) -> str:
         ("unit", ""),
         ("note", "line"),
         ("p-value", "n"),
-        ("rivals", "text"),
     ]
+    doubts = "".join(
+        f"<p>In place of {escape(called(c.effect))} it may be {escape(alternatives(c.rivals))}.</p>"
+        for c in verdict.selection.causes
+        if c.rivals
+    )
     words = (
         ""
         if verdict.names
@@ -230,6 +230,7 @@ def _causes(found: Diagnosis) -> str:
     return (
         words
         + table("", head, rows)
+        + doubts
         + (table("Nuisance parameters, fitted in every case.", fitted, rest) if rest else "")
     )
 

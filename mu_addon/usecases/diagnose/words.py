@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...evidence.effect import FORCE_SCALE, SLIP, Effect, Parameter
+from ...evidence.effect import FORCE_SCALE, OF, SLIP, Effect, Parameter
+from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
@@ -25,6 +26,8 @@ _INSTEAD = {
     "the same hold with a plug of metal in the unit's place": "the same hold with soapy water on its joints",
     "a longer hold, and the same in a rigid chamber of that volume": "a hold ten times as long",
 }
+_HYPHENED = re.compile(r"\b(rate|self)_(independent|heating)")
+_LATER = re.compile(r"^of tests from (.*) on$")
 # Least share of a misfit for an explanation to be reported.
 LEAST_SHARE = 0.1
 # Number of intervals from which a table is used.
@@ -35,13 +38,33 @@ MOST_SHOWN = 3
 
 def readable(name: str) -> str:
     """An effect's or quantity's name for a reader."""
-    return name.replace("_", " ")
+    return _HYPHENED.sub(r"\1-\2", name).replace("_", " ")
 
 
 def called(effect: Effect) -> str:
     """An effect's title for a reader; a scale of force with its possible causes."""
-    _, _, causes = effect.mechanism.partition(": ")
-    return f"{readable(effect.title)} ({causes})" if effect.name == FORCE_SCALE else readable(effect.title)
+    return " ".join(_parts(effect))
+
+
+def _parts(title: Effect | str) -> list[str]:
+    """Name of an effect, or of a rival by its title, and its owner if it has one, for a reader."""
+    effect, title = (title, title.title) if isinstance(title, Effect) else (None, title)
+    name, *owner = title.split(" ", 1)
+    if effect is not None and effect.name == FORCE_SCALE:
+        name += f" ({effect.mechanism.partition(': ')[2]})"
+    return [readable(name), *(_LATER.sub(r"of tests from “\1” on", words) for words in owner)]
+
+
+def alternatives(effects: Sequence[Effect | str]) -> str:
+    """Effects of which one is the cause, those of one owner together: "a or b of specimen B; or c"."""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for effect in effects:
+        name, *owner = _parts(effect)
+        groups.setdefault(tuple(owner), []).append(name)
+    choices = [" ".join([listed(names, "or"), *owner]) for owner, names in groups.items()]
+    if len(choices) in (1, len(effects)):
+        return listed(choices, "or")
+    return f"{'; '.join(choices[:-1])}; or {choices[-1]}"
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
@@ -52,7 +75,8 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def bare(p: Parameter) -> str:
     """A parameter's name for a reader, without the unit that follows its value."""
     unit = p.unit.replace("1/", "per_").replace("/h", "_per_hour").replace("/", "_")
-    return readable(p.name.removesuffix(f"_{unit}") if unit else p.name)
+    name, of, whose = p.name.partition(OF)
+    return readable(name.removesuffix(f"_{unit}") if unit else name) + of + whose
 
 
 def between(low: float, high: float) -> str:
@@ -72,11 +96,7 @@ def sized(verdict: Verdict, cause: Cause) -> str:
         return _slipped(verdict, cause)
     sizes = []
     if cause.effect.among:
-        value, low, high = cause.effect.spread
-        unit = cause.effect.parameters[0].unit
-        size = f"{value:.3g} {unit}".rstrip()
-        # So many intervals are a table.
-        return f"standard deviation between {cause.effect.among}s {size} (95 %: {between(low, high)})"
+        return _differing(verdict, cause.effect)
     for key, p in zip(cause.effect.keys, cause.effect.parameters, strict=True):
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         unit = f" {p.unit}" if p.unit else ""
@@ -85,6 +105,21 @@ def sized(verdict: Verdict, cause: Cause) -> str:
         if (cause.effect.name, p.name) == ("overcure", "offset_mm"):
             sizes.append(f"of every surface, so that struts and walls are {2 * value:.2g} mm thicker")
     return ", ".join(sizes)
+
+
+def _differing(verdict: Verdict, effect: Effect) -> str:
+    """Smallest and largest size among the owners of an effect, and the spread of all."""
+    values = verdict.selection.chosen.values
+    unit = effect.parameters[0].unit
+    sizes = sorted((values[key], p.name) for key, p in sizes_of(effect))
+    name = bare(effect.parameters[0]).partition(OF)[0]
+    ends = [
+        f"{value:.3g} {unit}".rstrip() + f" ({key.partition(OF)[2]})" for value, key in (sizes[0], sizes[-1])
+    ]
+    sd, low, high = effect.spread
+    spread = f"{sd:.3g} {unit}".rstrip()
+    # So many intervals are a table.
+    return f"{name} from {ends[0]} to {ends[1]}, standard deviation {spread} (95 %: {between(low, high)})"
 
 
 def _slipped(verdict: Verdict, cause: Cause) -> str:
@@ -128,7 +163,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             return names, " ".join(sizes)
         return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
     if verdict.kind == "ambiguous":
-        choices = [listed([called(c.effect), *(readable(n) for n in c.rivals)], "or") for c in found.causes]
+        choices = [alternatives([c.effect, *c.rivals]) for c in found.causes]
         sizes = [f"{readable(c.effect.title)}: {sized(verdict, c)}" for c in found.causes]
         message = "Each of these effects explains the data, and these data do not distinguish them." + (
             "" if tabled else f" Fitted values: {'; '.join(sizes)}."
@@ -227,8 +262,11 @@ def advice(verdict: Verdict) -> str:
 
 def _asked(verdict: Verdict) -> str:
     if verdict.proposal is not None:
-        effects = listed([readable(n) for n in verdict.proposal.separates])
-        return f"{_upper(verdict.proposal.what)}. It distinguishes {effects}."
+        doubted = [c for c in verdict.selection.causes if c.rivals]
+        shows = "tells these causes apart"
+        if len(doubted) > 1:
+            shows = f"shows whether one is {alternatives([doubted[0].effect, *doubted[0].rivals])}"
+        return f"{_upper(verdict.proposal.what)}. It {shows}."
     found = verdict.selection
     if verdict.kind == "named":
         return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."

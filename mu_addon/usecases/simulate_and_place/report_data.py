@@ -98,8 +98,8 @@ def _of_model(study: Study) -> list[str]:
     """Changes that an extended model made to the unit, and those that were left out, in words."""
     model = study.context.summary.get("model", {})
     return [
-        *(f"Applied of the extended model: {words}." for words in model.get("applied", ())),
-        *(f"Not applied of the extended model: {words}." for words in model.get("left_out", ())),
+        *(f"Applied from the extended model: {words}." for words in model.get("applied", ())),
+        *(f"Not applied from the extended model: {words}." for words in model.get("left_out", ())),
     ]
 
 
