@@ -62,7 +62,10 @@ class Block:
         return hashlib.sha256(repr([*parts, OFFSETS_mm, mesh, STRAIN]).encode()).hexdigest()[:32]
 
     def __str__(self) -> str:
-        return f"{self.cells} x {self.cells} x {self.cells} cells between plates that {self.plates} its faces"
+        straight = self.cell.junction_radius_mm == self.cell.midspan_radius_mm
+        struts = f" of {2.0 * self.cell.midspan_radius_mm:.4g} mm struts (at 1.0x)" if straight else ""
+        count = f"{self.cells} x {self.cells} x {self.cells}"
+        return f"{count} cells{struts} between plates that {self.plates} its faces"
 
 
 def _silent(what: str, share: float) -> None:
@@ -148,7 +151,8 @@ def printed(print_: Printing) -> tuple[float, float]:
 def block_of(experiment: Experiment, unit: Unit) -> Block | None:
     """The block of a unit's lattice that an experiment compressed; None where it gives no count of cells.
 
-    Plates hold the faces where the experiment does not say. Raises InputError for a block that is no cube.
+    Struts are the unit's, or straight ones of the experiment's own diameter. Plates hold the faces where the
+    experiment does not say. Raises InputError for a block that is no cube, and for struts that cannot be.
     """
     if experiment.cells is None:
         return None
@@ -159,6 +163,9 @@ def block_of(experiment: Experiment, unit: Unit) -> Block | None:
             "compress cubes, or omit cells: the specimen is then modelled as slender struts",
         )
     cell = strut_cell(attrs.evolve(unit, scale=1.0, print=Printing()))
+    if experiment.strut_mm is not None:
+        radius = 0.5 * experiment.strut_mm / experiment.scale
+        cell = attrs.evolve(cell, junction_radius_mm=radius, midspan_radius_mm=radius)
     return Block(cell, experiment.cells[0], experiment.plates or HELD, unit.material.membrane_poisson)
 
 

@@ -39,6 +39,7 @@ _KEYS_OF_NUMBERS = (
     "scale",
     "orientation_deg",
     "mass_g",
+    "strut_mm",
     "chamber_volume_mm3",
     "gap_mm",
     *ACCURACIES,

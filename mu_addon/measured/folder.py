@@ -184,9 +184,19 @@ def _described(entry: dict[str, Any], kind: Kind, at: _Place) -> dict[str, Any]:
         fields["run_order"] = _number(entry["run_order"], "run_order", at, -1e15, 1e15)
     if "temperature_C" in entry:
         fields["temperature_C"] = _number(entry["temperature_C"], "temperature_C", at, -100.0, 300.0)
-    for key, most in (("length_mm", 1e4), ("mass_g", 1e6), ("mass_sd_g", 1e6), ("chamber_volume_mm3", 1e9)):
+    for key, most in (
+        ("length_mm", 1e4),
+        ("strut_mm", 1e3),
+        ("mass_g", 1e6),
+        ("mass_sd_g", 1e6),
+        ("chamber_volume_mm3", 1e9),
+    ):
         if key in entry:
             fields[key] = _number(entry[key], key, at, 0.0, most, above=True)
+    if "strut_mm" in entry and "cells" not in entry:
+        raise InputError(
+            "strut_mm needs cells", at("strut_mm"), "give the count of cells, from which a block is computed"
+        )
     fields["accuracy"] = {
         column: _number(entry[key], key, at, 0.0, 1e6, above=True)
         for key, column in ACCURACIES.items()

@@ -146,7 +146,16 @@ KINDS = {
             _LOAD,
             ("time_s", "stress_sd_kPa"),
             timed=False,
-            may_have_keys=("section_mm", "length_mm", "cells", "plates", "axis", "mass_g", "mass_sd_g"),
+            may_have_keys=(
+                "section_mm",
+                "length_mm",
+                "cells",
+                "strut_mm",
+                "plates",
+                "axis",
+                "mass_g",
+                "mass_sd_g",
+            ),
         ),
         Kind(
             "coupon",

@@ -88,6 +88,36 @@ def test_counts_of_cells_share_one_modulus_as_drawn():
 
 
 @pytest.mark.usefixtures("no_test")
+def test_a_block_may_have_struts_of_its_own():
+    """Drawn 1.2 and 0.9 mm in cells of 10 mm: at 1.0x these are 1.5 and 1.125 mm, straight."""
+    thick, thin = (block_of(block(cells=(3, 3, 3), scale=0.8, strut_mm=d), UNIT) for d in (1.2, 0.9))
+    assert (thick.cell.junction_radius_mm, thick.cell.midspan_radius_mm) == pytest.approx((0.75, 0.75))
+    assert thin.cell.midspan_radius_mm == pytest.approx(0.5625)
+    assert thin.cell.size_mm == thick.cell.size_mm == UNIT.dimensions.cell
+    assert str(thick) == ("3 x 3 x 3 cells of 1.5 mm struts (at 1.0x) between plates that hold its faces")
+    with pytest.raises(InputError, match="fill the cell"):
+        block_of(block(cells=(3, 3, 3), strut_mm=20.0), UNIT)
+
+
+def test_struts_of_its_own_soften_a_block(monkeypatch):
+    made = {}
+
+    def test(block, offset_mm, cache):
+        made[block] = block
+        radius = block.cell.midspan_radius_mm
+        return (radius + offset_mm) ** 4, (radius + offset_mm) ** 2
+
+    monkeypatch.setattr(lattice_fem, "at_offset", test)
+    both = [block(name=f"{d}", cells=(3, 3, 3), scale=0.8, strut_mm=d) for d in (1.2, 0.9)]
+    simulator = LatticeStress(both, scalings(both, UNIT)[0])
+    thick, thin = (simulator.predict(e, {})[0][-1] for e in both)
+    assert len(made) == 2
+    assert thin / thick == pytest.approx((0.9 / 1.2) ** 4, rel=1e-6)
+    # Thinner struts that print 0.1 mm thinner than drawn.
+    printed = simulator.predict(both[1], {"strut_thickness.thicker_mm": -0.1})[0][-1]
+    assert printed / thin == pytest.approx((0.8 / 0.9) ** 4, rel=0.03)
+
+
 def test_an_offset_that_the_unit_has_already_comes_before_the_effects():
     printed = attrs.evolve(UNIT, print=Printing(offset_xy_mm=0.1, offset_z_mm=0.1))
     bare, grown = (scalings([THREE], u)[0][THREE.name] for u in (UNIT, printed))

@@ -109,12 +109,14 @@ def test_every_field_that_is_given_is_kept(tmp_path):
         specimen="B",
         temperature_C=23.5,
         cells=4,
+        strut_mm=0.9,
         axis="z",
         mass_g=12.5,
     )
     e = read_folder(folder(tmp_path, toml, a=GOOD)).experiments[0]
     assert (e.scale, e.orientation_deg, e.specimen, e.temperature_C) == (0.75, -90.0, "B", 23.5)
     assert (e.cells, e.axis, e.mass_g, e.mode, e.section_mm) == ((4, 4, 4), "z", 12.5, None, None)
+    assert e.strut_mm == 0.9
     other = read_folder(folder(tmp_path, entry(**LATTICE, cells=[4, 3, 2]), a=GOOD)).experiments[0]
     assert other.cells == (4, 3, 2)
     assert np.isnan(other.temperature_C)
@@ -283,6 +285,7 @@ def test_what_cannot_be_used_is_refused_by_file_and_row(tmp_path, keys, text, wh
         (entry(section_mm=40.0), "is not a pair", "line 7"),
         (entry(section_mm=[40.0, -1.0]), "out of bounds", "line 7"),
         (entry(**(LATTICE | {"cells": 2.5})), "is not a number of cells", "line 6"),
+        (entry(**(LATTICE | {"strut_mm": 0.9})), "strut_mm needs cells", "line 6"),
         (entry(**(POSE | {"orientation_deg": 5.0})), "is a column of unit_pose", "line 6"),
         (entry(**(POSE | {"orientation_axis": [0, 0, 0]})), "has no length", "line 6"),
         (entry(**(POSE | {"orientation_axis": 3})), "is not a direction", "line 6"),

@@ -31,6 +31,7 @@ KEYS = (
     "valve",
     "pressure",
     "cells",
+    "strut_mm",
     "temperature_C",
     "scale",
     "orientation_deg",
