@@ -275,6 +275,12 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
     assert again.texts() == jobs[1].texts()
 
 
+def test_a_unit_of_softer_resin_is_trusted_with_its_own_moduli(tmp_path, analytic_unit):
+    context, _ = run(bent_unit(tmp_path / "data", {"modulus_factor": 0.8}), tmp_path / "out")
+    assert context.summary["verdict"] == "none"
+    assert "with --model model.toml, whose moduli are 0.8 times the unit's" in context.summary["to_do"]
+
+
 @pytest.mark.nightly("test_a_diagnosis_goes_on_with_what_it_knew")
 def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic_unit):
     first, _ = run(bent_unit(tmp_path / "first", RELAXES), tmp_path / "one", load_preset("mu-1.0x"))

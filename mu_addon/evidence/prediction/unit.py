@@ -183,6 +183,9 @@ def pressure_histories(experiments: Sequence[Experiment]) -> dict[str, PressureH
     return found
 
 
+MODULUS = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
+
+
 def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     """Parameters free in every fit of a unit: modulus factor, and each channel's zero in its unit."""
     zeros = [
@@ -190,8 +193,7 @@ def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
         for c in channels
         for most, by in [(1e6, "syringe") if c.startswith("volume") else (1e3, "camera")]
     ]
-    modulus = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of resin differ")
-    return (modulus, *zeros)
+    return (MODULUS, *zeros)
 
 
 def believed(

@@ -11,6 +11,7 @@ import numpy as np
 from ...evidence.effect import FORCE_SCALE, OF, SLIP, Effect, Parameter
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
+from ...evidence.prediction.unit import MODULUS
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.selection import Cause
@@ -32,6 +33,8 @@ _LATER = re.compile(r"^of tests from (.*) on$")
 LEAST_SHARE = 0.1
 # Number of intervals from which a table is used.
 TABLE = 6
+# Of a factor of moduli: less is not worth a word.
+NEAR_ONE = 0.02
 # Most proposed measurements for effects that the data cannot show.
 MOST_SHOWN = 3
 
@@ -296,13 +299,24 @@ def _asked(verdict: Verdict) -> str:
 def to_do(verdict: Verdict) -> str:
     """Next action, in words; empty if nothing was named."""
     if verdict.kind == "none":
-        trust = "Trust the simulation for experiments like these"
+        trust = f"Trust the simulation for experiments like these{_with_moduli(verdict)}"
         return f"{trust}, and set the load cell to zero before each test." if verdict.zeros else f"{trust}."
     if verdict.kind == "ambiguous":
         return "Make the next measurement below before anything is changed."
     if verdict.kind == "unexplained":
         return f"Do not trust the simulation to better than {_error(verdict)} until this is explained."
     return what_to_do(verdict.names)
+
+
+def _with_moduli(verdict: Verdict) -> str:
+    """Fitted factor of a unit's moduli, without which the simulation misses, in words; empty near 1."""
+    key = MODULUS.name
+    factor = verdict.selection.base.values.get(key, 1.0)
+    low, high = verdict.intervals.get(key, (1.0, 1.0))
+    if low <= 1.0 <= high or abs(factor - 1.0) < NEAR_ONE:
+        return ""
+    times = f"{factor:.3g} times the unit's (95 %: {between(low, high)})"
+    return f" with --model model.toml, whose moduli are {times}"
 
 
 def _of_one_only(cause: Cause) -> str:
