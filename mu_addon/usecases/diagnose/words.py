@@ -266,10 +266,10 @@ def advice(verdict: Verdict) -> str:
 def _asked(verdict: Verdict) -> str:
     if verdict.proposal is not None:
         doubted = [c for c in verdict.selection.causes if c.rivals]
-        shows = "tells these causes apart"
+        it = "tells these causes apart"
         if len(doubted) > 1:
-            shows = f"shows whether one is {alternatives([doubted[0].effect, *doubted[0].rivals])}"
-        return f"{_upper(verdict.proposal.what)}. It {shows}."
+            it = f"shows whether one is {alternatives([doubted[0].effect, *doubted[0].rivals])}"
+        return f"{_upper(verdict.proposal.what)}. It {it}."
     found = verdict.selection
     if verdict.kind == "named":
         return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."
