@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class MuError(Exception):
     """A failure described by `what`, `where` and `remedy`; `status` is the exit status of its run."""
@@ -45,3 +47,15 @@ class OutputError(MuError):
     """A result that could not be written."""
 
     status = 5
+
+
+def did_you_mean(name: str, names: Iterable[str], alike: float = 0.6) -> str:
+    """`; did you mean x?` for the most similar of the names, "" where none is similar.
+
+    alike: least similarity, from 0 to 1.
+    """
+    # Imported late: only a message needs it.
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, list(names), 1, alike)
+    return f"; did you mean {close[0]!r}?" if close else ""

@@ -43,10 +43,10 @@ class _Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            from ..design.toml_text import nearest
+            from ..errors import did_you_mean
 
             names = [str(name) for name in action.choices]
-            words = f"{value!r} is unknown{nearest(str(value), names)} (choose from {', '.join(names)})"
+            words = f"{value!r} is unknown{did_you_mean(str(value), names)} (choose from {', '.join(names)})"
             raise argparse.ArgumentError(action, words)
 
     def error(self, message: str) -> None:  # type: ignore[override]

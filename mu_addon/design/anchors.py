@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .parameters import Unit
-from .toml_text import nearest
 
 SHORTEST = 3
 """Fewest anchors of a path (the source paper's h >= 3)."""
@@ -72,7 +71,7 @@ def window(unit: Unit, name: str) -> Window:
             return candidate
     raise InputError(
         f"there is no path {name!r} among {unit.dimensions.count} anchors"
-        + nearest(name, [candidate.name for candidate in every]),
+        + did_you_mean(name, [candidate.name for candidate in every]),
         "path",
         f"choose one of {every[0].name} .. {every[-1].name}",
     )

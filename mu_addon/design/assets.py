@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..reading import file_text, parse_toml
-from .toml_text import nearest
 
 
 def asset_root() -> Path:
@@ -51,7 +50,7 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
         )
         raise InputError(what_it_is, what, f"choose one of {', '.join(names)}")
     raise InputError(
-        f"there is no {what} {name!r}{nearest(name, names)}",
+        f"there is no {what} {name!r}{did_you_mean(name, names)}",
         what,
         f"choose one of {', '.join(names)}, or give the path of a TOML file",
     )

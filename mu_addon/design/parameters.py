@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import attrs
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..files import write_bytes
 from ..reading import file_text
 from . import lattices, rules, toml_text
@@ -448,7 +448,7 @@ class Unit:
             if name not in sections:
                 known = [*head, *sections]
                 raise InputError(
-                    f"there is no parameter {name!r}{toml_text.nearest(name, known)}",
+                    f"there is no parameter {name!r}{did_you_mean(name, known)}",
                     "Unit.evolve",
                     f"choose from {', '.join(known)}",
                 )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import attrs
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     # The command line's --help reads settings, and must be fast.
@@ -237,9 +236,8 @@ def _check_choice(instance: Any, field: Any, value: Any) -> None:
             f"{field.name} = {value!r} is not a name", where(instance, field.name), field.metadata["text"]
         )
     if value not in names:
-        close = difflib.get_close_matches(value, names, n=1)
         raise InputError(
-            f"{field.name} = {value!r} is not known{f'; did you mean {close[0]!r}?' if close else ''}",
+            f"{field.name} = {value!r} is not known{did_you_mean(value, names)}",
             where(instance, field.name),
             f"choose one of {', '.join(names)}",
         )

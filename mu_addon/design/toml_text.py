@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..reading import parse_toml
 from ..toml_writer import Commented, toml_text, toml_value
 from .quantity import Description
@@ -93,12 +92,6 @@ def place(origin: str, line: int | None) -> str:
     return ", ".join(parts) or "TOML text"
 
 
-def nearest(name: str, names: Sequence[str]) -> str:
-    """`; did you mean x?` for the most similar of the names, "" where none is similar."""
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
-
-
 def _unknown(
     where: str, key: str, here: Sequence[str], keys: Mapping[str, Sequence[str]], text: str, origin: str
 ) -> InputError:
@@ -106,7 +99,7 @@ def _unknown(
     if elsewhere:
         hint = f"; it belongs {f'in [{elsewhere[0]}]' if elsewhere[0] else 'at the top level'}"
     else:
-        hint = nearest(key, here)
+        hint = did_you_mean(key, here)
     return InputError(
         f"unknown key {key!r}{hint}",
         f"{place(origin, line_of(text, where))}, {where}",

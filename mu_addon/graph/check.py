@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator
 
 import attrs
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .definition import NUMBER, Definition, Definitions, Input
 from .tree import Node, NodeTree, Source
 
@@ -36,8 +35,7 @@ def faults(tree: NodeTree, definitions: Definitions) -> tuple[Fault, ...]:
     for name, node in tree.nodes.items():
         definition = definitions.get(node.kind)
         if definition is None:
-            close = difflib.get_close_matches(node.kind, definitions, n=1)
-            words = f"; did you mean {close[0]!r}?" if close else ""
+            words = did_you_mean(node.kind, definitions)
             remedy = f"choose one of {', '.join(definitions)}"
             found.append(Fault(name, f"there is no kind of node {node.kind!r}{words}", remedy))
             continue
@@ -88,8 +86,7 @@ def _of_link(
 ) -> Iterator[Fault]:
     node = tree.nodes.get(source.node)
     if node is None:
-        close = difflib.get_close_matches(source.node, tree.nodes, n=1)
-        words = f"; did you mean {close[0]!r}?" if close else ""
+        words = did_you_mean(source.node, tree.nodes)
         yield Fault(name, f"there is no node {source.node!r}{words}", "correct the link", key, source)
         return
     definition = definitions.get(node.kind)

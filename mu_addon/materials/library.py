@@ -13,9 +13,9 @@ import numpy as np
 from ..design.assets import asset_file, asset_names
 from ..design.parameters import HIGHEST_POISSON
 from ..design.quantity import in_kPa
-from ..design.toml_text import nearest, parse, place
+from ..design.toml_text import parse, place
 from ..design.wall import Wall, require_used
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..fem import laws
 from ..fem.materials import Layer, Materials
 from ..files import write_text
@@ -306,7 +306,7 @@ class _Reader:
         value = self.word(table, found, key, number)
         if value not in choices:
             raise InputError(
-                f"{key} = {value!r} is not known{nearest(value, choices)}",
+                f"{key} = {value!r} is not known{did_you_mean(value, choices)}",
                 self.at(table, key, number),
                 f"choose one of {', '.join(choices)}",
             )
@@ -334,7 +334,7 @@ class _Reader:
         for key in found:
             if key not in _POINT:
                 raise InputError(
-                    f"unknown key {key!r}{nearest(key, _POINT)}",
+                    f"unknown key {key!r}{did_you_mean(key, _POINT)}",
                     self.at("point", key, number),
                     f"known here: {', '.join(_POINT)}",
                 )
@@ -395,7 +395,7 @@ class _Reader:
         for key in found:
             if key not in law.parameter_names:
                 raise InputError(
-                    f"the {law.name} law has no parameter {key!r}{nearest(key, law.parameter_names)}",
+                    f"the {law.name} law has no parameter {key!r}{did_you_mean(key, law.parameter_names)}",
                     where,
                     f"its parameters are {', '.join(law.parameter_names)}",
                 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import math
 import re
@@ -14,7 +13,7 @@ import attrs
 import numpy as np
 
 from ..cells.own import own_text
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..reading import file_bytes, file_text, parse_toml
 from ..run.inputs import digest
 from .experiment import Array, Experiment
@@ -60,7 +59,7 @@ def read_folder(folder: Path) -> Measured:
     if document:
         key = next(iter(document))
         raise InputError(
-            f"unknown key {key!r}{_nearest(key, ['experiment'])}",
+            f"unknown key {key!r}{did_you_mean(key, ['experiment'])}",
             _place(path, text, 0, key),
             "define every experiment under [[experiment]]",
         )
@@ -111,7 +110,7 @@ def _experiment(entry: dict[str, Any], at: _Place) -> tuple[Experiment, list[Rem
     for key in entry:
         if key not in kind.keys:
             elsewhere = [k.name for k in KINDS.values() if key in k.keys]
-            hint = f"; it belongs to {', '.join(elsewhere)}" if elsewhere else _nearest(key, kind.keys)
+            hint = f"; it belongs to {', '.join(elsewhere)}" if elsewhere else did_you_mean(key, kind.keys)
             raise InputError(f"unknown key {key!r}{hint}", at(key), f"known here: {', '.join(kind.keys)}")
     for key in ("name", "file", *kind.needs_keys):
         if key not in entry:
@@ -413,7 +412,7 @@ def _choice(entry: dict[str, Any], key: str, choices: tuple[str, ...], at: _Plac
         raise InputError(f"key {key!r} is missing", at(), f"choose one of {', '.join(choices)}")
     value = entry[key]
     if value not in choices:
-        hint = _nearest(value, choices) if isinstance(value, str) else ""
+        hint = did_you_mean(value, choices) if isinstance(value, str) else ""
         raise InputError(
             f"{key} = {value!r} is not known{hint}", at(key), f"choose one of {', '.join(choices)}"
         )
@@ -427,11 +426,6 @@ def _number(value: Any, key: str, at: _Place, low: float, high: float, above: bo
         range_ = f"above {low:g}, up to {high:g}" if above else f"from {low:g} to {high:g}"
         raise InputError(f"{key} = {value:g} is out of bounds", at(key), f"give a number {range_}")
     return float(value)
-
-
-def _nearest(name: str, names: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, names, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def _place(path: Path, text: str, number: int, key: str = "") -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 import re
@@ -15,7 +14,7 @@ import attrs
 import numpy as np
 
 from ..cells.own import own_lines, own_rows
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..reading import require_rows
 from .kinds import STEADY, Kind, markers, may_be_missing, named, quantity_of, units_of
 
@@ -181,11 +180,9 @@ def _header(
                 _at(path, None, name),
                 f"name it {wanted}, or end its name with {' or '.join(others)}, in which it is read as well",
             )
-        close = difflib.get_close_matches(name, kind.columns, n=1, cutoff=0.75)
-        if close:
-            raise InputError(
-                f"unknown column {name!r}; did you mean {close[0]!r}?", _at(path), f"known here: {known}"
-            )
+        hint = did_you_mean(name, kind.columns, 0.75)
+        if hint:
+            raise InputError(f"unknown column {name!r}{hint}", _at(path), f"known here: {known}")
         remarks.append(
             Remark(f"column {name!r} is not known and was not read", _at(path), f"known here: {known}")
         )

@@ -16,8 +16,7 @@ from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
 from ..design.quantity import Description
 from ..design.settings import USUAL_RESIN
-from ..design.toml_text import nearest
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import FIDELITY, HOMOGENISED, OF_CONTINUUM, RESOLVED, MeshSettings
 from ..reading import parse_toml
@@ -231,7 +230,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
     for key in document:
         if key not in _KEYS:
             raise InputError(
-                f"unknown key {key!r}{nearest(key, _KEYS)}",
+                f"unknown key {key!r}{did_you_mean(key, _KEYS)}",
                 f"{origin}, {_line(text, key)}, {key}",
                 f"known: {', '.join(_KEYS)}",
             )

@@ -13,8 +13,7 @@ from ..design import grading, wall_factors
 from ..design.grading import CellFactor
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
-from ..design.toml_text import nearest
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 SCALE = "scale"
 PATH, RESIN = "path", "resin"
@@ -218,7 +217,7 @@ def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
     known = parameters()
     name = table.get("parameter")
     if not isinstance(name, str) or name not in known:
-        hint = nearest(name, list(known)) if isinstance(name, str) else ""
+        hint = did_you_mean(name, list(known)) if isinstance(name, str) else ""
         raise InputError(
             f"parameter = {name!r} is not a parameter of a unit{hint}",
             f"{where}, parameter",
@@ -231,7 +230,9 @@ def _require_keys(table: Mapping[str, Any], known: Sequence[str], where: str) ->
     for key in table:
         if key not in known:
             raise InputError(
-                f"unknown key {key!r}{nearest(key, known)}", f"{where}, {key}", f"known: {', '.join(known)}"
+                f"unknown key {key!r}{did_you_mean(key, known)}",
+                f"{where}, {key}",
+                f"known: {', '.join(known)}",
             )
 
 

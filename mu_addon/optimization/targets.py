@@ -9,8 +9,7 @@ from typing import Any, Literal
 import attrs
 
 from ..design.body import Body
-from ..design.toml_text import nearest
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .quantities import (
     AirVolume,
     Angle,
@@ -168,7 +167,7 @@ def _of_printer(printable: Target, supplies: Supplies) -> Target:
 def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Target]:
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        hint = nearest(kind, list(KINDS)) if isinstance(kind, str) else ""
+        hint = did_you_mean(kind, list(KINDS)) if isinstance(kind, str) else ""
         raise InputError(
             f"kind = {kind!r} is not known{hint}", f"{where}, kind", f"one of: {', '.join(KINDS)}"
         )
@@ -176,7 +175,7 @@ def _targets(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[T
     for key in table:
         if key not in known:
             raise InputError(
-                f"unknown key {key!r} of {kind}{nearest(key, known)}", f"{where}, {key}",
+                f"unknown key {key!r} of {kind}{did_you_mean(key, known)}", f"{where}, {key}",
                 f"known: {', '.join(known)}",
             )  # fmt: skip
     if "points" in table:

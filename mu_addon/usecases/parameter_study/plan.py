@@ -13,8 +13,7 @@ import numpy as np
 
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.quantity import Description
-from ...design.toml_text import nearest
-from ...errors import InputError, MuError
+from ...errors import InputError, MuError, did_you_mean
 from ...fem.protocol import Protocol
 from ...meshing.settings import fidelity_where_none_is_named
 from ...reading import parse_toml
@@ -205,7 +204,9 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
     """The sweep of a document; files: where those lie that its variables name, its own folder without."""
     for key in document:
         if key not in (*_KEYS, RUN):
-            raise InputError(f"unknown key {key!r}{nearest(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}")
+            raise InputError(
+                f"unknown key {key!r}{did_you_mean(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}"
+            )
     if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
         raise InputError(f"format = {document.get('format', 'missing')}", where, f"write format = {FORMAT}")
     vary = document.get("vary")

@@ -13,8 +13,7 @@ import numpy as np
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import describe
-from ...design.toml_text import nearest
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ...fem.protocol import Protocol, read_protocol
 from ...meshing.settings import MeshSettings
 from ...placement.graph import Limits
@@ -81,7 +80,7 @@ def variable(name: str, given: Any, where: str) -> Variable:
     where = f"{where}, [vary] {name}"
     if name not in variable_names():
         raise InputError(
-            f"unknown input {name!r}{nearest(name, variable_names())}",
+            f"unknown input {name!r}{did_you_mean(name, variable_names())}",
             where,
             "name it as in unit.toml (chambers.wall_mm) or in study.toml (simulate.mesh.refine)",
         )

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ...design.toml_text import nearest
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ...evidence.effect import LIBRARY, Parameter
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
 from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED, TWO_VOLUMES
@@ -94,7 +93,7 @@ class NamedEffects:
         if name not in NAMES:
             why = " it is not an effect that a simulation of the unit can contain" if name in LIBRARY else ""
             raise InputError(
-                f"no effect {name!r} is known here{';' + why if why else nearest(name, NAMES)}",
+                f"no effect {name!r} is known here{';' + why if why else did_you_mean(name, NAMES)}",
                 self.where,
                 f"known: {', '.join(NAMES)}",
             )
