@@ -10,9 +10,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..cells.own import own_lines, own_rows, own_text
 from ..errors import InputError
 from ..reading import require_rows
+from ..table_cells.own import own_lines, own_rows, own_text
 
 Array = np.ndarray[Any, Any]
 

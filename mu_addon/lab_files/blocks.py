@@ -14,10 +14,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..cells.clock import clock, is_clock
-from ..cells.dialect import BRACKET, Row, split
-from ..cells.notation import judged, number, unit_behind, without_units
 from ..errors import InputError
+from ..table_cells.clock import clock, is_clock
+from ..table_cells.dialect import BRACKET, Row, split
+from ..table_cells.notation import judged, number, unit_behind, without_units
 from .columns import Column, column, is_unit, plain
 from .source import Sheet
 

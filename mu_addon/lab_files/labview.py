@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import attrs
 
-from ..cells.dialect import Row
-from ..cells.notation import number
+from ..table_cells.dialect import Row
+from ..table_cells.notation import number
 from .columns import column, is_unit
 
 _MAGIC, _TITLES = "LabVIEW Measurement", "X_Value"

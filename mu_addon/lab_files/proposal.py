@@ -11,9 +11,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..cells.notation import number
 from ..errors import InputError
 from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
+from ..table_cells.notation import number
 from .blocks import Block, Unread
 from .columns import READ_IN, Column, column, plain, unit_of
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import attrs
 
-from ..cells.dialect import Row, rows_of
-from ..cells.encoding import decoded
 from ..errors import InputError
 from ..reading import file_bytes, require_rows, unreadable
+from ..table_cells.dialect import Row, rows_of
+from ..table_cells.encoding import decoded
 from .columns import known_words
 from .labview import is_labview, rows_of_labview
 

@@ -12,10 +12,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..cells.own import own_text
 from ..errors import InputError, did_you_mean
 from ..reading import file_bytes, file_text, parse_toml
 from ..run.inputs import digest
+from ..table_cells.own import own_text
 from .experiment import Array, Experiment
 from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.cells.encoding import decoded
-from mu_addon.cells.notation import number
 from mu_addon.errors import InputError
 from mu_addon.lab_files.blocks import tables
 from mu_addon.lab_files.source import read_sheets, sheet_of_text
+from mu_addon.table_cells.encoding import decoded
+from mu_addon.table_cells.notation import number
 
 
 @pytest.mark.parametrize(

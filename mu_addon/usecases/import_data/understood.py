@@ -7,12 +7,12 @@ from pathlib import Path
 
 import attrs
 
-from ...cells.notation import DECIMALS
 from ...errors import InputError
 from ...lab_files.blocks import Block, tables
 from ...lab_files.proposal import NoExperiment, Proposal, Question, answers_for, propose
 from ...lab_files.source import Sheet, read_sheets
 from ...measured.kinds import ACCURACIES
+from ...table_cells.notation import DECIMALS
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"

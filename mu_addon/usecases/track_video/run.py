@@ -14,7 +14,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...cells.own import own_text
 from ...design.toml_text import line_of, parse, place
 from ...errors import InputError
 from ...files import write_text
@@ -25,6 +24,7 @@ from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
 from ...reading import file_text, unreadable
 from ...run.context import RunContext
+from ...table_cells.own import own_text
 from ...toml_writer import toml_text
 from .tracked_table import PROJECTS, SUFFIXES, read_pixels
 
