@@ -109,7 +109,7 @@ def parse_toml(text: str, origin: str, remedy: str = "correct that line") -> dic
     """Tables and values of TOML text; raises InputError, with the line if known."""
     _require_length(text, _LONGEST_TOML, origin or "TOML text", "check that it is the right file")
     if _DOTTED.search(text):
-        raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin or "TOML text", remedy)
+        raise InputError(f"tables are nested more than {_DEEPEST} deep", origin or "TOML text", remedy)
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -154,7 +154,7 @@ def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> N
     level, depth = [value], 0
     while level:
         if depth > _DEEPEST:
-            raise InputError(f"tables lie more than {_DEEPEST} deep in each other", origin, remedy)
+            raise InputError(f"tables are nested more than {_DEEPEST} deep", origin, remedy)
         inner: list[Any] = []
         for item in level:
             if isinstance(item, dict):
@@ -168,7 +168,7 @@ def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> N
 
 def _short(error: Exception) -> str:
     if isinstance(error, RecursionError):
-        return "brackets lie too deep in each other"
+        return "brackets are nested too deep"
     # Python's message is about one of its settings.
     if "integer string conversion" in str(error):
         return "it holds a whole number of thousands of digits"

@@ -6,7 +6,7 @@ from ..design.quantity import described
 from ..meshing.settings import REFINE as REFINEMENT
 
 REFINE = REFINEMENT._replace(default=0.5)
-GRAVITY = described("gravity", True, "whether the units' weight acts")
+GRAVITY = described("gravity", True, "apply the units' weight")
 TIP_MASS = described("tip_mass_g", 0.0, "mass at the middle of the tip", unit="g", low=0.0, high=1e5)
 TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=10_000)
 PRESSURE_STEP = described(

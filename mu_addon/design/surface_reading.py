@@ -74,7 +74,7 @@ def require_mesh(content: bytes, name: str) -> None:
     suffix = PurePath(name).suffix.lower()
     named = [row for row in _OTHERS if suffix in row[1]]
     for _, _, what, remedy in named or [row for row in _OTHERS if row[0] and content.startswith(row[0])]:
-        raise InputError(f"the file is {what}, no STL, OBJ or PLY", name, remedy)
+        raise InputError(f"the file is {what}, not an STL, OBJ or PLY file", name, remedy)
 
 
 def _kind(content: bytes) -> str:
@@ -118,7 +118,7 @@ def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangl
 
 def _text_stl(text: str, name: str) -> tuple[Vertices, Triangles]:
     if not text.lstrip().startswith("solid"):
-        raise _malformed(name, "no STL begins so, or has that length")
+        raise _malformed(name, "its beginning or length is not that of an STL file")
     try:
         words = (float(word) for corner in _CORNER.finditer(text) for word in corner.groups())
         corners = np.fromiter(words, float).reshape(-1, 3)

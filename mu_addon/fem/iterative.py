@@ -115,7 +115,9 @@ class TwoLevel:
         tolerance: float = 1e-8,
     ) -> None:
         if mesh.order != 2:
-            raise InputError("two levels need quadratic elements", "a mesh of order 1", "factorise instead")
+            raise InputError(
+                "the iterative solver needs quadratic elements", "a mesh of order 1", "factorise instead"
+            )
         self.size = len(indptr) - 1
         self.tolerance = tolerance
         self.iterations = 0

@@ -107,7 +107,7 @@ def _sealed(entry: Path) -> dict[str, object]:
         return {}
     sealed = parse_json(content, _SEAL)
     if not isinstance(sealed, dict):
-        raise InputError("these are no digests", _SEAL, "remove the folder that it lies in")
+        raise InputError("these are not digests", _SEAL, "remove the folder that it lies in")
     return sealed
 
 

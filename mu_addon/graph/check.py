@@ -62,7 +62,7 @@ def _of_settings(name: str, node: Node, definition: Definition) -> Iterator[Faul
         except InputError as error:
             yield Fault(name, error.what, error.remedy, key)
     if node.muted and definition.muting == "":
-        yield Fault(name, f"a node {node.kind!r} cannot be muted", "unmute it: what follows needs it")
+        yield Fault(name, f"a node {node.kind!r} cannot be muted", "unmute it: the nodes after it need it")
 
 
 def _of_links(

@@ -117,5 +117,5 @@ def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> N
         raise InputError(
             "self-contact needs walls and struts as they are printed",
             "--self-contact",
-            "give --fidelity resolved, too, or leave it out",
+            "also give --fidelity resolved, or leave it out",
         )

@@ -334,10 +334,10 @@ def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fix
     """Quantities that need a homogenised lattice, in words, or ""."""
     for target in targets:
         if target.kind in OF_SENSOR:
-            return f"{target.kind} is of a sensor, which a printed body has meshed into it"
+            return f"{target.kind} needs a sensor, which a printed body would have in its mesh"
     for name in (*(f.name for f in freedoms), *fixed):
         if name in OF_CONTINUUM:
-            return f"{name} is of a homogenised lattice: printed struts have the resin's"
+            return f"{name} belongs to a homogenised lattice: printed struts have the resin's"
     return ""
 
 
@@ -358,7 +358,7 @@ def _require_homogenised(
     for freedom in freedoms:
         if freedom.name in UNSEEN:
             raise InputError(
-                f"the homogenised lattice does not see {freedom.name}: its modulus is a parameter{because}",
+                f"{freedom.name} has no effect on a homogenised lattice: its modulus is a parameter{because}",
                 places.get(freedom.name, freedom.name),
                 remedy,
             )
@@ -372,7 +372,7 @@ def _require_homogenised(
 def _unit(document: Mapping[str, Any], origin: str, folder: Path) -> Unit:
     if ("preset" in document) == ("unit" in document):
         raise InputError(
-            "no unit is given, or two", origin, 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
+            "no unit is given, or two are", origin, 'write preset = "mu-1.0x" or unit = "my-unit.toml"'
         )
     if "preset" in document:
         return load_preset(_word(document, "preset", "", origin))

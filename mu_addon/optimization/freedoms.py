@@ -301,7 +301,7 @@ def _of_factor(listed: FactorList, table: Mapping[str, Any], where: str) -> Free
         place = listed.canonical(place if ";" not in place else "?")
     except InputError as error:
         raise InputError(
-            f"{listed.key} = {given!r} is no {what}",
+            f"{listed.key} = {given!r} does not give {what}",
             f"{where}, {listed.key}",
             f'write {listed.key} = "{example}"',
         ) from error

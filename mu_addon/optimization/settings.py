@@ -34,7 +34,7 @@ CHECK_REFINE = described(
 ORIENTATION = described(
     "orientation_deg",
     0.0,
-    "orientation of the unit that bears its weight, degrees about x; 0: hanging, tip down; 90: level",
+    "orientation of the unit under its weight, degrees about x; 0: hanging, tip down; 90: level",
     low=-360.0,
     high=360.0,
 )

@@ -248,7 +248,7 @@ def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Tar
         )
     if "pressure_kPa" not in KINDS[table["kind"]][0]:
         raise InputError(f"{table['kind']} has no curve", f"{where}, points", "give a value")
-    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points say it already")
+    _refuse(table, ("value", "low", "high", "objective", "pressure_kPa"), where, "points give it already")
     rest = {key: v for key, v in table.items() if key not in ("points", "name")}
     return [
         target
@@ -304,7 +304,7 @@ def _quantity(
         direction = table.get("direction", "y")
         if direction not in ("y", "z"):
             raise InputError(
-                f"direction = {direction!r} is none in which the tip moves", f"{where}, direction",
+                f"the tip does not move in direction = {direction!r}", f"{where}, direction",
                 'write "y", toward which it bends, or "z", along the axis',
             )  # fmt: skip
         return TipPosition(name, pressure, str(direction))
@@ -333,7 +333,7 @@ def _tip_force(name: str, pressure: float, table: Mapping[str, Any], where: str)
 def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str) -> None:
     for key in keys:
         if key in table:
-            raise InputError(f"{why}: {key} has no place there", f"{where}, {key}", "leave it out")
+            raise InputError(f"{why}: {key} does not apply there", f"{where}, {key}", "leave it out")
 
 
 def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:

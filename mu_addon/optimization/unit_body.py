@@ -147,7 +147,7 @@ class UnitBody:
                 ends[side] = value + sign * step
         if ends[0] == ends[1]:
             raise InputError(
-                f"{freedom.name} = {value:g} can be moved to neither side", freedom.name, "fix it"
+                f"{freedom.name} = {value:g} cannot be varied in either direction", freedom.name, "fix it"
             )
         plus, minus = map(self.moved, units)
         return plus, minus, ends[0] - ends[1]

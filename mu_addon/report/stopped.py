@@ -36,7 +36,7 @@ def write_stopped_report(folder: Path, why: str) -> None:
     ]
     words = [
         f"This run is partial: {why}. The results below are from before the stop, and are not final.",
-        "The same command, or `run.py resume` with this folder, takes up what is finished.",
+        "The same command, or `run.py resume` with this folder, continues from what is finished.",
     ]
     whole = page(f"Stopped run: {folder.resolve().name}", "", note(words), "", sections)
     write_text(folder / REPORT, f"{whole}{STOPPED}\n")

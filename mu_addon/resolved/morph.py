@@ -56,7 +56,7 @@ class PrintedMorph:
         wall = mirror(wall, "x") if self._full else wall
         self._count = count = len(wall.nodes)
         if len(mesh.nodes) <= count or not np.array_equal(mesh.nodes[:count], wall.nodes):
-            raise unmovable("it is no printed unit's, or has other settings")
+            raise unmovable("it is not of a printed unit, or has other settings")
         turns = np.unique(mesh.beams[:, 1::2])
         # Rotation vectors of beams are the last nodes, and follow the others.
         self._struts = mesh.nodes[count : len(mesh.nodes) - len(turns)]

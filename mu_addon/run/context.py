@@ -103,7 +103,7 @@ class RunContext:
             self.progress.warning(
                 "the last run in this folder was interrupted: it was killed, or the computer stopped",
                 str(folder),
-                "nothing: this run takes up what that one finished; log.ndjson says how far it came",
+                "nothing: this run continues from its finished stages; log.ndjson shows how far it came",
             )
 
     def unlock(self) -> None:

@@ -47,7 +47,7 @@ def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]
     found = document.pop("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(
-            f"{path.name} is of format {found!r}, and this version knows {FORMAT}",
+            f"{path.name} is of format {found!r}, and this version reads {FORMAT}",
             str(path),
             "use the newer version that wrote it",
         )
@@ -115,12 +115,12 @@ def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:
         raise InputError(
             f"{path.name} does not say where the {what} lies",
             f"{path}, [{RUN}] {key}",
-            "start the run by its own command, with this folder as --out: what is finished is kept",
+            "start the run by its own command, with this folder as --out: finished stages are kept",
         )
     found = Path(named)
     if not found.exists():
         raise InputError(
-            f"the {what} is not where it was", named, f"put it back, or correct {path}, [{RUN}] {key}"
+            f"the {what} is not where it was", named, f"restore it, or correct {path}, [{RUN}] {key}"
         )
     return found
 
@@ -129,7 +129,7 @@ def require_digest(path: Path, content: bytes, sha256: Any, what: str) -> None:
     """Raise InputError if a file is not the one that a run was made with."""
     if digest(content) != sha256:
         raise InputError(
-            f"the {what} is not the one that the run was made with",
+            f"the {what} has changed since the run was made",
             str(path),
-            "put that one back, or check this one in a folder of its own",
+            "restore it, or use a separate folder for this one",
         )

@@ -34,7 +34,7 @@ def interpreter(blender: str = "") -> list[str]:
     raise InputError(
         "there is no Python to run the job with",
         str(python),
-        "use Blender as its makers ship it, or run headless/run.py from a terminal",
+        "use an official build of Blender, or run headless/run.py from a terminal",
     )
 
 

@@ -149,7 +149,7 @@ def require_memory() -> None:
         if limit != resource.RLIM_INFINITY and limit < least * 1_000_000:
             option = {"RLIMIT_DATA": "-d", "RLIMIT_AS": "-v"}[name]
             raise MuError(
-                f"out of memory: this process may take up {limit / 1e6:.0f} MB",
+                f"out of memory: this process may use up to {limit / 1e6:.0f} MB",
                 f"the system's limit {name}",
                 f"allow {least} MB or more: `ulimit {option} {least * 1000}`, or memory_MB of a sweep",
             )

@@ -100,7 +100,7 @@ def why_unread(line: str) -> str:
         found, rest = _pairs_until(line)
         if found:
             return "a number in it is too large"
-        return f"{rest[:40]!r} is no `label:value`" if found is None else "no value in it is a number"
+        return f"{rest[:40]!r} is not a `label:value` pair" if found is None else "no value in it is a number"
     cell = next((cell for cell in _cells(line) if not _VALUE.match(cell)), "")
     return f"{cell[:40]!r} is not a number, and has no label before it" if cell else "a number is too large"
 
@@ -122,10 +122,10 @@ def json_of(line: str) -> Pairs | None:
 
 
 def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object of JSON; ValueError where a name comes twice, as where two lines ran into one."""
+    """An object of JSON; ValueError where a name occurs twice, as where two lines ran into one."""
     value = dict(pairs)
     if len(value) < len(pairs):
-        raise ValueError("a name comes twice")
+        raise ValueError("a name occurs twice")
     return value
 
 

@@ -141,7 +141,9 @@ class Recorder:
             raise output_error(error, path) from error
         self._rejects_left -= len(data)
         if self._rejects_left <= 0:
-            self.event("rejects_full", time_s, detail=f"{REJECTS} grows no more; bytes are still counted")
+            self.event(
+                "rejects_full", time_s, detail=f"{REJECTS} is no longer written; bytes are still counted"
+            )
 
     def tick(self, time_s: float, counters: Mapping[str, int]) -> None:
         """Once a second, write file position and counters to the index, and everything to the disk.

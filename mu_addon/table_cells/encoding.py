@@ -51,7 +51,7 @@ def decoded(data: bytes, where: str, known: Callable[[str], int] = lambda text: 
             return _of(data, encoding, where)
     for begin, what, remedy in _BINARY:
         if data.startswith(begin):
-            raise InputError(f"the file is {what}, no table", where, remedy)
+            raise InputError(f"the file is {what}, not a table", where, remedy)
     head = data[:2000]
     if b"\0" in head:
         # UTF-16 without a mark has a zero in every other byte of its ASCII letters.

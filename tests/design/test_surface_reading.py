@@ -110,7 +110,7 @@ def test_every_dialect_brings_the_same_column(name):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a point that the file does not have"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "a point that the file does not have"),
         ("a.stl", stl(CORNERS)[:-60], "corner"),
-        ("a.stl", "triangles of mine", "no STL"),
+        ("a.stl", "triangles of mine", "not that of an STL file"),
         ("a.ply", ply().decode()[:-20], "truncated or malformed"),
         ("a.ply", ply().decode().replace("element face", "element edge 2\nelement face"), "no properties"),
         (

@@ -165,7 +165,7 @@ def test_the_printed_body_is_searched_unless_it_cannot_answer():
         assert found.settings.fidelity == "homogenised"
         assert why in found.why_homogenised
         assert not read(design(HEAD + HOMOGENISED + text)).why_homogenised
-    with pytest.raises(InputError, match="does not see") as error:
+    with pytest.raises(InputError, match="has no effect on") as error:
         design(HEAD + ANGLE + J_OF_ALPHA1 + THICK)
     assert "sensor" in error.value.what
 
@@ -260,7 +260,7 @@ def test_what_follows_a_freedom_changes_with_it():
             + HOMOGENISED
             + ANGLE
             + '[[freedom]]\nparameter = "lattice.midspan_diameter_mm"\nlow = 1.6\nhigh = 2.4\n',
-            "does not see",
+            "has no effect on",
             "line 8",
         ),
         (
@@ -277,8 +277,8 @@ def test_what_follows_a_freedom_changes_with_it():
         (HEAD + ANGLE.replace("angle", "tip_force").replace("30", "-5") + WALL, "toward which", "line 5"),
         (HEAD + FORCE.replace("gap_mm = 2", "gap_mm = 999") + WALL, "gap_mm = 999 is out", "line 6"),
         (HEAD + FORCE.replace("gap_mm = 2", 'direction = "y"') + WALL, "unknown key 'direction'", "line 6"),
-        (HEAD + ASIDE + WALL, "none in which", "line 7"),
-        (HEAD + ANGLE + CELL, "no column, row and chamber", "line 9"),
+        (HEAD + ASIDE + WALL, "does not move", "line 7"),
+        (HEAD + ANGLE + CELL, "does not give column, row and chamber", "line 9"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 2 *"').replace("1.3", "3"), "not a range of", "line 10"),
         (HEAD + ANGLE + CELL.replace('"0 2"', '"0 9 *"'), "0 9 *", "line 9"),
         (HEAD + "robust = 1\n" + ANGLE + WALL, "neither true nor false", "line 3"),

@@ -107,5 +107,5 @@ def test_what_cannot_be_moved_is_refused(morph):
     ):
         with pytest.raises(MeshingError, match="cannot be moved"):
             morph.to(other)
-    with pytest.raises(MeshingError, match="no printed unit's"):
+    with pytest.raises(MeshingError, match="not of a printed unit"):
         PrintedMorph(morph.mesh, unit(chambers__wall_mm=1.0), SETTINGS)

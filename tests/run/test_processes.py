@@ -88,7 +88,7 @@ except MuError as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "this process may take up 90 MB" in done.stdout, done.stderr
+    assert "this process may use up to 90 MB" in done.stdout, done.stderr
     assert f"ulimit {option} " in done.stdout
 
 

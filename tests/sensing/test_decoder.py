@@ -297,7 +297,7 @@ def test_a_line_in_no_known_format_is_complained_about_once():
     ("line", "why"),
     [
         ("Sensor ready", "it holds no number"),
-        ("light:5a2,dark:1", "'light:5a2,dark:1' is no `label:value`"),
+        ("light:5a2,dark:1", "'light:5a2,dark:1' is not a `label:value` pair"),
         ("light 512 of 1023", "'light' is not a number"),
         ('{"light": 512', "not a whole JSON object"),
     ],

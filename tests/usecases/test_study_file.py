@@ -100,7 +100,7 @@ GOOD = compose(JOB.tables())
         ("a = " + "[" * 50_000, "not TOML"),
         ("# x\n" * 100_000, "100000 characters"),
         ("format = 3\n[design]\n", "format 3"),
-        ("format = 1\n[design]\n", "format 1, and this version knows 2"),
+        ("format = 1\n[design]\n", "format 1, and this version reads 2"),
         ("format = true\n[design]\n", "format True"),
         ("format = 2\n", "are not those of a study"),
         ("format = 2\n[simulate]\n", "are not those of a study"),

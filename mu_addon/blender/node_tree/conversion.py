@@ -35,7 +35,7 @@ class _Flat:
     def __attrs_post_init__(self) -> None:
         if self.depth > DEEPEST:
             raise InputError(
-                f"groups lie more than {DEEPEST} deep in each other", self.tree.name, "ungroup one of them"
+                f"groups are nested more than {DEEPEST} deep", self.tree.name, "ungroup one of them"
             )
         for link in self.tree.links:
             if not link.is_muted:

@@ -126,7 +126,7 @@ class Job:
             bool(self.self_friction) and not self.self_contact,
             "friction between walls and struts needs self-contact",
             "--self-friction",
-            "give --self-contact, too, or leave it out",
+            "also give --self-contact, or leave it out",
         )
         friction = graph and bool(self.self_friction)
         yield friction, f"{without} friction", "--self-friction, --paths graph", one

@@ -252,7 +252,7 @@ def test_a_group_in_itself_is_told():
     if again.node_tree is None:
         return
     found = state.refresh(tree)
-    assert any(s.error is not None and "deep in each other" in s.error.what for s in found.values())
+    assert any(s.error is not None and "nested more than" in s.error.what for s in found.values())
 
 
 def test_saved_and_opened_again_a_tree_is_the_same_driven_and_all(tmp_path):
