@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-_MIDWAY = 0.25
-
 
 def following(mesh: Mesh, u: Array) -> Array:
     """Displacements u (n, 3) in mm with tied and carried nodes set to follow their masters, in place."""
@@ -29,8 +27,8 @@ class Carried:
 
     A node at X moves by the mean, weighted by its two shares, of what the sections at two beam nodes would
     do to it: u + (R - 1) a, with displacement u and rotation R of the beam node at X_b, and a = X - X_b for a
-    node of one section. Midway between two, a is shorter by a quarter of the way from X_b to the other
-    section: the axis is then the parabola with the sections as its normals, and their shear is the beam's.
+    node of one section. Between two, a is shorter by half the other's share of the way to it (midway by a
+    quarter): the axis is then the parabola with the sections as its normals, and their shear is the beam's.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -45,7 +43,7 @@ class Carried:
         self._share = shares[own, side]
         # Shares of three places in each arm: the carried node's, the section's and the other section's.
         self._other = node[own, 1 - side]
-        self._less = np.where(self._share < 1.0, _MIDWAY, 0.0)[:, None]
+        self._less = (0.5 * (1.0 - self._share))[:, None]
         x = mesh.nodes
         self._arm = x[mesh.carried[own]] - (1.0 - self._less) * x[self._node] - self._less * x[self._other]
 

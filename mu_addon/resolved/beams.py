@@ -40,9 +40,9 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
     gone[np.unique(mesh.beam_of[solid & (mesh.beam_of >= 0)])] = True
     if not gone.any():
         return mesh
-    # A joint's beams all begin at it, or all end at it; between layers one begins where one ends.
-    begins, stops = (np.bincount(mesh.beams[:, k], minlength=len(mesh.nodes)) > 0 for k in (0, 2))
-    joint = begins != stops
+    # Between layers one beam begins where another ends.
+    begins, stops = (np.bincount(mesh.beams[:, k], minlength=len(mesh.nodes)) for k in (0, 2))
+    joint = (begins != 1) | (stops != 1)
     for end in (0, 2):
         at = np.unique(mesh.beams[gone, end])
         at = at[joint[at]]
@@ -50,18 +50,24 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
     number = np.where(gone, -1, np.cumsum(~gone) - 1)
     beam_of = np.append(number, -1)[mesh.beam_of]
     beams = mesh.beams[~gone]
-    inside = np.zeros(len(mesh.nodes), bool)
+    inside, ends = np.zeros((2, len(mesh.nodes)), bool)
     inside[mesh.tets[beam_of >= 0]] = True
-    inside[beams] = False
-    keep = inside[mesh.carried]
+    inside[beams], ends[beams] = False, True
+    # What two sections carried is carried by one where the other has gone.
+    left = ends[mesh.carriers[:, 0::2]] & (np.column_stack([mesh.shares, 1.0 - mesh.shares]) > 0.0)
+    keep = inside[mesh.carried] & left.any(axis=1)
+    alone = left[:, 0] != left[:, 1]
+    first, second = mesh.carriers[:, :2], mesh.carriers[:, 2:]
+    carriers, shares = mesh.carriers.copy(), np.where(alone, 1.0, mesh.shares)
+    carriers[alone] = np.tile(np.where(left[:, :1], first, second)[alone], 2)
     return attrs.evolve(
         mesh,
         beams=beams,
         flexible=mesh.flexible[~gone],
         beam_of=beam_of,
         carried=mesh.carried[keep],
-        carriers=mesh.carriers[keep],
-        shares=mesh.shares[keep],
+        carriers=carriers[keep],
+        shares=shares[keep],
     )
 
 
@@ -120,25 +126,12 @@ class Layers:
     def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
         """Mask (struts, layers) of the layers that can be a beam."""
         shape = len(self.lattice.struts), self.count
-        tied = np.zeros(len(mesh.nodes), bool)
-        tied[mesh.tied] = True
-        nodes = mesh.tets[self.elements]
-        bad = (mesh.filled[self.elements] < _WHOLE).any(axis=1) | tied[nodes].any(axis=1)
-        bad |= (clear[nodes] < reach_mm).any(axis=1)
         there = np.zeros(shape, int)
         np.add.at(there, (self.strut, self.layer), 1)
         spoilt = np.zeros(shape, int)
-        np.add.at(spoilt, (self.strut, self.layer), bad)
+        np.add.at(spoilt, (self.strut, self.layer), ~unspoilt(mesh, self.elements, clear, reach_mm))
         found = (there == there.max()) & (spoilt == 0)
-        # A joint is one of beams if all struts that are there are beams at it.
-        ends = self.ends
-        present = (there > 0).any(axis=1)
-        free = np.ones(len(self.lattice.nodes), bool)
-        for end, layer in ((0, 0), (1, self.count - 1)):
-            free[ends[present & ~found[:, layer], end]] = False
-        for end, layer in ((0, 0), (1, self.count - 1)):
-            found[~free[ends[:, end]], layer] = False
-        return np.asarray(found)
+        return free_joints(found, (there > 0).any(axis=1), self.ends, len(self.lattice.nodes))
 
     def replaced(self, mesh: Mesh, whole: Array, zones: Zones) -> Mesh:
         """The mesh with beams in place of the whole layers (struts, layers)."""
@@ -195,28 +188,61 @@ class Layers:
 
         lattice: this one, or one of as many struts with other radii.
         """
-        ends = self.ends[strut]
-        way = lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]
-        length = np.linalg.norm(way, axis=1)
-        start, stop = layer / self.count * length, (layer + 1) / self.count * length
-        middle = (start + stop) / 2
-        meeting = np.bincount(lattice.struts.ravel(), minlength=len(lattice.nodes))
-        junction = 2 * lattice.node_radii[ends]
-        flipped = lattice.struts[strut, 0] != ends[:, 0]
-        found = np.empty((len(strut), 6))
-        stretch, bend = zones.lengths(junction, meeting[ends])
-        for zone, columns in ((stretch, (0,)), (bend, (1, 2, 3, 4, 5))):
-            low = np.where(layer == 0, np.maximum(start, zone[:, 0]), start)
-            high = np.where(layer == self.count - 1, np.minimum(stop, length - zone[:, 1]), stop)
-            s, weight = _stations(low, high)
-            t = s / length[:, None]
-            radius = lattice.radii(np.where(flipped[:, None], 1 - t, t), strut)
-            area, inertia = np.pi * radius**2, np.pi * radius**4 / 4
-            off = s - middle[:, None]
-            integrands = (1 / area, 0.5 / inertia, 1 / inertia, off / inertia, off**2 / inertia, 1 / area)
-            for column in columns:
-                found[:, column] = (weight * integrands[column]).sum(axis=1)
-        return found
+        return integrals(lattice, strut, self.ends[strut], layer, self.count, zones)
+
+
+def unspoilt(mesh: Mesh, elements: Array, clear: Array, reach_mm: float) -> Array:
+    """Mask (k,) of elements (k,) that are whole, without tied nodes, and no nearer than reach_mm to walls.
+
+    clear (n,): distance of the nodes in mm from the parts that struts stand on.
+    """
+    tied = np.zeros(len(mesh.nodes), bool)
+    tied[mesh.tied] = True
+    nodes = mesh.tets[elements]
+    bad = (mesh.filled[elements] < _WHOLE).any(axis=1) | tied[nodes].any(axis=1)
+    return np.asarray(~(bad | (clear[nodes] < reach_mm).any(axis=1)))
+
+
+def free_joints(whole: Array, present: Array, ends: Array, count: int) -> Array:
+    """Layers (s, l) of those that are whole without the ones at joints that something solid reaches.
+
+    present (s,): struts that are there at all; ends (s, 2): joints of each, of `count`. A joint is one of
+    beams if all struts that are there are beams at it.
+    """
+    found, free = whole.copy(), np.ones(count, bool)
+    for end, layer in ((0, 0), (1, -1)):
+        free[ends[present & ~found[:, layer], end]] = False
+    for end, layer in ((0, 0), (1, -1)):
+        found[~free[ends[:, end]], layer] = False
+    return found
+
+
+def integrals(lattice: Lattice, strut: Array, ends: Array, layer: Array, count: int, zones: Zones) -> Array:
+    """Integrals (e, 6) over the sections of some layers, see `fem.beams.sections_of`.
+
+    strut, layer (e,): of each, of `count` layers that run from the first of two ends (e, 2) to the second.
+    """
+    way = lattice.nodes[ends[:, 1]] - lattice.nodes[ends[:, 0]]
+    length = np.linalg.norm(way, axis=1)
+    start, stop = layer / count * length, (layer + 1) / count * length
+    middle = (start + stop) / 2
+    meeting = np.bincount(lattice.struts.ravel(), minlength=len(lattice.nodes))
+    junction = 2 * lattice.node_radii[ends]
+    flipped = lattice.struts[strut, 0] != ends[:, 0]
+    found = np.empty((len(strut), 6))
+    stretch, bend = zones.lengths(junction, meeting[ends])
+    for zone, columns in ((stretch, (0,)), (bend, (1, 2, 3, 4, 5))):
+        low = np.where(layer == 0, np.maximum(start, zone[:, 0]), start)
+        high = np.where(layer == count - 1, np.minimum(stop, length - zone[:, 1]), stop)
+        s, weight = _stations(low, high)
+        t = s / length[:, None]
+        radius = lattice.radii(np.where(flipped[:, None], 1 - t, t), strut)
+        area, inertia = np.pi * radius**2, np.pi * radius**4 / 4
+        off = s - middle[:, None]
+        integrands = (1 / area, 0.5 / inertia, 1 / inertia, off / inertia, off**2 / inertia, 1 / area)
+        for column in columns:
+            found[:, column] = (weight * integrands[column]).sum(axis=1)
+    return found
 
 
 def _stations(low: Array, high: Array) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from ..fem.model import Model
 from ..fem.stress import PeakStretch, exceeded
 from ..homogenize.elasticity import Elasticity, strained
 from ..meshing.mesh import LATTICE, Array, Mesh
-from .strut import radius_of, strut_mesh
+from .strut import is_half_diagonal, radius_of, strut_mesh
 
 POISSON = 0.45
 # Of the solid octant: its moduli are then within 1 % of a mesh by pytetwild (docs/engineering/method.md).
@@ -59,10 +59,10 @@ class Zones:
 
 def zones_of(d: Dimensions) -> Zones:
     """The zones of a lattice of half diagonals, by its solid cell without grading; kept for the process."""
-    return _zones(*_shape(d))
+    return _zones(*shape_of(d))
 
 
-def _shape(d: Dimensions) -> tuple[LatticeKind, float, float]:
+def shape_of(d: Dimensions) -> tuple[LatticeKind, float, float]:
     """Kind and diameters in cells: a unit's scale changes nothing."""
     return d.kind, round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
 
@@ -102,7 +102,7 @@ def concentration_factors(d: Dimensions) -> ConcentrationFactors:
     Of an equal strain along all axes, which stretches struts, and of opposite ones along two, which bends
     them.
     """
-    return _concentration_factors(*_shape(d))
+    return _concentration_factors(*shape_of(d))
 
 
 @lru_cache(maxsize=8)
@@ -181,14 +181,14 @@ def _octant(strut: _Strut) -> tuple[Mesh, Elasticity, Array]:
 def joint_stretch(model: Model, materials: Materials, d: Dimensions, u: Array) -> PeakStretch | None:
     """The largest stretch in a joint under displacements u (n, 3) in mm; None where no beam ends in a joint.
 
-    d: dimensions of the lattice's box. Of each strut's end, of small strain: 1 + Ka N/(E A) + Kb M r/(E I)
-    with its `concentration_factors`, where the strut leaves the joint's rigid zone. exceeded: by 1 % of the
-    ends.
+    None, too, for another kind than half diagonals. d: dimensions of the lattice's box. Of each strut's end,
+    of small strain: 1 + Ka N/(E A) + Kb M r/(E I) with its `concentration_factors`, where the strut leaves
+    the joint's rigid zone. exceeded: by 1 % of the ends.
     """
     from scipy.spatial import cKDTree
 
     mesh, beams = model.mesh, model.beams_of(materials)
-    if beams is None:
+    if beams is None or not is_half_diagonal(d):
         return None
     lattice, factors = lattice_of(d), concentration_factors(d)
     ends = mesh.beams[:, 0::2]

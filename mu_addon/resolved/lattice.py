@@ -34,7 +34,7 @@ _STEPS = 6
 # Elements filled by less are left out.
 _LEAST = 1e-3
 # Least share of a quadrature point of an element of which anything is filled.
-_FLOOR = 0.01
+FLOOR = 0.01
 # A node of which less than this is filled has next to no stiffness: it is tied.
 LEAST_SUPPORT = 0.02
 
@@ -147,10 +147,10 @@ def filled_outside(mesh: Mesh, kept: list[Depth], drop: bool = True) -> Mesh:
         filled[mixed, point] = (volume[:, rows] * outside[:, rows]).sum(axis=1) / volume[:, rows].sum(axis=1)
     # Points without volume leave an element motions without stiffness.
     some = (filled > 0).any(axis=1)
-    filled[some] = np.maximum(filled[some], _FLOOR)
+    filled[some] = np.maximum(filled[some], FLOOR)
     if not drop:
         return attrs.evolve(mesh, filled=filled)
-    return _with_elements(attrs.evolve(mesh, filled=filled), filled.mean(axis=1) > max(_LEAST, 1.01 * _FLOOR))
+    return _with_elements(attrs.evolve(mesh, filled=filled), filled.mean(axis=1) > max(_LEAST, 1.01 * FLOOR))
 
 
 def _with_elements(mesh: Mesh, keep: Array) -> Mesh:

@@ -64,7 +64,8 @@ class PrintedMorph:
         self._graph = graph_of(covered)
         self._lattice = with_struts(self._graph, covered)
         self._swept = SweptNodes(self._lattice, self._struts) if is_half_diagonal(a) else None
-        self._layers = Layers(mesh, self._lattice, beam_layers(sizes)) if len(turns) else None
+        swept = self._swept is not None and len(turns) > 0
+        self._layers = Layers(mesh, self._lattice, beam_layers(sizes)) if swept else None
         self._beams = None if self._layers is None else self._layers.of_beams(mesh)
         self._footholds = Footholds.of(wall, mesh.nodes[mesh.tied])
         self._cut, self._outside = self._cut_elements(a)
@@ -116,10 +117,9 @@ class PrintedMorph:
         mesh, other = self.mesh, with_struts(self._graph, covering(d, self._body))
         struts = self._struts_of(d, other)
         nodes = np.vstack([wall, struts])
-        if self._layers is None or self._beams is None:
-            return nodes, mesh.flexible
-        nodes = np.vstack([nodes, rotation_nodes(mesh.beams, nodes)[1]])
-        if struts is self._struts:
+        if len(mesh.beams):
+            nodes = np.vstack([nodes, rotation_nodes(mesh.beams, nodes)[1]])
+        if self._layers is None or self._beams is None or struts is self._struts:
             return nodes, mesh.flexible
         return nodes, self._layers.flexible(other, *self._beams, zones_of(d))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
+from ..design.lattice import lattice_of
 from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.embedding import embed
@@ -21,6 +22,8 @@ from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, SOLID, MeshSettings
 from ..meshing.wall_grid import WallGrid
 from .beams import REACH, with_beams
+from .frame import frame_zones
+from .graph_beams import with_graph_beams
 from .lattice import LEAST_SUPPORT, clearance, struts, support, without_loose_parts
 from .strut import is_half_diagonal
 
@@ -93,9 +96,9 @@ def mesh_printed(
     """The printed unit as quadratic tetrahedra: wall and caps, and struts whose nodes in the wall follow it.
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
-    the wall. Struts that are half diagonals are beams where they are whole (`with_beams`), unless the
-    settings ask for the fidelity "solid" or the wall's law has memory. The base is clamped, the inlet is
-    left out.
+    the wall. Struts are beams where they are whole (`with_beams`; of other kinds than half diagonals
+    `with_graph_beams`), unless the settings ask for the fidelity "solid" or the wall's law has memory. The
+    base is clamped, the inlet is left out.
 
     settings: of it fidelity, fraction ("half" or "full") and `refine` count. cache: folder for the octants
     of lattices other than body-centred. body: a closed surface
@@ -113,7 +116,7 @@ def mesh_printed(
     d = unit.printed
     own = covering(d, body)
     # The wall's law is that of struts, too, and beams have no memory.
-    beams = s.fidelity != SOLID and is_half_diagonal(d) and not unit.wall.has_memory
+    beams = s.fidelity != SOLID and not unit.wall.has_memory
     sizes = (sizes or Sizes()).refined(s.refine)
     if beams:
         sizes = attrs.evolve(sizes, layers=beam_layers(sizes))
@@ -134,9 +137,12 @@ def mesh_printed(
     check_positive(mesh)
     if beams:
         reach = REACH * d.junction_diameter
-        mesh = with_beams(
-            mesh, own, sizes.layers, np.concatenate([np.full(len(wall.nodes), np.inf), clear]), reach
-        )
+        clear = np.concatenate([np.full(len(wall.nodes), np.inf), clear])
+        if is_half_diagonal(d):
+            mesh = with_beams(mesh, own, sizes.layers, clear, reach)
+        else:
+            zones = frame_zones(own, cache)
+            mesh = with_graph_beams(mesh, lattice_of(own), sizes.layers, clear, reach, zones)
     report("mesh", 1.0)
     return mesh
 

@@ -13,6 +13,7 @@ from scipy import sparse
 from ..design.anchors import Window
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
+from ..design.lattice import lattice_of
 from ..design.parameters import Unit
 from ..design.waveguide import Bar, waveguide
 from ..errors import InputError
@@ -21,6 +22,7 @@ from ..meshing.mesh import LATTICE, Array, Mesh, part
 from ..meshing.quality import check_positive
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
 from .beams import REACH, without_beams
+from .graph_beams import graph_layers_of
 from .lattice import LEAST_SUPPORT, Depth, clearance, cuts, filled_outside, support
 from .octants import in_replaced, is_thickening, thickened_nodes
 from .strut import is_half_diagonal
@@ -67,6 +69,11 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     found, wall_ties = _thickened(mesh, bar, d, body)
     struts = found.region == LATTICE
     outside: list[Depth] = [partial(outside_bar, bar), *(partial(outside_seat, seat) for seat in bar.seats)]
+    graph, drawn = None, mesh.filled
+    if len(mesh.beams) and not is_half_diagonal(d):
+        graph = graph_layers_of(mesh, lattice_of(d))
+        drawn = graph.uncut(mesh)
+        found = attrs.evolve(found, filled=drawn)
     filled = found.filled.copy()
     filled[struts] *= filled_outside(part(found, struts), outside, drop=False).filled
     filled[struts & in_replaced(d, bar, found.nodes[found.tets].mean(axis=1))] = 0.0
@@ -76,13 +83,14 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     within = (away <= 0) | (support(found) < LEAST_SUPPORT)
     within[found.tets[~struts]] = False
     within[wall_ties.nodes] = False
-    within[mesh.beams[:, 1::2]] = False
+    within[np.setdiff1d(mesh.beams, mesh.tets)] = False
     if len(mesh.beams):
-        touched = (filled != mesh.filled).any(axis=1) | (found.nodes != mesh.nodes).any(axis=1)[
-            found.tets
-        ].any(axis=1)
+        moved = (found.nodes != mesh.nodes).any(axis=1)
+        touched = (filled != drawn).any(axis=1) | moved[found.tets].any(axis=1)
         touched |= (away[found.tets] < REACH * d.junction_diameter).any(axis=1)
-        found = without_beams(found, touched & struts)
+        touched &= struts
+        found = without_beams(found, touched) if graph is None else graph.without(found, touched)
+        within[found.carried] = False
 
     actuator: list[Depth] = [lambda points: clearance(d, points)]
     own = bar_mesh(bar, half, actuator)

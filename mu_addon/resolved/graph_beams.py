@@ -1,0 +1,240 @@
+"""Struts of a lattice of any kind as beams, where they are whole and away from the walls.
+
+The struts' mesh is not swept: an element belongs to the strut whose axis is nearest, in radii, and its volume
+to the layers that it reaches. A layer that is whole and clear of all that struts stand on becomes a beam
+between two sections of its own. Of elements that reach into such a layer only the part outside it resists;
+their nodes inside move with the sections. Struts on the envelope's faces, of which the box cuts half away,
+stay solid, and so do the joints that they end in.
+"""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..design.lattice import Lattice
+from ..fem.elements import even_points, shape_functions
+from ..meshing.mesh import LATTICE, Array, Mesh
+from .beams import free_joints, integrals, rotation_nodes, unspoilt
+from .joints import Zones
+from .lattice import FLOOR, LEAST_SUPPORT, support
+
+# Stations of axes, a layer, among which an element's strut is sought, and how many of them.
+_STATIONS, _NEAR = 2, 24
+# Steps along each edge of the points that tell which part of an element lies in which layer.
+_STEPS = 4
+# Part of a layer that a rigid zone may take.
+_BEYOND = 0.8
+# Share of the largest volume of such a layer that one has which is whole.
+_WHOLE = 0.98
+
+
+class GraphLayers:
+    """Layers of the struts in a resolved mesh of a lattice of any kind; see `with_graph_beams`.
+
+    elements (k,): those of struts; strut (k,): of each; inside (k, p): layer of each of p points in it.
+    """
+
+    def __init__(self, mesh: Mesh, lattice: Lattice, layers: int) -> None:
+        self.lattice, self.count = lattice, layers
+        self.elements = np.flatnonzero(mesh.region == LATTICE)
+        self.start = lattice.nodes[lattice.struts[:, 0]]
+        self.way = lattice.nodes[lattice.struts[:, 1]] - self.start
+        corners = mesh.nodes[mesh.tets[self.elements, :4]]
+        self.strut = self._nearest(corners.mean(axis=1))
+        shape = shape_functions(even_points(_STEPS), 1)
+        self.inside = np.empty((len(corners), len(shape)), np.int64)
+        for p, weights in enumerate(shape):
+            at = self._distances(weights @ corners, self.strut)[1]
+            self.inside[:, p] = np.clip((layers * at).astype(int), 0, layers - 1)
+        self.volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+        self.halved = ("x" in mesh.symmetry) & (lattice.nodes[lattice.struts][:, :, 0] == 0.0).all(axis=1)
+
+    def _nearest(self, points: Array) -> Array:
+        """Strut (p,) nearest to points (p, 3) in its radii."""
+        t = (np.arange(_STATIONS * self.count) + 0.5) / (_STATIONS * self.count)
+        stations = (self.start[:, None] + t[:, None] * self.way[:, None]).reshape(-1, 3)
+        near = cKDTree(stations).query(points, min(_NEAR, len(stations)))[1] // len(t)
+        best = self._distances(points[:, None], near)[0].argmin(axis=1)
+        return np.asarray(near[np.arange(len(points)), best])
+
+    def _distances(self, points: Array, struts: Array) -> tuple[Array, Array]:
+        """Distances in radii, and fractions of the length, of points (..., 3) in mm from struts (...)."""
+        way = self.way[struts]
+        off = points - self.start[struts]
+        t = np.clip((off * way).sum(axis=-1) / (way**2).sum(axis=-1), 0.0, 1.0)
+        radius = self.lattice.radii(t.reshape(-1, 1), struts.ravel()).reshape(t.shape)
+        return np.linalg.norm(off - t[..., None] * way, axis=-1) / radius, t
+
+    def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
+        """Mask (struts, layers) of the layers that can be a beam."""
+        lattice, kind = self.lattice, self.lattice.kind
+        volume, spoilt = np.zeros((2, len(lattice.struts), self.count))
+        bad = ~unspoilt(mesh, self.elements, clear, reach_mm)
+        for layer in self.inside.T:
+            np.add.at(volume, (self.strut, layer), self.volume)
+            np.add.at(spoilt, (self.strut, layer), bad)
+        # Struts that begin at the same place of a cell and run the same way are alike.
+        first, last = (lattice.grid[lattice.struts[:, k]] for k in (0, 1))
+        place = (first - lattice.cells[0]) % kind.divisions
+        alike = np.ravel(np.unique(np.hstack([place, last - first]), axis=0, return_inverse=True)[1])
+        most = np.zeros((alike.max() + 1, self.count))
+        np.maximum.at(most, alike, volume)
+        wanted = _WHOLE * most[alike] * np.where(self.halved, 0.5, 1.0)[:, None]
+        found = (volume > 0.0) & (volume >= wanted) & (spoilt == 0)
+        return free_joints(found, (volume > 0.0).any(axis=1), lattice.struts, len(lattice.nodes))
+
+    def replaced(self, mesh: Mesh, whole: Array, zones: Zones) -> Mesh:
+        """The mesh with beams in place of the whole layers (struts, layers)."""
+        strut, layer = np.nonzero(whole)
+        if not len(strut):
+            return mesh
+        section, places = self._sections(strut, layer)
+        first, second = (len(mesh.nodes) + section[strut, layer + end] for end in (0, 1))
+        nodes = np.vstack([mesh.nodes, places])
+        own, turns = rotation_nodes(np.column_stack([first, first, second, second]), nodes)
+        turn = np.full(len(nodes), -1)
+        turn[own] = len(nodes) + np.arange(len(own))
+        # Struts in the plane of the base are clamped with it.
+        floor = len(mesh.nodes) + np.flatnonzero(places[:, 2] == mesh.nodes[mesh.base[0], 2])
+        found = attrs.evolve(mesh, nodes=np.vstack([nodes, turns]), base=np.concatenate([mesh.base, floor]))
+        beams = np.column_stack([first, turn[first], second, turn[second]])
+        return self._fitted(found, whole, beams, self._flexible(strut, layer, zones))
+
+    def uncut(self, mesh: Mesh) -> Array:
+        """Filled shares (m, q) of a mesh of `replaced` as they were without its beams."""
+        filled = mesh.filled.copy()
+        taken = self._whole_in(mesh)[self.strut[:, None], self.inside]
+        filled[self.elements[taken.any(axis=1)]] = 1.0
+        return filled
+
+    def without(self, mesh: Mesh, solid: Array) -> Mesh:
+        """A mesh of `replaced`, its shares `uncut`, with some elements (m,) bool solid again.
+
+        With all layers that these reach into, and the joints of these. Sections that no beam uses any more
+        stay as nodes, so that numbers do not change.
+        """
+        before = self._whole_in(mesh)
+        spoilt = np.zeros(before.shape)
+        for layer in self.inside.T:
+            np.add.at(spoilt, (self.strut, layer), solid[self.elements])
+        present = np.zeros(len(before), bool)
+        present[self.strut] = True
+        whole = before & (spoilt == 0)
+        whole = free_joints(whole, present, self.lattice.struts, len(self.lattice.nodes))
+        keep = whole[np.nonzero(before)]
+        return self._fitted(mesh, whole, mesh.beams[keep], mesh.flexible[keep])
+
+    def _whole_in(self, mesh: Mesh) -> Array:
+        """Mask (struts, layers) of the beams of a mesh of `replaced`, which are in the order of its rows."""
+        ends = mesh.nodes[mesh.beams[:, 0::2]]
+        strut = self._nearest(ends.mean(axis=1))
+        at = self._distances(ends.mean(axis=1), strut)[1]
+        found = np.zeros((len(self.way), self.count), bool)
+        found[strut, (self.count * at).astype(int)] = True
+        return found
+
+    def _fitted(self, mesh: Mesh, whole: Array, beams: Array, flexible: Array) -> Mesh:
+        """The mesh with the beams (e, 4) of the whole layers (struts, layers), in the order of its rows."""
+        strut, layer = np.nonzero(whole)
+        number = np.full(whole.shape, -1)
+        number[strut, layer] = np.arange(len(strut))
+        taken = whole[self.strut[:, None], self.inside]
+        every, some = taken.all(axis=1), taken.any(axis=1)
+        beam_of, filled = np.full(len(mesh.tets), -1), mesh.filled.copy()
+        middle = self.inside[:, self.inside.shape[1] // 2]
+        beam_of[self.elements[every]] = number[self.strut, middle][every]
+        cut = some & ~every
+        own = even_points(_STEPS).argmax(axis=1)  # the quadrature point that each is nearest to
+        for q in range(filled.shape[1]):
+            left = 1.0 - taken[cut][:, own == q].mean(axis=1)
+            filled[self.elements[cut], q] = np.maximum(left, FLOOR)
+        found = attrs.evolve(mesh, filled=filled, beam_of=beam_of, beams=beams, flexible=flexible)
+        node, turn = np.full((len(whole), self.count + 1), -1), np.full(len(mesh.nodes), -1)
+        node[strut, layer], node[strut, layer + 1] = beams[:, 0], beams[:, 2]
+        turn[beams[:, 0::2]] = beams[:, 1::2]
+        carried, at, shares = self._carried(found, whole, node)
+        carriers = np.column_stack([at[:, 0], turn[at[:, 0]], at[:, 1], turn[at[:, 1]]])
+        return attrs.evolve(found, carried=carried, carriers=carriers, shares=shares)
+
+    def _sections(self, strut: Array, layer: Array) -> tuple[Array, Array]:
+        """Numbers (struts, layers + 1) of the sections between beams, -1 for none, and places (s, 3) in mm.
+
+        strut, layer (e,): of each beam. Struts that meet have one section at their joint.
+        """
+        count, joints = self.count, len(self.lattice.nodes)
+        every = np.empty((len(self.way), count + 1), np.int64)
+        every[:, 0], every[:, -1] = self.lattice.struts.T
+        every[:, 1:-1] = joints + np.arange(len(self.way) * (count - 1)).reshape(len(self.way), -1)
+        used = np.unique(np.concatenate([every[strut, layer], every[strut, layer + 1]]))
+        number = np.full(every.max() + 1, -1)
+        number[used] = np.arange(len(used))
+        at = self.start[:, None] + np.linspace(0.0, 1.0, count + 1)[:, None] * self.way[:, None]
+        places = np.empty((len(number), 3))
+        places[every] = at
+        places[:joints] = self.lattice.nodes
+        return number[every], np.asarray(places[used])
+
+    def _carried(self, mesh: Mesh, whole: Array, node: Array) -> tuple[Array, Array, Array]:
+        """Carried nodes (c,), the nodes (c, 2) of each one's sections, and the first one's shares (c,).
+
+        Those within whole layers, and those that no solid element supports. node (struts, layers + 1): the
+        sections' nodes.
+        """
+        reached = np.flatnonzero(whole[self.strut[:, None], self.inside].any(axis=1))
+        of = mesh.tets[self.elements[reached]]
+        pairs = np.unique(np.column_stack([of.ravel(), np.repeat(self.strut[reached], of.shape[1])]), axis=0)
+        away, t = self._distances(mesh.nodes[pairs[:, 0]], pairs[:, 1])
+        # Of the struts whose elements a node is part of, the one whose axis is nearest carries it.
+        order = np.lexsort((away, pairs[:, 0]))
+        rows = order[np.unique(pairs[order, 0], return_index=True)[1]]
+        carried, strut, at = pairs[rows, 0], pairs[rows, 1], t[rows] * self.count
+        if "x" in mesh.symmetry:
+            # Nodes in the mirror plane move with a section there, or else they would leave it.
+            on = (mesh.nodes[carried, 0] == 0.0) & ~self.halved[strut]
+            for end, level in ((0, 0.0), (1, float(self.count))):
+                at[on & (self.lattice.nodes[self.lattice.struts[strut, end], 0] == 0.0)] = level
+        layer = np.clip(at.astype(int), 0, self.count - 1)
+        solid = attrs.evolve(mesh, filled=np.where(mesh.solid[:, None], mesh.filled, 0.0))
+        keep = whole[strut, layer] | (support(solid)[carried] < LEAST_SUPPORT)
+        carried, strut, at, layer = carried[keep], strut[keep], at[keep], layer[keep]
+        # A node beyond the last beam of its strut moves with that beam's end.
+        gap = np.abs(np.arange(self.count) - layer[:, None]) + np.where(whole[strut], 0, 2 * self.count)
+        own = gap.argmin(axis=1)
+        share = 1.0 - np.clip(at - own, 0.0, 1.0)
+        return carried, np.column_stack([node[strut, own], node[strut, own + 1]]), share
+
+    def _flexible(self, strut: Array, layer: Array, zones: Zones) -> Array:
+        """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`.
+
+        Of struts in the mirror plane of a half mesh, half of which are there, twice as much.
+        """
+        found = integrals(self.lattice, strut, self.lattice.struts[strut], layer, self.count, zones)
+        return np.asarray(found * np.where(self.halved[strut], 2.0, 1.0)[:, None])
+
+
+def graph_layers_of(mesh: Mesh, lattice: Lattice) -> GraphLayers:
+    """The layers of a mesh that `with_graph_beams` made, of struts of this lattice."""
+    ends = mesh.nodes[mesh.beams[0, 0::2]]
+    joints = lattice.nodes[lattice.struts]
+    # A beam is part of the one strut that is no longer by way of its ends.
+    length = np.linalg.norm(joints[:, 1] - joints[:, 0], axis=1)
+    by_way = np.linalg.norm(joints - ends.mean(axis=0), axis=2).sum(axis=1)
+    strut = (by_way / length).argmin()
+    return GraphLayers(mesh, lattice, round(float(length[strut] / np.linalg.norm(ends[1] - ends[0]))))
+
+
+def with_graph_beams(
+    mesh: Mesh, lattice: Lattice, layers: int, clear: Array, reach_mm: float, zones: Zones
+) -> Mesh:
+    """A resolved mesh with beams in place of the layers of struts that are whole and far from walls.
+
+    layers: of a strut at most, fewer where one would be little longer than a rigid zone; clear (n,): distance
+    of the nodes in mm from the parts that struts stand on; reach_mm: below which a layer stays solid.
+    Sections and then their rotation vectors are nodes added at the end.
+    """
+    shortest = np.linalg.norm(np.diff(lattice.nodes[lattice.struts], axis=1), axis=2).min()
+    rigid = max(zones.stretch, zones.bend) * 2.0 * lattice.node_radii.max()
+    parts = GraphLayers(mesh, lattice, max(1, min(layers, int(_BEYOND * shortest / rigid))))
+    return parts.replaced(mesh, parts.whole(mesh, clear, reach_mm), zones)

@@ -1,0 +1,208 @@
+"""Struts of lattices of any kind as beams: moduli of frames, and units against the same mesh of solids."""
+
+import math
+
+import attrs
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mu_addon.design.lattice import filled, lattice_of
+from mu_addon.design.lattices import BODY_CENTRED, LatticeKind, constant, register
+from mu_addon.design.parameters import load_preset
+from mu_addon.fem.bending_angle import bending_angle_deg
+from mu_addon.fem.carried import following
+from mu_addon.fem.equilibrium import Equilibrium
+from mu_addon.fem.materials import Materials
+from mu_addon.fem.model import Model
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.mesh import LATTICE
+from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
+from mu_addon.meshing.tiling import tiled
+from mu_addon.resolved.beams import Layers, integrals
+from mu_addon.resolved.frame import frame_tensor, frame_zones
+from mu_addon.resolved.graph_beams import graph_layers_of, with_graph_beams
+from mu_addon.resolved.joints import POISSON, Zones, zones_of
+from mu_addon.resolved.strut import strut_mesh
+from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.waveguide import bar_of, with_waveguide
+from tests.design.kinds import octet
+
+FACES = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
+UPRIGHT = LatticeKind(
+    "cross of the faces", [(0.5, 0.5, 0.5), *FACES], [(0, k) for k in range(1, 7)], constant
+)
+NONE = Zones(0.0, 0.0, ())
+
+
+def tensor(kind, junction, midspan, zones=NONE):
+    """Of a frame of struts of these diameters in cells."""
+    one = filled(kind, np.zeros((1, 3), np.int64), 1.0, junction / 2, midspan / 2)
+    each = np.arange(len(one.struts))
+    return frame_tensor(kind, integrals(one, each, one.struts, 0 * each, 1, zones), POISSON)
+
+
+def test_half_diagonals_have_the_moduli_of_their_closed_form():
+    """C44 = K + (C11 - C12)/6, and the bulk's error that `zones_of` finds by another way."""
+    d = load_preset("mu-1.0x").printed
+    zones = attrs.evolve(zones_of(d), fewer=())
+    sizes = BODY_CENTRED, d.junction_diameter / d.cell, d.midspan_diameter / d.cell
+    C, soft = tensor(*sizes, zones), tensor(*sizes)
+    bulk = (C[0, 0] + 2 * C[0, 1]) / 3
+    assert C[3, 3] == pytest.approx(bulk + (C[0, 0] - C[0, 1]) / 6, rel=1e-9)
+    assert (np.diag(C) > np.diag(soft)).all(), "rigid zones stiffen"
+    solid = bulk / (1 + zones.bulk_error)
+    assert 0.0145 < solid < 0.0152, "the solid cell's, see docs/engineering/method.md"
+
+
+def test_a_slender_cross_is_the_frame_of_the_textbook():
+    """Cubes of bars: E A along an edge, and both bars of a face bend in shear, G = 6 E I/a^4."""
+    d = 0.02
+    C = tensor(UPRIGHT, d, d)
+    assert C[0, 0] == pytest.approx(math.pi * d**2 / 4, rel=1e-9)
+    assert C[0, 1] == pytest.approx(0.0, abs=1e-12)
+    assert C[3, 3] == pytest.approx(6 * math.pi * (d / 2) ** 4 / 4, rel=0.01)
+
+
+def test_an_octet_frame_of_slender_bars_has_the_moduli_of_pinned_ones():
+    """C11 = 2 C12 = 2 C44 = rho E/6 (Deshpande, Fleck and Ashby, J. Mech. Phys. Solids 49 (2001) 1747)."""
+    d = 0.01
+    C = tensor(octet(), d, d)
+    rho = 6 * math.sqrt(2) * math.pi * (d / 2) ** 2 / (1 / math.sqrt(2)) ** 2
+    for value, share in ((C[0, 0], 1 / 6), (C[0, 1], 1 / 12), (C[3, 3], 1 / 12)):
+        assert value == pytest.approx(share * rho, rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def unit():
+    register(UPRIGHT)
+    return load_preset("mu-1.0x").evolve(kind=UPRIGHT.name, count=3, seats=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("cells")
+
+
+@pytest.fixture(scope="module")
+def meshes(unit, folder):
+    def of(fidelity, fraction):
+        settings = MeshSettings(fidelity=fidelity, refine=0.5, fraction=fraction)
+        return mesh_printed(unit, settings, cache=folder)
+
+    return {"half": of(RESOLVED, "half"), "full": of(RESOLVED, "full"), "solid": of(SOLID, "half")}
+
+
+@pytest.fixture(scope="module")
+def sensed(unit, meshes):
+    path = np.array([[0.0, 25.0, 12.5 * (k + 0.5)] for k in range(3)])
+    return {name: with_waveguide(meshes[name], bar_of(unit, path), unit) for name in ("half", "solid")}
+
+
+def bent(unit, mesh, kPa=5.0):
+    solver = Equilibrium(Model(mesh, threads=1), materials_of(unit, mesh), explains=False)
+    state = solver.reach(kPa / 1000, [solver.at_zero_pressure()])
+    return bending_angle_deg(mesh, state.u), len(solver.model.free)
+
+
+def test_zones_give_beams_the_solid_cells_moduli(unit, folder):
+    d = unit.printed
+    zones = frame_zones(d, folder)
+    assert zones.fewer == ()
+    assert 0.0 <= zones.stretch < zones.bend < 1.0
+    assert -0.3 < zones.bulk_error < 0.0
+
+
+def plate_force(mesh, axis):
+    """Force in N along an axis on the upper plate of a block, moved that way by 1e-4 of its height."""
+    height = mesh.nodes[mesh.tip[0], 2]
+    held = np.zeros(mesh.nodes.shape, bool)
+    held[np.concatenate([mesh.base, mesh.tip])] = True
+    moved = np.zeros_like(mesh.nodes)
+    moved[:, axis] = 1e-4 * mesh.nodes[:, 2]
+    moved[mesh.beams[:, 1::2]] = 0.0
+    model = Model(attrs.evolve(mesh, base=mesh.base[:0], tip=mesh.tip[:0]), held, threads=1)
+    m = model.parameters(Materials.neo_hooke(np.ones(len(mesh.tets)), np.full(len(mesh.tets), POISSON)))
+    model.factor.factor(model.tangent(np.zeros_like(moved), 0.0, m))
+    u = model.following(moved)
+    for _ in range(3):
+        u = model.moved(u, -model.factor.solve(model.residual(u, 0.0, m).ravel()[model.free]))
+    return 2.0 * float(model.potential(u, 0.0, m)) / (1e-4 * height)
+
+
+def test_a_block_between_plates_is_as_stiff_as_swept_ones():
+    """Of half diagonals, whose mesh is swept, so that beams can be laid into it by layers, too."""
+    d, cells = load_preset("mu-1.0x").printed, 2
+    octant = strut_mesh(d, 1, 5)
+    mesh = tiled(octant, (2 * cells,) * 3, (d.cell / 2,) * 3)
+    side, count = cells * d.cell, len(mesh.tets)
+    nodes = mesh.nodes.copy()
+    nodes[np.abs(nodes - side) < 1e-7] = side
+    ends = (np.flatnonzero(nodes[:, 2] == z) for z in (0.0, side))
+    base, tip = ends
+    solid = attrs.evolve(mesh, nodes=nodes, symmetry=(), base=base, tip=tip, filled=np.ones((count, 4)))
+    at = 2 * np.stack(np.meshgrid(*(np.arange(cells),) * 3, indexing="ij"), -1).reshape(-1, 3)
+    lattice = filled(BODY_CENTRED, at, d.cell, d.junction_diameter / 2, d.midspan_diameter / 2)
+    clear = np.minimum(nodes[:, 2], side - nodes[:, 2])
+    reach, zones = 0.3 * d.junction_diameter, zones_of(d)
+    graph = with_graph_beams(solid, lattice, 5, clear, reach, zones)
+    swept = Layers(solid, lattice, 5)
+    layers = swept.replaced(solid, swept.whole(solid, clear, reach), zones)
+    assert len(graph.beams) > 0.85 * len(layers.beams)
+    for axis in (0, 2):
+        assert plate_force(graph, axis) == pytest.approx(plate_force(layers, axis), rel=0.02)
+
+
+@pytest.mark.nightly("test_a_block_between_plates_is_as_stiff_as_swept_ones")
+def test_a_unit_bends_as_its_solid_struts_do_and_half_of_it_as_the_whole(unit, meshes, sensed):
+    found = {name: bent(unit, mesh) for name, mesh in meshes.items()}
+    (half, few), (full, _), (solid, many) = (found[name] for name in ("half", "full", "solid"))
+    assert half == pytest.approx(full, rel=1e-3)
+    assert half == pytest.approx(solid, rel=0.03)
+    assert few < 0.4 * many
+    # What the waveguide changes is the same.
+    by_beams, by_solids = (bent(unit, sensed[name])[0] for name in ("half", "solid"))
+    assert by_beams / half == pytest.approx(by_solids / solid, rel=5e-3)
+
+
+def test_a_rigid_motion_strains_no_beam_and_carries_its_nodes(meshes):
+    mesh = meshes["full"]
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
+    u = np.array([1.0, 2.0, 3.0]) + turn.apply(mesh.nodes) - mesh.nodes
+    wanted = u.copy()
+    u[mesh.beams[:, 1::2]] = turn.as_rotvec()
+    u[mesh.carried] = 0.0
+    found = following(mesh, u)
+    np.testing.assert_allclose(found[mesh.carried], wanted[mesh.carried], atol=1e-12)
+
+
+def test_what_a_beam_takes_is_what_solids_no_longer_count(unit, meshes):
+    """Elements within a beam resist nothing; of one that reaches into a beam the part outside counts."""
+    mesh, solid = meshes["half"], meshes["solid"]
+    count = len(mesh.tets)
+    assert (mesh.tets == solid.tets).all()
+    cut = mesh.solid & (mesh.filled != solid.filled).any(axis=1)
+    assert cut.any()
+    assert (mesh.region[cut] == LATTICE).all()
+    assert (solid.filled[cut] == 1.0).all(), "none that the wall cuts"
+    assert (mesh.filled[cut] < 1.0).any(axis=1).all()
+    layers = graph_layers_of(mesh, lattice_of(unit.printed))
+    assert (layers.uncut(mesh) == solid.filled).all()
+    # Struts on the envelope's faces are half away, and those in the mirror plane a half of theirs.
+    ends = mesh.nodes[mesh.beams[:, 0::2]]
+    low, high = (np.array(unit.printed.bounds).T[k][1] for k in (0, 1))
+    assert not ((ends[..., 1] == low).all(axis=1) | (ends[..., 1] == high).all(axis=1)).any()
+    assert (ends[..., 0] == 0.0).all(axis=1).any()
+    assert count == len(mesh.beam_of)
+
+
+def test_struts_that_a_waveguide_meets_are_solid_again(meshes, sensed):
+    """Where bar and struts are as wide the joint is whole again: nothing is missing, nothing doubled."""
+    plain, found, by_solids = meshes["half"], sensed["half"], sensed["solid"]
+    assert 0 < len(found.beams) < len(plain.beams)
+    own = len(plain.tets)
+    held = np.zeros(len(found.nodes), bool)
+    held[found.carried] = True
+    apart = found.solid[:own] & ~held[found.tets[:own]].any(axis=1)
+    assert (found.filled[:own][apart] == by_solids.filled[:own][apart]).all()
+    assert not np.isin(found.tied, found.carried).any()
