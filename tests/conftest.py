@@ -1,4 +1,4 @@
-"""Two processes run the tests side by side, a file each at a time; `-n 0` runs them in one, to debug."""
+"""Three processes run the tests side by side, a file each at a time; `-n 0` runs them in one, to debug."""
 
 from __future__ import annotations
 
