@@ -162,16 +162,16 @@ class Reference:
         return ReferenceGradients(gradients, volumes)
 
     @property
-    def filled_volumes(self) -> Array:
-        """Volumes (m, q) in mm3 that the quadrature points stand for, as far as they are filled."""
+    def resisting_volumes(self) -> Array:
+        """Volumes (m, q) in mm3 that the quadrature points stand for, as far as `Mesh.resisting` counts."""
         volumes = self.at.volumes
-        return np.asarray(volumes * self.mesh.filled if self.mesh.resolved else volumes)
+        return np.asarray(volumes * self.mesh.resisting if self.mesh.resolved else volumes)
 
     @cached_property
     def on_device(self) -> tuple[wp.array, wp.array]:
-        """Gradients (m, q, k) and filled volumes (m, q) as kernels take them."""
+        """Gradients (m, q, k) and resisting volumes (m, q) as kernels take them."""
         here = self.device == "cpu"
-        volumes = np.ascontiguousarray(self.filled_volumes)
+        volumes = np.ascontiguousarray(self.resisting_volumes)
         return (
             wp.array(self.at.gradients, dtype=wp.vec3d, device=self.device, copy=not here),
             wp.array(volumes, dtype=wp.float64, device=self.device, copy=not here),

@@ -191,8 +191,8 @@ class Model:
 
     @property
     def volumes(self) -> Array:
-        """Volumes (m,) in mm3 of the elements, as far as they are filled."""
-        return np.asarray(self.reference.filled_volumes.sum(axis=1))
+        """Volumes (m,) in mm3 of the elements, as far as they resist."""
+        return np.asarray(self.reference.resisting_volumes.sum(axis=1))
 
     @property
     def _gradients(self) -> wp.array:

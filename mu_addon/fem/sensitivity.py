@@ -60,7 +60,7 @@ def of_residual(
     move: their derivatives are computed elsewhere.
     """
     mesh = model.mesh
-    G, dV = model.reference.at.gradients, model.reference.filled_volumes
+    G, dV = model.reference.at.gradients, model.reference.resisting_volumes
     slope_u = _slopes(mesh, G, u)
     F = np.eye(3) + slope_u
     J, cofactor = np.linalg.det(F), _cofactors(F)

@@ -55,7 +55,8 @@ class Mesh:
     (e, 6): integrals over their sections, see `fem.beams.sections_of`; beam_of (m,): the beam that an element
     is part of, which then resists nothing by itself, or -1. carried (c,), carriers (c, 4), shares (c,): nodes
     that move with the sections at two beam nodes, each given as in `beams`: the share of the first counts,
-    and the rest of the second.
+    and the rest of the second. in_beams (m, q), or empty: the share, 0 to 1, of the volume at each quadrature
+    point of an element that is no beam's part but reaches into one, which resists for it there.
     """
 
     nodes: Array = attrs.field(converter=_float64)
@@ -75,6 +76,7 @@ class Mesh:
     carried: Array = attrs.field(factory=lambda: np.zeros(0), converter=_int32)
     carriers: Array = attrs.field(factory=lambda: np.zeros((0, 4)), converter=_int32)
     shares: Array = attrs.field(factory=lambda: np.zeros(0), converter=_float64)
+    in_beams: Array = attrs.field(factory=lambda: np.zeros((0, 0)), converter=_float64)
 
     @property
     def resolved(self) -> bool:
@@ -85,6 +87,11 @@ class Mesh:
     def solid(self) -> Array:
         """Mask (m,) of elements that resist by themselves, and are not part of a beam."""
         return np.ones(len(self.tets), bool) if len(self.beam_of) == 0 else self.beam_of < 0
+
+    @property
+    def resisting(self) -> Array:
+        """Share (m, q) of the volume at each quadrature point that is filled, and does not lie in a beam."""
+        return self.filled * (1.0 - self.in_beams) if self.in_beams.size else self.filled
 
     def following(self, u: Array) -> Array:
         """Displacements u (n, ...) in mm with tied nodes set to those of the nodes they follow, in place."""
@@ -131,6 +138,8 @@ class Mesh:
             parts += [self.filled, self.tied, self.tied_to, self.tied_weights]
         if len(self.beams):
             parts += [self.beams, self.flexible, self.beam_of, self.carried, self.carriers, self.shares]
+        if self.in_beams.size:
+            parts.append(self.in_beams)
         for array in parts:
             digest.update(repr((array.shape, array.dtype.str)).encode())
             digest.update(array.tobytes())
@@ -197,6 +206,7 @@ def _mirrored_beams(mesh: Mesh, image: Array) -> dict[str, Array]:
         "carried": np.concatenate([mesh.carried, image[mesh.carried[off]]]),
         "carriers": np.vstack([mesh.carriers, image[mesh.carriers[off]]]),
         "shares": np.concatenate([mesh.shares, mesh.shares[off]]),
+        "in_beams": np.vstack([mesh.in_beams, mesh.in_beams[:, FLIPPED_TET[: mesh.in_beams.shape[1]]]]),
     }
 
 

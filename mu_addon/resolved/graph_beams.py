@@ -102,15 +102,8 @@ class GraphLayers:
         beams = np.column_stack([first, turn[first], second, turn[second]])
         return self._fitted(found, whole, beams, self._flexible(strut, layer, zones))
 
-    def uncut(self, mesh: Mesh) -> Array:
-        """Filled shares (m, q) of a mesh of `replaced` as they were without its beams."""
-        filled = mesh.filled.copy()
-        taken = self._whole_in(mesh)[self.strut[:, None], self.inside]
-        filled[self.elements[taken.any(axis=1)]] = 1.0
-        return filled
-
     def without(self, mesh: Mesh, solid: Array) -> Mesh:
-        """A mesh of `replaced`, its shares `uncut`, with some elements (m,) bool solid again.
+        """A mesh of `replaced` with some elements (m,) bool solid again.
 
         With all layers that these reach into, and the joints of these. Sections that no beam uses any more
         stay as nodes, so that numbers do not change.
@@ -142,15 +135,15 @@ class GraphLayers:
         number[strut, layer] = np.arange(len(strut))
         taken = whole[self.strut[:, None], self.inside]
         every, some = taken.all(axis=1), taken.any(axis=1)
-        beam_of, filled = np.full(len(mesh.tets), -1), mesh.filled.copy()
+        beam_of, in_beams = np.full(len(mesh.tets), -1), np.zeros(mesh.filled.shape)
         middle = self.inside[:, self.inside.shape[1] // 2]
         beam_of[self.elements[every]] = number[self.strut, middle][every]
         cut = some & ~every
         own = even_points(_STEPS).argmax(axis=1)  # the quadrature point that each is nearest to
-        for q in range(filled.shape[1]):
-            left = 1.0 - taken[cut][:, own == q].mean(axis=1)
-            filled[self.elements[cut], q] = np.maximum(left, FLOOR)
-        found = attrs.evolve(mesh, filled=filled, beam_of=beam_of, beams=beams, flexible=flexible)
+        for q in range(in_beams.shape[1]):
+            share = taken[cut][:, own == q].mean(axis=1)
+            in_beams[self.elements[cut], q] = np.minimum(share, 1.0 - FLOOR)
+        found = attrs.evolve(mesh, in_beams=in_beams, beam_of=beam_of, beams=beams, flexible=flexible)
         node, turn = np.full((len(whole), self.count + 1), -1), np.full(len(mesh.nodes), -1)
         node[strut, layer], node[strut, layer + 1] = beams[:, 0], beams[:, 2]
         turn[beams[:, 0::2]] = beams[:, 1::2]
@@ -196,7 +189,7 @@ class GraphLayers:
             for end, level in ((0, 0.0), (1, float(self.count))):
                 at[on & (self.lattice.nodes[self.lattice.struts[strut, end], 0] == 0.0)] = level
         layer = np.clip(at.astype(int), 0, self.count - 1)
-        solid = attrs.evolve(mesh, filled=np.where(mesh.solid[:, None], mesh.filled, 0.0))
+        solid = attrs.evolve(mesh, filled=np.where(mesh.solid[:, None], mesh.resisting, 0.0))
         keep = whole[strut, layer] | (support(solid)[carried] < LEAST_SUPPORT)
         carried, strut, at, layer = carried[keep], strut[keep], at[keep], layer[keep]
         # A node beyond the last beam of its strut moves with that beam's end.

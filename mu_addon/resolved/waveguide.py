@@ -69,11 +69,6 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     found, wall_ties = _thickened(mesh, bar, d, body)
     struts = found.region == LATTICE
     outside: list[Depth] = [partial(outside_bar, bar), *(partial(outside_seat, seat) for seat in bar.seats)]
-    graph, drawn = None, mesh.filled
-    if len(mesh.beams) and not is_half_diagonal(d):
-        graph = graph_layers_of(mesh, lattice_of(d))
-        drawn = graph.uncut(mesh)
-        found = attrs.evolve(found, filled=drawn)
     filled = found.filled.copy()
     filled[struts] *= filled_outside(part(found, struts), outside, drop=False).filled
     filled[struts & in_replaced(d, bar, found.nodes[found.tets].mean(axis=1))] = 0.0
@@ -86,10 +81,13 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     within[np.setdiff1d(mesh.beams, mesh.tets)] = False
     if len(mesh.beams):
         moved = (found.nodes != mesh.nodes).any(axis=1)
-        touched = (filled != drawn).any(axis=1) | moved[found.tets].any(axis=1)
+        touched = (filled != mesh.filled).any(axis=1) | moved[found.tets].any(axis=1)
         touched |= (away[found.tets] < REACH * d.junction_diameter).any(axis=1)
         touched &= struts
-        found = without_beams(found, touched) if graph is None else graph.without(found, touched)
+        if is_half_diagonal(d):
+            found = without_beams(found, touched)
+        else:
+            found = graph_layers_of(mesh, lattice_of(d)).without(found, touched)
         within[found.carried] = False
 
     actuator: list[Depth] = [lambda points: clearance(d, points)]
@@ -121,6 +119,7 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
         tied_to=tied.to,
         tied_weights=tied.weights,
         beam_of=np.append(found.beam_of, np.full(more, -1)) if len(found.beam_of) else found.beam_of,
+        in_beams=np.pad(found.in_beams, ((0, more), (0, 0))) if found.in_beams.size else found.in_beams,
     )
     check_positive(whole)
     return whole

@@ -267,12 +267,17 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
 @pytest.fixture
 def interrupted(tmp_path, unit, with_light):
     """Folder of a run that was stopped among its candidates, and what it said."""
-    out = with_light(tmp_path / "out")
-    process = started(out, unit)
-    wait_for_a_state_swept(process, out)
-    # As a terminal does it: to every process of the group.
-    os.killpg(process.pid, signal.SIGINT)
-    output, errors = process.communicate(timeout=PATIENCE_S)
+    for attempt in range(3):
+        out = with_light(tmp_path / str(attempt))
+        process = started(out, unit)
+        wait_for_a_state_swept(process, out)
+        # As a terminal does it: to every process of the group.
+        os.killpg(process.pid, signal.SIGINT)
+        in_time = not (out / "report.html").exists()
+        output, errors = process.communicate(timeout=PATIENCE_S)
+        # On a busy machine the run may have got further than its candidates.
+        if in_time:
+            break
     assert process.returncode == 130, errors
     return out, output + errors
 

@@ -351,7 +351,9 @@ def read_motion(folder: Path) -> Motion:
 def _motion(
     place: Path, mesh: dict[str, Array], model: dict[str, Array], sensitivity: dict[str, Array]
 ) -> Motion:
-    fields = {f.name: mesh[f.name] for f in attrs.fields(Mesh) if f.name != "symmetry"}
+    # Older files lack later tables, which most meshes leave empty.
+    needed = [f for f in attrs.fields(Mesh) if f.name in mesh or f.default is attrs.NOTHING]
+    fields = {f.name: mesh[f.name] for f in needed if f.name != "symmetry"}
     names = [p.stem for p in place.glob("*.npz") if p.stem not in _NOT_PATHS]
     return Motion(
         folder=place,
