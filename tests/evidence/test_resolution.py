@@ -55,8 +55,18 @@ def test_a_converter_s_step_need_not_be_decimal(step, seed):
     assert quantum(written / 37.13) == pytest.approx(step / 37.13, rel=1e-4)
 
 
+@pytest.mark.parametrize("counts", [(18, 59, 105), (3, 4, 5), (-7, 0, 12, 30)])
+def test_records_that_stand_at_one_reading_each_show_the_step_together(counts):
+    step = 0.1 * math.pi
+    written = np.repeat(np.round(step * np.array(counts), 7), 18)
+    assert quantum(written) == pytest.approx(step, rel=1e-5)
+    # Of few readings, and of levels that are no multiples, none is seen but that of their digits.
+    assert quantum(written[::18]) < 1e-5
+    assert quantum(written + np.repeat(np.round(np.sqrt(np.arange(len(counts))), 7), 18)) < 1e-5
+
+
 def test_a_display_s_step_is_seen_in_all_of_its_records_together():
-    """Held, moved and held: seven levels or eight each, of which no record alone shows the step."""
+    """Held, moved and held: seven levels each, of which none alone shows the step, as their zero is off."""
     step = 0.0524 * 4.0003
     records = [
         (0, 5, 10, 25, 46, 62, 84),
@@ -66,7 +76,7 @@ def test_a_display_s_step_is_seen_in_all_of_its_records_together():
     t = np.arange(280.0)
     made = []
     for k, levels in enumerate(records):
-        angle = np.repeat(np.array(levels), 40) * step
+        angle = (np.repeat(np.array(levels), 40) + 0.37) * step
         columns = {"time_s": t, "angle_deg": t, "voltage_V": np.array([float(f"{v:.8g}") for v in angle])}
         made.append(bench.experiment("waveguide_bending", columns, f"record {k}"))
     assert max(quantum(e["voltage_V"]) for e in made) < 1e-3 * step
