@@ -41,7 +41,7 @@ NEAR = 2.0
 # Blocks in a window of a burst, and times the usual scatter: less happens by chance.
 WINDOW, LOUD = 15, 2.5
 # Deviations from those around it beyond which a block is a separate burst; largest share of such blocks.
-ALONE, MOST = 5.0, 0.2
+ALONE, MOST = 4.0, 0.2
 # A louder block does not count any more.
 LOUDEST = 1e3
 
