@@ -41,9 +41,10 @@ def page(title: str, subtitle: str, notes: str, lead: str, sections: Sequence[tu
     )
 
 
-def note(paragraphs: Iterable[str]) -> str:
-    """HTML of a box with paragraphs of text; "" where there are none."""
-    html = "".join(f"<p>{escape(paragraph)}</p>" for paragraph in paragraphs)
+def note(paragraphs: Iterable[str], stopped: str = "") -> str:
+    """HTML of a box with paragraphs of text, "" where there are none; `stopped`: why its run ended early."""
+    first = [f"This run is partial: {stopped}. What is missing was not computed."] if stopped else []
+    html = "".join(f"<p>{escape(paragraph)}</p>" for paragraph in (*first, *paragraphs))
     return f'<div class="note">{html}</div>' if html else ""
 
 

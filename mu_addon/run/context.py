@@ -12,7 +12,6 @@ import traceback
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from html import escape
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -83,8 +82,6 @@ class RunContext:
         """Write the report, if there is one and it is wanted; it says why the run stopped, if it did."""
         if self.report is not None and self.wants_report:
             self.report(stopped)
-            if stopped and self.folder is not None:
-                _say_stopped(self.folder / "report.html", stopped)
 
     def lock_folder(self, folder: Path) -> None:
         """Keep other processes out of `folder` until the run ends. Raises InUseError and OutputError."""
@@ -166,15 +163,6 @@ def _read_summary(path: Path) -> dict[str, Any]:
     except (OSError, InputError):
         return {}
     return found if isinstance(found, dict) else {}
-
-
-def _say_stopped(path: Path, why: str) -> None:
-    """Put the reason of a stop above a report that does not hold it: all its results may have been there."""
-    with suppress(OSError, InputError):
-        text = file_bytes(path).decode("utf-8")
-        if escape(why) not in text:
-            words = f'<p class="note">This run is partial: {escape(why)}.</p>'
-            write_text(path, text.replace("<main>", f"{words}\n<main>", 1))
 
 
 def record_crash(folder: Path, error: MuError, stack: str = "") -> None:

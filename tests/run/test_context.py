@@ -293,13 +293,10 @@ def test_a_run_that_was_killed_is_told_by_the_next_one_in_its_folder(tmp_path):
     assert warned[1] == []
 
 
-@pytest.mark.parametrize("words", ["", "stopped by Ctrl-C"])
-def test_a_report_of_whole_results_says_that_its_run_was_stopped(tmp_path, words):
-    page = f"<body>\n<header>{words}</header>\n<main>\nfigures</main>\n"
+def test_a_report_is_given_the_reason_of_a_stop(tmp_path):
+    given = []
     with run_to_end(Progress()) as context:
         context.open_folder(tmp_path)
-        context.report = lambda _: (tmp_path / "report.html").write_text(page)
+        context.report = given.append
         raise KeyboardInterrupt
-    text = (tmp_path / "report.html").read_text()
-    assert text.count("stopped by Ctrl-C") == 1
-    assert "figures" in text
+    assert given == ["stopped by Ctrl-C"]

@@ -100,6 +100,9 @@ def test_results_of_other_inputs_are_set_aside(tmp_path):
     assert context.status == 0
     assert (tmp_path / "stale" / "material.toml").read_text() == first
     assert "Yeoh" in (tmp_path / "material.toml").read_text()
+    assert "is partial" not in (tmp_path / "report.html").read_text()
+    context.write_report("stopped by Ctrl-C")
+    assert "This run is partial: stopped by Ctrl-C" in (tmp_path / "report.html").read_text()
 
 
 def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):

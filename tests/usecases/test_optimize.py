@@ -55,6 +55,10 @@ def job(tmp_path):
 def started(job, folder):
     context = RunContext(Progress([]))
     found = USE_CASE.start(job, folder, context)
+    context.write_report("stopped by Ctrl-C")
+    page = (folder / "report.html").read_text()
+    assert "This run is partial: stopped by Ctrl-C" in page
+    context.write_report()
     context.unlock()
     return found, context.summary
 

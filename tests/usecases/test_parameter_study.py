@@ -96,6 +96,16 @@ def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
     assert "<script" not in report
 
 
+def test_a_report_of_all_points_says_that_its_run_was_stopped(tmp_path):
+    with run_to_end(Progress([])) as context:
+        USE_CASE.start(Job(parse_plan(TEXT, tmp_path), work=formula), tmp_path, context)
+        assert "is partial" not in (tmp_path / "report.html").read_text()
+        raise KeyboardInterrupt
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("This run is partial: stopped by Ctrl-C") == 1
+    assert "chambers.wall_mm" in page
+
+
 def test_what_is_done_stays_done_and_more_can_be_added(tmp_path):
     first, _ = swept(TEXT, tmp_path)
     assert len(asked) == 6

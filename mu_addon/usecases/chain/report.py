@@ -45,9 +45,6 @@ def write_report(run: Running, stopped: str = "") -> None:
         pictures = {} if run.context.hurried else charts.pictures(run)
         for name, picture in pictures.items():
             write_bytes(run.folder / f"{name}.png", picture.png)
-        warnings = list(run.warnings)
-        if stopped:
-            warnings.insert(0, f"This run is partial: {stopped}. Later states were not computed.")
         shown = "".join(picture_figure(picture) for picture in pictures.values())
         sections = [
             ("shape", "The chain", f'<div class="many">{shown}</div>'),
@@ -62,7 +59,8 @@ def write_report(run: Running, stopped: str = "") -> None:
         lead = f'<div class="lead"><div>{_headline(run)}</div></div>'
         subtitle = f"{len(run.job.units)} units: {names}"
         write_text(
-            run.folder / "report.html", page("Units in series", subtitle, note(warnings), lead, sections)
+            run.folder / "report.html",
+            page("Units in series", subtitle, note(run.warnings, stopped), lead, sections),
         )
 
 

@@ -51,12 +51,13 @@ def write_report(
     folder: Path,
     progress: Progress,
     mended: Repair | None = None,
+    stopped: str = "",
 ) -> None:
-    """Write places.png and report.html."""
+    """Write places.png and report.html; `stopped`: why an incomplete run stopped."""
     with progress.stage("report", expected_s=4.0):
         picture = places_picture(vertices, triangles, found, job.direction)
         write_bytes(folder / "places.png", picture.png)
-        write_text(folder / "report.html", report(job, vertices, triangles, found, picture, mended))
+        write_text(folder / "report.html", report(job, vertices, triangles, found, picture, mended, stopped))
 
 
 def report(
@@ -66,6 +67,7 @@ def report(
     found: PrintCheck,
     picture: Picture,
     mended: Repair | None = None,
+    stopped: str = "",
 ) -> str:
     """The whole report as HTML text."""
     files = {name: text for name, text in FILES.items() if name != "unit.toml" or job.unit is not None}
@@ -89,7 +91,7 @@ def report(
     measured = [MEANING[name] for name, limit in job.printer.limits.items() if limit.measured]
     notes = [*(notes if assumed else []), *([f"Measured: {', '.join(measured)}."] if measured else [])]
     lead = f'<div class="lead"><div>{_headline(job, found)}</div>{picture_figure(picture)}</div>'
-    return page(f"Print check: {job.name}", job.printer.title, note(notes), lead, sections)
+    return page(f"Print check: {job.name}", job.printer.title, note(notes, stopped), lead, sections)
 
 
 def _headline(job: Job, found: PrintCheck) -> str:

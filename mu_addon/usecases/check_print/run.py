@@ -62,7 +62,9 @@ def check_print(job: Job, folder: Path, context: RunContext) -> PrintCheck:
     context.summary |= summary(found, job.printer)
     write_bytes(folder / "part.stl", stl_bytes(vertices, triangles))
     write_json(folder / "check.json", as_plain(job, found, mended))
-    context.report = lambda _: write_report(job, vertices, triangles, found, folder, progress, mended)
+    context.report = lambda stopped: write_report(
+        job, vertices, triangles, found, folder, progress, mended, stopped
+    )
     # Before the error of a part that must not be printed: that is the result, and no reason to leave early.
     context.write_report()
     context.report = None

@@ -162,8 +162,8 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     _write(found, folder / "limits.csv")
     context.summary |= summary(found)
     name = measured.folder.resolve().name
-    context.report = lambda _: write_text(
-        folder / "report.html", _report(found, name, remarks, package_versions())
+    context.report = lambda stopped: write_text(
+        folder / "report.html", _report(found, name, remarks, package_versions(), stopped)
     )
     return found
 
@@ -235,7 +235,7 @@ def _write(found: Plan, path: Path) -> None:
     write_csv(path, head, rows)
 
 
-def _report(found: Plan, name: str, remarks: Sequence[str], versions: Mapping[str, str]) -> str:
+def _report(found: Plan, name: str, remarks: Sequence[str], versions: Mapping[str, str], stopped: str) -> str:
     rows = []
     for s in found.seen:
         alike = [b if a == s.effect.name else a for a, b, _ in found.alike if s.effect.name in (a, b)]
@@ -280,7 +280,7 @@ def _report(found: Plan, name: str, remarks: Sequence[str], versions: Mapping[st
     shown = sum(s.identifiable for s in found.seen)
     share = f"<strong>{shown} of {len(found.seen)}</strong>"
     lead = f'<p class="answer">These experiments can detect {share} effects.</p>'
-    return page(f"Experiments planned in {name}", subtitle, note(remarks), lead, sections)
+    return page(f"Experiments planned in {name}", subtitle, note(remarks, stopped), lead, sections)
 
 
 def summary(found: Plan) -> dict[str, Any]:

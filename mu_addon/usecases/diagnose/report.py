@@ -41,15 +41,15 @@ MOST_PANELS = 30
 MOST_NOTES = 3
 
 
-def write_report(found: Diagnosis, out: Path, context: RunContext) -> None:
-    """Write report.html; raises OutputError."""
+def write_report(found: Diagnosis, out: Path, context: RunContext, stopped: str) -> None:
+    """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
     with context.progress.stage("report", expected_s=5.0):
         versions = package_versions()
         context.summary["versions"] = versions
-        write_text(out / "report.html", report(found, out, versions))
+        write_text(out / "report.html", report(found, out, versions, stopped))
 
 
-def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
+def report(found: Diagnosis, out: Path, versions: dict[str, str], stopped: str = "") -> str:
     """The whole report as HTML text."""
     sections = [
         ("measured", "Measured and predicted", _measured(found)),
@@ -72,17 +72,17 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str]) -> str:
     return page(
         f"Diagnosis of {name}",
         subtitle,
-        _notes(found),
+        _notes(found, stopped),
         _headline(found),
         sections,
     )
 
 
-def _notes(found: Diagnosis) -> str:
+def _notes(found: Diagnosis, stopped: str) -> str:
     remarks = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
     if len(remarks) > MOST_NOTES:
         remarks = [f"There are {len(remarks)} remarks on the data; the section Data lists them."]
-    return note(remarks)
+    return note(remarks, stopped)
 
 
 def _headline(found: Diagnosis) -> str:

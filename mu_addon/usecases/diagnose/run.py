@@ -119,7 +119,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     found.model.save(folder / "model.toml")
     _write_residuals(found, folder / "residuals.csv")
     context.summary |= summary(found)
-    context.report = lambda _: write_report(found, folder, context)
+    context.report = lambda stopped: write_report(found, folder, context, stopped)
     return found
 
 

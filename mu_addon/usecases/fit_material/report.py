@@ -36,15 +36,15 @@ WEIGHTS_MEAN = {
 }
 
 
-def write_report(found: Fitting, out: Path, context: RunContext) -> None:
-    """Write report.html; raises OutputError."""
+def write_report(found: Fitting, out: Path, context: RunContext, stopped: str) -> None:
+    """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
     with context.progress.stage("report", expected_s=1.0):
         versions = package_versions()
         context.summary["versions"] = versions
-        write_text(out / "report.html", report(found, versions))
+        write_text(out / "report.html", report(found, versions, stopped))
 
 
-def report(found: Fitting, versions: dict[str, str]) -> str:
+def report(found: Fitting, versions: dict[str, str], stopped: str = "") -> str:
     """The whole report as HTML text."""
     sections = [
         ("modes", "Tests and laws", _charts(found)),
@@ -58,7 +58,11 @@ def report(found: Fitting, versions: dict[str, str]) -> str:
     count = len(found.fitted) + len(found.held_out)
     subtitle = f"{count} coupon test{'s' if count > 1 else ''}: " + ", ".join(TITLES[m] for m in found.modes)
     return page(
-        f"A law for {found.material.name}", subtitle, note(_warnings(found)), _headline(found), sections
+        f"A law for {found.material.name}",
+        subtitle,
+        note(_warnings(found), stopped),
+        _headline(found),
+        sections,
     )
 
 

@@ -88,7 +88,7 @@ def fit_material(job: Job, folder: Path, context: RunContext) -> Fitting:
     )
     _write(found, folder)
     context.summary |= summary(found)
-    context.report = lambda _: write_report(found, folder, context)
+    context.report = lambda stopped: write_report(found, folder, context, stopped)
     return found
 
 

@@ -66,9 +66,6 @@ def report(
     stopped: str = "",
 ) -> str:
     """The whole report as HTML text, of all finished stages."""
-    warnings = list(run.warnings)
-    if stopped:
-        warnings.insert(0, f"This run is partial: {stopped}. Later stages were not computed.")
     job = run.job
     sections = [
         ("frames", "The grasp, phase by phase", _frames(run, frames)),
@@ -83,7 +80,7 @@ def report(
     gap = job.gripper.fingers.gap_mm
     subtitle = f"Two {job.gripper.unit.name} {gap:g} mm apart, {label(job.gripper.path)} in each"
     lead = f'<div class="lead"><div>{_headline(run)}</div>{picture_figure(part) if part else ""}</div>'
-    return page(f"Gripper: {job.gripper.name}", subtitle, note(warnings), lead, sections)
+    return page(f"Gripper: {job.gripper.name}", subtitle, note(run.warnings, stopped), lead, sections)
 
 
 def _headline(run: Gripping) -> str:

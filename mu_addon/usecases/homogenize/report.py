@@ -48,9 +48,6 @@ def write_report(study: Homogenisation, stopped: str = "") -> None:
 def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -> str:
     """The whole report as HTML text, of all finished stages."""
     cell = study.job.cell
-    warnings = list(study.warnings)
-    if stopped:
-        warnings.insert(0, f"This run is partial: {stopped}. Later stages were not computed.")
     sections = [
         ("cell", "The cell and its moduli", _moduli(study)),
         ("test", "Block between plates", _test(study)),
@@ -64,7 +61,7 @@ def report(study: Homogenisation, versions: dict[str, str], stopped: str = "") -
         f"Cell of {cell.size_mm:g} mm, {cell.kind.name}, struts of {2 * cell.junction_radius_mm:g} to "
         f"{2 * cell.midspan_radius_mm:g} mm, resin of {kPa(1e3 * study.job.resin.modulus_MPa)}"
     )
-    return page(title, subtitle, note(warnings), _headline(study), sections)
+    return page(title, subtitle, note(study.warnings, stopped), _headline(study), sections)
 
 
 def _headline(study: Homogenisation) -> str:

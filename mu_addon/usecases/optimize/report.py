@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from .run import Optimised, Proposal
 
 
-def write_report(found: Optimised, path: Path, progress: Progress) -> None:
-    """Write report.html; raises OutputError."""
+def write_report(found: Optimised, path: Path, progress: Progress, stopped: str) -> None:
+    """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
     with progress.stage("report", expected_s=3.0):
-        write_text(path, report(found))
+        write_text(path, report(found, stopped))
 
 
-def report(found: Optimised) -> str:
+def report(found: Optimised, stopped: str = "") -> str:
     """The report as one page of HTML."""
     robust = sum(p.checked.is_robust for p in found.proposals)
     lead = f"<p>{escape(found.words)}</p>" + cards(
@@ -41,7 +41,7 @@ def report(found: Optimised) -> str:
     return page(
         f"Optimisation of {d.unit.name}",
         f"{len(d.targets)} targets, {len(d.freedoms)} freedoms, {d.settings.fidelity}",
-        note([*limits, *(f"Not in the simulation: {words}." for words in found.left_out)]),
+        note([*limits, *(f"Not in the simulation: {words}." for words in found.left_out)], stopped),
         lead,
         [
             ("front", "Front", _front(found)),

@@ -132,7 +132,7 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
     else:
         (folder / FRONT).unlink(missing_ok=True)
     context.summary |= summary(result)
-    context.report = lambda _: write_report(result, folder / REPORT, progress)
+    context.report = lambda stopped: write_report(result, folder / REPORT, progress, stopped)
     return result
 
 

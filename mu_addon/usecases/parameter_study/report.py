@@ -26,13 +26,13 @@ FEWEST = 4
 MOST_ROWS = 200
 
 
-def write_report(found: Found, path: Path, progress: Progress) -> None:
-    """Write report.html; raises OutputError."""
+def write_report(found: Found, path: Path, progress: Progress, stopped: str) -> None:
+    """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
     with progress.stage("report", expected_s=3.0):
-        write_text(path, report(found))
+        write_text(path, report(found, stopped))
 
 
-def report(found: Found) -> str:
+def report(found: Found, stopped: str = "") -> str:
     """The report as one page of HTML."""
     done, failed = found.done, found.failed
     waiting = len(found.rows) - len(done) - len(failed)
@@ -57,7 +57,7 @@ def report(found: Found) -> str:
     return page(
         f"Parameter study of {p.inputs.unit.name}",
         f"{len(found.inputs)} inputs, {p.method.replace('_', ' ')}, {' + '.join(p.stages)}",
-        note(remarks),
+        note(remarks, stopped),
         lead,
         [
             ("effects", "Main effects", _effects(found)),

@@ -88,7 +88,7 @@ def sweep(job: Job, folder: Path, context: RunContext) -> Found:
         raise
     found = run.found()
     context.summary |= summary(found)
-    context.report = lambda _: write_report(found, folder / REPORT, progress)
+    context.report = lambda stopped: write_report(found, folder / REPORT, progress, stopped)
     return found
 
 

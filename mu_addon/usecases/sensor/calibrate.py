@@ -18,7 +18,7 @@ from ...files import write_csv, write_text
 from ...measured import read_folder
 from ...reading import require_rows
 from ...report.charts import canvas
-from ...report.html import cards, figure, page, table
+from ...report.html import cards, figure, note, page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured
@@ -153,7 +153,9 @@ def calibrate_sensor(job: Job, folder: Path, context: RunContext) -> Calibration
     rows = np.column_stack([at, volts, near, far]).tolist()
     write_csv(folder / "calibration.csv", ("angle_deg", "voltage_V", "angle_low_deg", "angle_high_deg"), rows)
     context.summary |= summary(found, checks)
-    context.report = lambda _: write_text(folder / "report.html", _report(found, fitted, held, checks))
+    context.report = lambda stopped: write_text(
+        folder / "report.html", _report(found, fitted, held, checks, stopped)
+    )
     return found
 
 
@@ -340,6 +342,7 @@ def _report(
     fitted: Sequence[CalibrationSweep],
     held: Sequence[tuple[str, CalibrationSweep]],
     checks: Sequence[Check],
+    stopped: str,
 ) -> str:
     low, high = found.range_deg
     facts = [
@@ -372,7 +375,7 @@ def _report(
     return page(
         "Calibration",
         f"{escape(found.channel)}, {found.sweeps} sweeps",
-        "",
+        note([], stopped),
         cards(facts) + words,
         [("map", "Calibration curve", chart), ("held-out", "Held-out sweeps", checked)],
     )
