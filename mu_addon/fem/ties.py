@@ -39,7 +39,7 @@ class TiedBlocks:
         self._follows = np.flatnonzero(self.weights)
         to = sparse.csr_matrix(
             (
-                self._follows,
+                self._follows.astype(np.int32),
                 (
                     np.concatenate([own, np.repeat(mesh.tied, mesh.tied_to.shape[1])])[self._follows],
                     np.concatenate([own, mesh.tied_to.ravel()])[self._follows],
@@ -50,25 +50,28 @@ class TiedBlocks:
         rows, columns = keys % n, keys // n
         per_row = np.diff(to.indptr)
         many = per_row[rows] * per_row[columns]
-        block = np.repeat(np.arange(len(keys)), many)
-        place = np.arange(len(block)) - np.repeat(np.cumsum(many) - many, many)
-        first = to.indptr[rows][block] + place // per_row[columns][block]
-        second = to.indptr[columns][block] + place % per_row[columns][block]
+        # Some millions of pairs: of 32 bits where that will do.
+        block = np.repeat(np.arange(len(keys), dtype=np.int32), many)
+        start = (np.cumsum(many) - many).astype(np.int32)
+        place = np.arange(len(block), dtype=np.int32) - start[block]
+        before, after = np.divmod(place, per_row[columns][block])
+        first, second = to.indptr[rows][block] + before, to.indptr[columns][block] + after
         row, column = to.indices[first].astype(np.int64), to.indices[second].astype(np.int64)
         self._pairs = to.data[first], to.data[second]
         # A block off the diagonal stands for its transpose, too: where both its nodes follow one, both fall
         # on that one's diagonal. One on the diagonal stands for itself, its own other half lies above.
         off = (rows != columns)[block]
-        straight = row >= column
-        turned = off & (row <= column)
-        found = np.unique(np.concatenate([(column * n + row)[straight], (row * n + column)[turned]]))
+        straight, turned = np.flatnonzero(row >= column), np.flatnonzero(off & (row <= column))
+        direct = column[straight] * n + row[straight]
+        transposed = row[turned] * n + column[turned]
+        found = np.unique(np.concatenate([direct, transposed]))
 
         def spread(chosen: Array, key: Array) -> sparse.csr_matrix:
-            where, number = np.searchsorted(found, key[chosen]), np.flatnonzero(chosen)
-            return sparse.csr_matrix((number, (where, block[chosen])), shape=(len(found), len(keys)))
+            where = np.searchsorted(found, key)
+            return sparse.csr_matrix((chosen, (where, block[chosen])), shape=(len(found), len(keys)))
 
         self.keys = found
-        self._places = spread(straight, column * n + row), spread(turned, row * n + column)
+        self._places = spread(straight, direct), spread(turned, transposed)
 
     def _weights_of(self, mesh: Mesh) -> Array:
         return np.concatenate([np.ones(self._own), mesh.tied_weights.ravel()])

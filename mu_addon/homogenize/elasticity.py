@@ -147,26 +147,33 @@ def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | No
 
 
 def strained(
-    mesh: Mesh, materials: Materials, box: Sequence[float] | None = None
+    mesh: Mesh, materials: Materials, box: Sequence[float] | None = None, alike: bool = False
 ) -> tuple[Elasticity, Array]:
     """`effective_tensor`, and the displacements (6, n, 3) in mm under unit mean strains that give it.
 
-    In Voigt's order, of engineering shears. Raises MeshingError as that does.
+    In Voigt's order, of engineering shears. alike: mesh and materials are the same along the three axes, so
+    that one shear is solved for all and four displacements come back. Raises MeshingError as that does.
     """
     octant = Octant(mesh, materials, box)
     C = np.zeros((6, 6))
     limit = np.zeros((6, 6))
-    moved = np.zeros((6, mesh.nodes.size))
-    for rows, affine, force, u, work in _responses(octant):
+    shears = SHEARS[:1] if alike else SHEARS
+    moved = np.zeros((3 + len(shears), mesh.nodes.size))
+    for rows, affine, force, u, work in _responses(octant, shears):
         moved[list(rows)] = u.T
         C[np.ix_(rows, rows)] = u.T @ work / octant.volume
         limit[np.ix_(rows, rows)] = affine.T @ force / octant.volume
+    if alike:
+        for tensor in (C, limit):
+            tensor[4, 4] = tensor[5, 5] = tensor[3, 3]
     found = Elasticity((C + C.T) / 2, octant.relative_density)
     _require_possible(found, octant, (limit + limit.T) / 2)
-    return found, moved.reshape(6, -1, 3)
+    return found, moved.reshape(len(moved), -1, 3)
 
 
-def _responses(octant: Octant) -> Iterator[tuple[range, Array, Array, Array, Array]]:
+def _responses(
+    octant: Octant, shears: Sequence[tuple[int, int]]
+) -> Iterator[tuple[range, Array, Array, Array, Array]]:
     """Rows of Voigt's order, and of each the affine motion, its forces, the motion and its forces, by column.
 
     Motions (3 n, k) in mm of a unit mean strain, forces in N.
@@ -174,7 +181,7 @@ def _responses(octant: Octant) -> Iterator[tuple[range, Array, Array, Array, Arr
     values, K = octant.tangent(np.zeros_like(octant.mesh.nodes))
     unit = np.eye(3)
     cases = [(octant.stretching, range(3), [np.outer(e, e) for e in unit])]
-    for row, (a, b) in enumerate(SHEARS):
+    for row, (a, b) in enumerate(shears):
         gradient = (np.outer(unit[a], unit[b]) + np.outer(unit[b], unit[a])) / 2
         cases.append((octant.shearing((a, b)), range(3 + row, 4 + row), [gradient]))
     for part, rows, gradients in cases:

@@ -172,10 +172,11 @@ class _Strut:
 
 @lru_cache(maxsize=8)
 def _octant(strut: _Strut) -> tuple[Mesh, Elasticity, Array]:
-    """Solid octant of a strut's cell, its elasticity, and its motion (6, n, 3) under unit mean strains."""
+    """Solid octant of a strut's cell, its elasticity, and its motion (4, n, 3): three stretches, a shear."""
     mesh = strut_mesh(strut, RINGS, LAYERS)
     count = len(mesh.tets)
-    return mesh, *strained(mesh, Materials.neo_hooke(np.ones(count), np.full(count, POISSON)))
+    resin = Materials.neo_hooke(np.ones(count), np.full(count, POISSON))
+    return mesh, *strained(mesh, resin, alike=True)
 
 
 def joint_stretch(model: Model, materials: Materials, d: Dimensions, u: Array) -> PeakStretch | None:

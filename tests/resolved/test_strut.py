@@ -7,6 +7,8 @@ import pytest
 from mu_addon.design import load_preset
 from mu_addon.design.strut_cell import Facets, StrutCell, relative_density
 from mu_addon.errors import InputError
+from mu_addon.fem.materials import Materials
+from mu_addon.homogenize.elasticity import strained
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.quality import dihedral_angles, element_volumes, folded_corners
 from mu_addon.meshing.tiling import tiled
@@ -50,6 +52,15 @@ def test_each_end_lies_on_three_planes():
         assert ((mesh.nodes == plane).sum(axis=0) > 5).all()
     assert mesh.nodes.min() == 0.0
     assert mesh.nodes.max() == DIMENSIONS.cell / 2.0
+
+
+def test_its_three_shears_are_one():
+    mesh = strut_mesh(DIMENSIONS, 1, 5)
+    resin = Materials.neo_hooke(np.ones(len(mesh.tets)), np.full(len(mesh.tets), 0.45))
+    whole, moved = strained(mesh, resin)
+    one, fewer = strained(mesh, resin, alike=True)
+    assert np.abs(one.C - whole.C).max() < 1e-9 * whole.C.max()
+    assert (fewer == moved[:4]).all()
 
 
 def test_what_it_cannot_sweep_is_refused():

@@ -39,6 +39,8 @@ from ..simulate_and_place.job import read_job as read_study
 from ..simulate_and_place.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
 from .requests import ASKED, BENT, LAYOUT, LEVELS, REQUEST, Job, read_job
 
+Array = np.ndarray[Any, Any]
+
 RUNGS = 4
 """Number of pressures solved between 0 and the largest."""
 NEWTON: NewtonSettings = attrs.evolve(
@@ -161,7 +163,7 @@ class LiveBending:
         study = attrs.evolve(study, mesh=attrs.evolve(study.mesh, refine=refine))
         before = self._levels.get(refine)
         found = self._begun(study, before)
-        old = {} if before is None or before.mesh.nodes.shape != found.mesh.nodes.shape else before.states
+        old = {} if before is None else _carried_over(before, found)
         body = Equilibrium(found.model, study.materials(found.mesh), NEWTON, explains=False)
         first = round(first_kPa, 3)
         top = max(float(study.protocol.pressure_kPa.max()), first_kPa, 1.0)
@@ -171,7 +173,7 @@ class LiveBending:
         coarse, finished = refine == LEVELS[0][0], refine == LEVELS[-1][0]
         coloured = False
         for count, pressure in enumerate(wanted):
-            found.states[pressure] = self._state(body, found, pressure, old.get(pressure))
+            found.states[pressure] = self._state(body, found, pressure, old)
             self._levels[refine] = found
             # A finer level replaces the one before as a whole.
             if not coarse and count + 1 < len(wanted):
@@ -212,12 +214,12 @@ class LiveBending:
                 self._look()
                 found.fields[pressure] = found.looked.of_states([state.u], materials)
 
-    def _state(self, body: Equilibrium, found: _Solved, pressure: float, old: State | None) -> State:
+    def _state(self, body: Equilibrium, found: _Solved, pressure: float, old: dict[float, Array]) -> State:
         """The state at a pressure in kPa: from the design before if it is near, else from those below it."""
-        if old is not None and old.u.shape == found.mesh.nodes.shape:
+        if pressure in old:
             with suppress(ConvergenceError):
-                far = _FAR * float(np.abs(old.u).max())
-                return body.newton(found.model.following(old.u.copy()), in_MPa(pressure), far)
+                far = _FAR * float(np.abs(old[pressure]).max())
+                return body.newton(found.model.following(old[pressure].copy()), in_MPa(pressure), far)
         below = [found.states[p] for p in sorted(found.states) if p < pressure]
         return body.reach(in_MPa(pressure), below)
 
@@ -244,6 +246,33 @@ class LiveBending:
     def _remove(self, names: Iterable[str]) -> None:
         for name in names:
             shutil.rmtree(self.folder / name, ignore_errors=True)
+
+
+def _carried_over(before: _Solved, found: _Solved) -> dict[float, Array]:
+    """Displacements (n, 3) in mm by pressure of the design before, at the nodes of this one.
+
+    Each node takes those of the nearest there, turns of beams those of turns; none between other numbers of
+    chambers, which bend otherwise.
+    """
+    if before.mesh.nodes.shape == found.mesh.nodes.shape:
+        return {pressure: state.u for pressure, state in before.states.items()}
+    if before.study.unit.chambers.count != found.study.unit.chambers.count:
+        return {}
+    from scipy.spatial import cKDTree
+
+    nearest = np.empty(len(found.mesh.nodes), int)
+    turns, others = _turns(found.mesh), _turns(before.mesh)
+    for turning in (True, False):
+        there, here = np.flatnonzero(others == turning), np.flatnonzero(turns == turning)
+        nearest[here] = there[cKDTree(before.mesh.nodes[there]).query(found.mesh.nodes[here])[1]]
+    return {pressure: state.u[nearest] for pressure, state in before.states.items()}
+
+
+def _turns(mesh: Mesh) -> Array:
+    """True (n,) for the nodes whose displacements are rotation vectors of beams."""
+    turns = np.zeros(len(mesh.nodes), bool)
+    turns[mesh.beams[:, 1::2]] = True
+    return turns
 
 
 def _wall_alone_differs(a: Dimensions, b: Dimensions) -> bool:
