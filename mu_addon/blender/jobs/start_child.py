@@ -238,8 +238,11 @@ def _poll() -> float | None:
     if news or before:
         # Redraw the bar each time: the time left counts down between messages.
         viewports.redraw_status()
-        if news:
+        # A report of progress changes no scene: drawing one takes long without a graphics card.
+        if before != running():
             viewports.redraw()
+        elif news:
+            viewports.redraw_panels()
     for key in set(before) - set(running()):
         sessions.drop(key)
         JOB_ENDED.send(key)

@@ -69,6 +69,14 @@ def redraw() -> None:
         area.tag_redraw()
 
 
+def redraw_panels() -> None:
+    """Redraw the sidebar of every 3D view, and not the scene."""
+    for area in areas():
+        for region in area.regions:
+            if region.type == "UI":
+                region.tag_redraw()
+
+
 def redraw_views(panels: bool) -> None:
     """Redraw every 3D view without its tool bars, with its sidebar only if `panels`."""
     for area in areas():

@@ -43,6 +43,12 @@ _NAMES = {
     "minus_y": "-Y Side",
     "plus_y": "+Y Side",
     "beside_x": "X Sides",
+    "lattice_modulus_kPa": "Lattice E (kPa)",
+    "membrane_modulus_kPa": "Wall E (kPa)",
+    "membrane_poisson": "Wall Poisson",
+    "sensor_modulus_kPa": "Sensor E (kPa)",
+    "elongation_at_break": "Break Strain",
+    "offset_xy_mm": "Offset XY",
 }
 """Parameters whose own names are too vague beside a field, or too long for it."""
 

@@ -145,3 +145,16 @@ def test_the_button_says_what_it_will_take_by_what_was_measured_here(tmp_path, m
     assert [rounded(s) for s in (3, 41, 95, 1500, 7200, 12600)] == [
         "10 s", "40 s", "2 min", "25 min", "2 h", "3 h 30 min",
     ]  # fmt: skip
+
+
+def test_progress_redraws_sidebars_and_an_end_the_scene(monkeypatch):
+    drawn = []
+    for name in ("redraw", "redraw_panels"):
+        monkeypatch.setattr(start_child.viewports, name, lambda name=name: drawn.append(name))
+    child = started(add(), "hang", monkeypatch)
+    watch(lambda: start_child._poll() and child.progress)
+    assert set(drawn) == {"redraw_panels"}
+    child.cancel()
+    watch(lambda: start_child._poll() is None)
+    assert drawn[-1] == "redraw"
+    assert drawn.count("redraw") == 1
