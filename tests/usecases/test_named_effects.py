@@ -409,6 +409,16 @@ def test_what_has_no_place_in_a_simulation_is_left_out_and_says_why():
     assert "1100" in part.left_out[-1]
 
 
+def test_softer_is_said_in_words_and_errors_of_the_model_are_no_part_of_a_unit():
+    size = {"excess": Fitted(-0.32, 0.01, -0.34, -0.3)}
+    errors = ("discrepancy_second", "mesh_share", "mesh_share_11_kPa_below")
+    nuisances = {name: Fitted(0.1, 0.01, 0.08, 0.12) for name in (*errors, "angle_zero_deg")}
+    model = ExtendedModel("named", {"tension_compression_asymmetry": size}, nuisances)
+    found = extend(load_preset("mu-1.0x"), model)
+    assert found.applied == ("struts are 32% softer in compression than in tension",)
+    assert [words.partition(" (")[0] for words in found.left_out] == ["angle zero deg"]
+
+
 def test_an_effect_out_of_its_bounds_is_refused_by_the_models_name():
     known = ExtendedModel("named", {"gravity": {"density_kg_m3": Fitted(9e3, 0, 0, 0)}}, {})
     with pytest.raises(InputError, match="out of bounds") as caught:

@@ -38,6 +38,8 @@ _NOWHERE = (
     "it concerns a gauge, a clock, a camera or the bench, which a simulation of the unit does not contain"
 )
 
+# What codes and meshes differ by is part of no unit.
+OF_THE_MODEL = ("discrepancy_", "mesh_share")
 _OTHER_KIND = "its parameters are of another kind of experiment than a whole unit under pressure"
 
 
@@ -102,7 +104,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
         elif name == "lattice_modulus_kPa":
             unit, words = _put(unit, origin, name, fitted, _as_printed(model))
             applied.append(words)
-        else:
+        elif not name.startswith(OF_THE_MODEL):
             left_out.append(
                 f"{readable(name)} ({fitted.value:.4g}) belongs to the test bench, not to the unit"
             )

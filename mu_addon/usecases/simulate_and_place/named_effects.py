@@ -46,8 +46,8 @@ NAMES = (*STATIC, *_OF_UNIT)
 _DESCRIPTIONS = {
     "gravity": "solid parts have a density of {:.4g} kg/m³",
     "strain_stiffening": "the wall stiffens at large stretch, c2/c1 = {:.3g}",
-    "anisotropy": "the wall is stiffer by {:.0%} along the print's layers than across them",
-    "tension_compression_asymmetry": "struts are stiffer by {:.0%} in compression than in tension",
+    "anisotropy": "the wall is {:.0%} stiffer along the print's layers than across them",
+    "tension_compression_asymmetry": "struts are {:.0%} stiffer in compression than in tension",
     "clogged_chamber": "the last chamber receives less pressure, by {:.0%} of the pressure",
     "line_lag": "the chambers follow the pressure with a time constant of {:.3g} s",
     "leak": "a leak conducts {:.2%} of what the line does",
@@ -252,7 +252,8 @@ def _in_words(name: str, given: Mapping[str, float]) -> str:
     if name == "line_lag" and "slower_s" in given:
         slower, faster = given["slower_s"], given["faster_share"] * given["slower_s"]
         return f"the chambers follow the pressure with time constants of {slower:.3g} and {faster:.3g} s"
-    return _DESCRIPTIONS[name].format(next(iter(given.values())))
+    size, words = next(iter(given.values())), _DESCRIPTIONS[name]
+    return words.format(size) if size > 0.0 else words.replace("stiffer", "softer").format(abs(size))
 
 
 def _size(p: Parameter, size: Any, where: str) -> float:
