@@ -618,7 +618,8 @@ class _Proposing:
         if "pressure" in KINDS[kind].keys and self._choice("pressure", ("gauge", "absolute")):
             keys["pressure"] = self._choice("pressure", ("gauge", "absolute"))
         if "cells" in self.answers and kind == "lattice_compression":
-            keys["cells"] = self._numbers("cells", (1, 3), whole=True)
+            cells = self._numbers("cells", (1, 3), whole=True)
+            keys["cells"] = cells if len(cells) == 3 else cells[0]
         # Section and length turn force and displacement into stress and strain.
         needs_section = "section_mm" in KINDS[kind].keys and (
             kind == "beam_deadweight" or ("stress_kPa" not in columns and "force_N" in columns)

@@ -125,6 +125,9 @@ def test_compression_recorded_as_negative_is_turned_and_told(tmp_path):
     experiment = imported(tmp_path, [path], answers).experiments[0]
     assert experiment["strain"].max() > 0
     assert experiment["stress_kPa"].max() > 0
+    # One count of cells is that along each axis.
+    counted = imported(tmp_path / "again", [path], answers | {"cells": "3", "strut_mm": "1.2"}).experiments[0]
+    assert (counted.cells, counted.strut_mm) == ((3, 3, 3), 1.2)
 
 
 def test_units_and_holds_are_known_by_their_columns(tmp_path):
