@@ -19,6 +19,9 @@ Array = np.ndarray[Any, Any]
 
 # Delta chi squared of 16: detected in nearly every data set, corrected for a library of some 25 effects.
 SEEN = 4.0
+# Share of it that the base model must leave of data made with an effect of its limit, and the factor by which
+# a limit of less is raised.
+LEFT, RAISED = 0.8, 1.4
 # Root of delta chi squared below which an effect, at its largest, explains nothing visible.
 WORTH = 2.0
 # Below this share an effect is a nuisance by another name.
@@ -166,18 +169,49 @@ def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensi
             continue
         p, most = s.effect.parameters[0], 0.0
         for bound in {p.low, p.high} - {p.null}:
-            try:
-                made = fitter.predict({**values, **s.shape, s.effect.keys[0]: bound})
-                imagined = attrs.evolve(fitter.record, values=made)
-                other = Fitter(imagined, fitter.simulator, fitter.sources, None, fitter.whitening)
-                chi2 = other.fit((), values).chi2
-            except MuError:
-                # Not every law has a solution at its bound.
-                continue
+            chi2 = _left(fitter, values, s, bound)
             if math.isfinite(chi2):
                 most = max(most, math.sqrt(chi2))
         judged.append(attrs.evolve(s, at_bounds=most))
     return judged
+
+
+def with_true_limits(
+    fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]
+) -> list[Sensitivity]:
+    """The same sensitivities, the limit of each effect's best shape at least where data made with it differ.
+
+    To first order nuisances absorb an effect as much as a small one; a large one they may follow further, as
+    another modulus does a thinner wall. The base model is fitted to the prediction with the effect of its
+    limit, of either sign, and the limit raised until that leaves `LEFT` of its delta chi squared; to infinity
+    beyond the effect's bounds. values: of the nuisances, by name and in their units.
+    """
+    best = {id(s) for s in best_seen(found).values()}
+    judged = []
+    for s in found:
+        p, limit = s.effect.parameters[0], s.limit
+        while id(s) in best and s.linear and math.isfinite(limit):
+            sizes = [p.null + sign * limit for sign in (-1.0, 1.0)]
+            left = [_left(fitter, values, s, size) for size in sizes if p.low <= size <= p.high]
+            if not left:
+                limit = math.inf
+            elif min(left) >= LEFT * SEEN**2:
+                break
+            else:
+                limit *= RAISED
+        judged.append(attrs.evolve(s, limit=limit))
+    return judged
+
+
+def _left(fitter: Fitter, values: Mapping[str, float], s: Sensitivity, size: float) -> float:
+    """Chi squared that the base model leaves of data made with an effect; inf where there are none."""
+    try:
+        made = fitter.predict({**values, **s.shape, s.effect.keys[0]: size})
+        imagined = attrs.evolve(fitter.record, values=made)
+        return Fitter(imagined, fitter.simulator, fitter.sources, None, fitter.whitening).fit((), values).chi2
+    except MuError:
+        # Not every law has a solution there.
+        return math.inf
 
 
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:

@@ -28,6 +28,7 @@ from .sensitivity import (
     SEEN,
     Sensitivity,
     best_seen,
+    with_true_limits,
 )
 from .simulator import Composite
 from .steps import STEPS, begun, unlikely
@@ -183,17 +184,22 @@ def diagnose(
         for name, why in gained.refused.items()
     ]
     proposal = propose_experiment(fitter, chosen, now.seen)
+    seen = now.seen
+    if kind == "none":
+        # What would have been detected is told.
+        progress("detection limits")
+        seen = with_true_limits(fitter, {p.name: chosen.base.values[p.name] for p in fitter.curved}, seen)
     if kind == "unexplained" and len(chosen.causes) > 1:
         chosen = with_promising_rivals(fitter, chosen, progress)
     known = chosen.chosen if chosen.causes else chosen.base
     # For an effect that is no cause the curvature suffices.
     sure = kind != "unexplained"
     bounds = {k: interval(fitter, known, k) if sure else _by_curvature(known, k) for k in known.keys}
-    identifiability = _identifiability(now.seen, chosen)
+    identifiability = _identifiability(seen, chosen)
     return Verdict(
         kind,
         chosen,
-        tuple(now.seen),
+        tuple(seen),
         fitter.sources,
         fitter.record,
         gained,

@@ -6,9 +6,12 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.camera import read_by_camera
 from mu_addon.evidence.prediction.coupon import CouponStress
+from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
@@ -137,6 +140,24 @@ def test_creep_by_the_root_of_time_is_at_least_a_rival_of_a_drift():
 def test_creep_by_the_logarithm_of_time_is_at_least_a_rival_of_a_drift():
     found = growing(np.log(1.0 + CLOCK / 20.0))
     assert found.names != ("pressure_drift",) or found.kind == "ambiguous"
+
+
+def test_the_fit_of_large_creep_by_a_power_of_time_ends_at_it():
+    """From a small size alone it ended in another minimum, and a cooling of the gas was named."""
+    t, rng = np.linspace(0.0, 322.5, 300), np.random.default_rng(1)
+    made = []
+    for number, level in enumerate((65.0, 308.0, 166.0)):
+        grown = 1.0 + 0.17e-3 * level * (np.maximum(t - 2.0, 0.0) / 100.0) ** 0.23
+        p = (level + 101.325) / grown - 101.325 + rng.normal(0.0, 0.33, len(t))
+        made.append(experiment("pressure_hold", {"time_s": t, "pressure_kPa": p}, f"hold {number}"))
+    simulator = Composite(bench_simulators(made))
+    measured = record(made, simulator)
+    fitter = Fitter(measured, simulator, {g: Source(0.33, 2.75, 322.5) for g in measured.groups})
+    base = fitter.fit()
+    (law,) = (e for e in simulator.refinements if e.name == "viscoelasticity")
+    found = fitter.best([law], [{**base.values, **start} for start in law.starts()])
+    assert found.chi2 < 1.2 * len(measured)
+    assert found.values[law.keys[1]] == pytest.approx(0.23, abs=0.03)
 
 
 NIGHTLY = pytest.mark.nightly("test_creep_by_the_root_of_time_is_at_least_a_rival_of_a_drift")
