@@ -1,4 +1,4 @@
-"""Three processes run the tests side by side, a file each at a time; `-n 0` runs them in one, to debug."""
+"""Two processes run the tests side by side, a file each at a time; `-n 0` runs them in one, to debug."""
 
 from __future__ import annotations
 

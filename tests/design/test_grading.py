@@ -84,10 +84,10 @@ def test_values_hold_where_they_are_said_to():
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("0 1 2", "no entry"),
-        ("0 1 2: much", "no entry"),
-        ("-1 1 2: 0.9", "no entry"),
-        ("0 1 2: nan", "no entry"),
+        ("0 1 2", "is not an entry"),
+        ("0 1 2: much", "is not an entry"),
+        ("-1 1 2: 0.9", "is not an entry"),
+        ("0 1 2: nan", "is not an entry"),
         ("0 1 2: 3", "out of bounds"),
         ("0 1 2: 0.9; 0 1 2: 0.8", "twice"),
     ],

@@ -336,7 +336,7 @@ def test_from_a_scene_of_millimetres_it_comes_into_one_of_metres_true_in_size_an
     linked = fetched(file, "stored", link=True)
     linked = next(o for o in bpy.data.objects if o.library is not None)
     select(linked)
-    assert "Seen 1e+03 times its true size. Object > Library Override" in drawn(unit_panel.CLASSES)
+    assert "Appears at 1e+03 times its true size. Object > Library Override" in drawn(unit_panel.CLASSES)
     override = linked.override_create(remap_local_usages=True)
     bpy.context.view_layer.update()
     gestures.look()
