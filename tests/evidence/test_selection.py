@@ -14,7 +14,7 @@ from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
 from mu_addon.evidence.search import one_more, reselected, select
-from mu_addon.evidence.sensitivity import sensitivities
+from mu_addon.evidence.sensitivity import LEFT, SEEN, best_seen, sensitivities, with_true_limits
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
@@ -222,3 +222,21 @@ def test_a_pair_is_fitted_once_from_whichever_effect_it_begins():
     # What promises less than half of the way to the best pair is left alone.
     alone = hypotheses(fitter, [second], effects)
     assert len(tried) - once < len(alone)
+
+
+def test_data_made_with_an_effect_of_its_limit_are_missed_by_the_base_model():
+    """Other values follow a large effect further than to first order: noisy data, large limits."""
+    fitter = fitter_of({}, noise=30.0)
+    values = {p.name: fitter.fit().values[p.name] for p in fitter.curved}
+    before = sensitivities(fitter, values)
+    after = best_seen(with_true_limits(fitter, values, before))
+    raised = [name for name, s in best_seen(before).items() if after[name].limit > s.limit]
+    assert "contact" in raised
+    for name in [*raised, "wall_thickness", "viscoelasticity"]:
+        s = after[name]
+        p = s.effect.parameters[0]
+        for size in (p.null - s.limit, p.null + s.limit):
+            if p.low <= size <= p.high:
+                made = fitter.predict({**values, **s.shape, s.effect.keys[0]: size})
+                imagined = attrs.evolve(fitter.record, values=made)
+                assert Fitter(imagined, fitter.simulator, fitter.sources).fit().chi2 > LEFT * SEEN**2 * 0.99

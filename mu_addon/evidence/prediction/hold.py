@@ -109,9 +109,7 @@ EFFECTS = (
         "viscoelasticity",
         (
             # From a small size alone fits of a large one end in another minimum, as bad as a wrong law.
-            Parameter(
-                "findley_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3, 0.1), "the volume's growth in the first 100 s"
-            ),
+            Parameter("findley_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3, 0.1), "the volume's growth in 100 s"),
             Parameter("findley_power", "", 0.05, 0.8, 0.3, (0.3,), "plastics 0.1 to 0.5 (Findley 1944)"),
         ),
         (KIND,),
