@@ -160,18 +160,18 @@ def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensi
     """The same sensitivities, with `at_bounds` computed for effects not visible to first order.
 
     The base model is fitted to the prediction at each bound of the size, and `at_bounds` is the root of the
-    chi squared left (no unit). Bounds without a solution are skipped.
+    chi squared left (no unit) beyond that without the effect. Bounds without a solution are skipped.
     """
-    judged = []
+    judged, plain = [], _missed(fitter, values, values)
     for s in found:
         if s.linear or s.unabsorbed <= ABSORBED:
             judged.append(s)
             continue
         p, most = s.effect.parameters[0], 0.0
         for bound in {p.low, p.high} - {p.null}:
-            chi2 = _left(fitter, values, s, bound)
+            chi2 = _missed(fitter, values, {**values, **s.shape, s.effect.keys[0]: bound}) - plain
             if math.isfinite(chi2):
-                most = max(most, math.sqrt(chi2))
+                most = max(most, math.sqrt(max(chi2, 0.0)))
         judged.append(attrs.evolve(s, at_bounds=most))
     return judged
 
@@ -187,12 +187,13 @@ def with_true_limits(
     beyond the effect's bounds. values: of the nuisances, by name and in their units.
     """
     best = {id(s) for s in best_seen(found).values()}
-    judged = []
+    judged, plain = [], _missed(fitter, values, values)
     for s in found:
-        p, limit = s.effect.parameters[0], s.limit
+        p, limit, key = s.effect.parameters[0], s.limit, s.effect.keys[0]
         while id(s) in best and s.linear and math.isfinite(limit):
             sizes = [p.null + sign * limit for sign in (-1.0, 1.0)]
-            left = [_left(fitter, values, s, size) for size in sizes if p.low <= size <= p.high]
+            within = [size for size in sizes if p.low <= size <= p.high]
+            left = [_missed(fitter, values, {**values, **s.shape, key: size}) - plain for size in within]
             if not left:
                 limit = math.inf
             elif min(left) >= LEFT * SEEN**2:
@@ -203,11 +204,13 @@ def with_true_limits(
     return judged
 
 
-def _left(fitter: Fitter, values: Mapping[str, float], s: Sensitivity, size: float) -> float:
-    """Chi squared that the base model leaves of data made with an effect; inf where there are none."""
+def _missed(fitter: Fitter, values: Mapping[str, float], truth: Mapping[str, float]) -> float:
+    """Chi squared of the base model's fit, from values, to the prediction of others; inf where there is none.
+
+    Without noise, so that of the values themselves it is what these cost by prior knowledge.
+    """
     try:
-        made = fitter.predict({**values, **s.shape, s.effect.keys[0]: size})
-        imagined = attrs.evolve(fitter.record, values=made)
+        imagined = attrs.evolve(fitter.record, values=fitter.predict(truth))
         return Fitter(imagined, fitter.simulator, fitter.sources, None, fitter.whitening).fit((), values).chi2
     except MuError:
         # Not every law has a solution there.
