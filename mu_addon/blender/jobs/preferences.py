@@ -1,11 +1,16 @@
-"""The extension's preferences: jobs when Blender is closed."""
+"""The extension's preferences: jobs when Blender is closed, and what uninstalling deletes."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
 from bpy.props import BoolProperty
 
+from ..shared.compat import user_folder
+from ..shared.panels import wrapped
 from .start_child import PACKAGE
+
+# Characters in a line of the preferences' window at its first size.
+_WIDTH = 90
 
 
 class MU_AP_preferences(bpy.types.AddonPreferences):
@@ -23,6 +28,20 @@ class MU_AP_preferences(bpy.types.AddonPreferences):
 
     def draw(self, context):
         self.layout.prop(self, "jobs_go_on")
+        if text := deleted_with_it():
+            wrapped(self.layout, text, "INFO", _WIDTH)
+
+
+def deleted_with_it() -> str:
+    """Results that go when the extension is uninstalled, in words; "" where there are none."""
+    count = sum(place.is_dir() for place in user_folder("studies").iterdir())
+    if not count:
+        return ""
+    of = "one unit or gripper" if count == 1 else f"{count} units or grippers"
+    return (
+        f"Uninstalling deletes the results of {of} in files that were never saved. "
+        "Save a file to keep its results beside it."
+    )
 
 
 register, unregister = bpy.utils.register_classes_factory((MU_AP_preferences,))

@@ -6,13 +6,14 @@ from unittest.mock import MagicMock
 
 import bpy
 
-from mu_addon.blender.jobs import header, start_child
+from mu_addon.blender.jobs import header, preferences, start_child
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
 from mu_addon.blender.simulate.panel import rounded, start_words
 from mu_addon.run.child import Child
 
 from .acting import add, refused
+from .drawing import drawn
 from .jobs import FAKE, ended, watch
 
 
@@ -158,3 +159,14 @@ def test_progress_redraws_sidebars_and_an_end_the_scene(monkeypatch):
     watch(lambda: start_child._poll() is None)
     assert drawn[-1] == "redraw"
     assert drawn.count("redraw") == 1
+
+
+def test_preferences_say_what_uninstalling_deletes(tmp_path, monkeypatch):
+    """Runs of files that were never saved lie in a folder that goes with the extension."""
+    monkeypatch.setattr(preferences, "user_folder", lambda *parts: tmp_path)
+    told = preferences.MU_AP_preferences
+    assert "Uninstalling" not in drawn([told])
+    (tmp_path / "mu-1.0x-1").mkdir()
+    assert "deletes the results of one unit or gripper in files that were never saved" in drawn([told])
+    (tmp_path / "hand-2").mkdir()
+    assert "of 2 units or grippers" in drawn([told])
