@@ -57,6 +57,7 @@ class Progress:
         self._stage = ""
         self._start = 0.0
         self._expected: float | None = None
+        self._planned_s: dict[str, float] = {}
         self._fraction: float | None = None
         self._pace = Pace()
         self._emitted_s = clock()
@@ -66,6 +67,7 @@ class Progress:
 
     def plan(self, stages: Plan) -> None:
         """Report the expected stages of the run, with their seconds; no effect without any."""
+        self._planned_s = dict(stages)
         if stages:
             slowed = slowed_so_far()
             self.estimate = ProgressEstimate(stages, self._clock, slowed)
@@ -99,14 +101,15 @@ class Progress:
 
     @contextmanager
     def stage(self, name: str, expected_s: float | None = None) -> Iterator[None]:
-        """Time the body as stage `name`; `expected_s` gives a time left until the first `update`.
+        """Time the body as stage `name`; `expected_s`, or the plan, gives a time left before an `update`.
 
         Stages do not nest. One that is left by an exception keeps its seconds and is not reported as ended.
         """
         if self._stage:
             raise ValueError(f"stage {name!r} inside stage {self._stage!r}")
         with self._one_at_a_time:
-            self._stage, self._start, self._expected = name, self._clock(), expected_s
+            self._stage, self._start = name, self._clock()
+            self._expected = self._planned_s.get(name) if expected_s is None else expected_s
             self._fraction, self._pace = None, Pace()
         try:
             self._emit_progress("start", self._fraction)

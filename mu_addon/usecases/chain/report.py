@@ -40,7 +40,7 @@ def write_report(run: Running, stopped: str = "") -> None:
     """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
     if not run.states:
         return
-    with run.progress.stage("report", expected_s=3.5):
+    with run.progress.stage("report"):
         # They take most of the time: a run that was asked to stop leaves them out.
         pictures = {} if run.context.hurried else charts.pictures(run)
         for name, picture in pictures.items():

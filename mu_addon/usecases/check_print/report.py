@@ -54,7 +54,7 @@ def write_report(
     stopped: str = "",
 ) -> None:
     """Write places.png and report.html; `stopped`: why an incomplete run stopped."""
-    with progress.stage("report", expected_s=4.0):
+    with progress.stage("report"):
         picture = places_picture(vertices, triangles, found, job.direction)
         write_bytes(folder / "places.png", picture.png)
         write_text(folder / "report.html", report(job, vertices, triangles, found, picture, mended, stopped))

@@ -43,7 +43,7 @@ MOST_NOTES = 3
 
 def write_report(found: Diagnosis, out: Path, context: RunContext, stopped: str) -> None:
     """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
-    with context.progress.stage("report", expected_s=5.0):
+    with context.progress.stage("report"):
         versions = package_versions()
         context.summary["versions"] = versions
         write_text(out / "report.html", report(found, out, versions, stopped))

@@ -38,7 +38,7 @@ WEIGHTS_MEAN = {
 
 def write_report(found: Fitting, out: Path, context: RunContext, stopped: str) -> None:
     """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
-    with context.progress.stage("report", expected_s=1.0):
+    with context.progress.stage("report"):
         versions = package_versions()
         context.summary["versions"] = versions
         write_text(out / "report.html", report(found, versions, stopped))

@@ -38,7 +38,7 @@ def write_report(run: Gripping, stopped: str = "") -> None:
     """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
     if run.solid is None:
         return
-    with run.progress.stage("report", expected_s=20.0):
+    with run.progress.stage("report"):
         versions = run.context.summary["versions"] = package_versions()
         # Pictures take most of the time: a run that was asked to stop leaves them out.
         part, frames = (None, {}) if run.context.hurried else _write_pictures(run, run.solid)

@@ -39,7 +39,7 @@ FRICTION = {"slide": "frictionless plates", "stick": "bonded plates"}
 
 def write_report(study: Homogenisation, stopped: str = "") -> None:
     """Write the pictures and report.html; `stopped`: why an incomplete run stopped."""
-    with study.progress.stage("report", expected_s=15.0):
+    with study.progress.stage("report"):
         versions = package_versions()
         study.context.summary["versions"] = versions
         write_text(study.folder / "report.html", report(study, versions, stopped))

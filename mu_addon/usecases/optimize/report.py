@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def write_report(found: Optimised, path: Path, progress: Progress, stopped: str) -> None:
     """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
-    with progress.stage("report", expected_s=3.0):
+    with progress.stage("report"):
         write_text(path, report(found, stopped))
 
 

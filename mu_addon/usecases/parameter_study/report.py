@@ -28,7 +28,7 @@ MOST_ROWS = 200
 
 def write_report(found: Found, path: Path, progress: Progress, stopped: str) -> None:
     """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
-    with progress.stage("report", expected_s=3.0):
+    with progress.stage("report"):
         write_text(path, report(found, stopped))
 
 
