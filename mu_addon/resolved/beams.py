@@ -40,9 +40,9 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
     gone[np.unique(mesh.beam_of[solid & (mesh.beam_of >= 0)])] = True
     if not gone.any():
         return mesh
-    # Between layers one beam begins where another ends.
-    begins, stops = (np.bincount(mesh.beams[:, k], minlength=len(mesh.nodes)) for k in (0, 2))
-    joint = (begins != 1) | (stops != 1)
+    # A joint's beams all begin at it, or all end at it; between layers one begins where one ends.
+    begins, stops = (np.bincount(mesh.beams[:, k], minlength=len(mesh.nodes)) > 0 for k in (0, 2))
+    joint = begins != stops
     for end in (0, 2):
         at = np.unique(mesh.beams[gone, end])
         at = at[joint[at]]
@@ -50,24 +50,18 @@ def without_beams(mesh: Mesh, solid: Array) -> Mesh:
     number = np.where(gone, -1, np.cumsum(~gone) - 1)
     beam_of = np.append(number, -1)[mesh.beam_of]
     beams = mesh.beams[~gone]
-    inside, ends = np.zeros((2, len(mesh.nodes)), bool)
+    inside = np.zeros(len(mesh.nodes), bool)
     inside[mesh.tets[beam_of >= 0]] = True
-    inside[beams], ends[beams] = False, True
-    # What two sections carried is carried by one where the other has gone.
-    left = ends[mesh.carriers[:, 0::2]] & (np.column_stack([mesh.shares, 1.0 - mesh.shares]) > 0.0)
-    keep = inside[mesh.carried] & left.any(axis=1)
-    alone = left[:, 0] != left[:, 1]
-    first, second = mesh.carriers[:, :2], mesh.carriers[:, 2:]
-    carriers, shares = mesh.carriers.copy(), np.where(alone, 1.0, mesh.shares)
-    carriers[alone] = np.tile(np.where(left[:, :1], first, second)[alone], 2)
+    inside[beams] = False
+    keep = inside[mesh.carried]
     return attrs.evolve(
         mesh,
         beams=beams,
         flexible=mesh.flexible[~gone],
         beam_of=beam_of,
         carried=mesh.carried[keep],
-        carriers=carriers[keep],
-        shares=shares[keep],
+        carriers=mesh.carriers[keep],
+        shares=mesh.shares[keep],
     )
 
 
@@ -129,7 +123,7 @@ class Layers:
         there = np.zeros(shape, int)
         np.add.at(there, (self.strut, self.layer), 1)
         spoilt = np.zeros(shape, int)
-        np.add.at(spoilt, (self.strut, self.layer), ~unspoilt(mesh, self.elements, clear, reach_mm))
+        np.add.at(spoilt, (self.strut, self.layer), ~whole_and_clear(mesh, self.elements, clear, reach_mm))
         found = (there == there.max()) & (spoilt == 0)
         return free_joints(found, (there > 0).any(axis=1), self.ends, len(self.lattice.nodes))
 
@@ -191,7 +185,7 @@ class Layers:
         return integrals(lattice, strut, self.ends[strut], layer, self.count, zones)
 
 
-def unspoilt(mesh: Mesh, elements: Array, clear: Array, reach_mm: float) -> Array:
+def whole_and_clear(mesh: Mesh, elements: Array, clear: Array, reach_mm: float) -> Array:
     """Mask (k,) of elements (k,) that are whole, without tied nodes, and no nearer than reach_mm to walls.
 
     clear (n,): distance of the nodes in mm from the parts that struts stand on.

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..design.lattice import Lattice
 from ..fem.elements import even_points, shape_functions
 from ..meshing.mesh import LATTICE, Array, Mesh
-from .beams import free_joints, integrals, rotation_nodes, unspoilt
+from .beams import free_joints, integrals, rotation_nodes, whole_and_clear
 from .joints import Zones
 from .lattice import FLOOR, LEAST_SUPPORT, support
 
@@ -71,7 +71,7 @@ class GraphLayers:
         """Mask (struts, layers) of the layers that can be a beam."""
         lattice, kind = self.lattice, self.lattice.kind
         volume, spoilt = np.zeros((2, len(lattice.struts), self.count))
-        bad = ~unspoilt(mesh, self.elements, clear, reach_mm)
+        bad = ~whole_and_clear(mesh, self.elements, clear, reach_mm)
         for layer in self.inside.T:
             np.add.at(volume, (self.strut, layer), self.volume)
             np.add.at(spoilt, (self.strut, layer), bad)
