@@ -32,12 +32,12 @@ from scipy.optimize import minimize, nnls
 from scipy.stats import chi2
 
 from mu_addon.errors import InputError
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source, estimate
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import Experiment, read_folder
 
 Array = np.ndarray[Any, Any]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
+    from .diagnosis import diagnose as diagnose
     from .effect import Effect as Effect
     from .effect import Parameter as Parameter
     from .extended import ExtendedModel as ExtendedModel
@@ -29,6 +30,5 @@ if TYPE_CHECKING:
     from .unit_fem import UnitSettings as UnitSettings
     from .unit_fem import unit_responses as unit_responses
     from .verdict import Verdict as Verdict
-    from .verdict import diagnose as diagnose
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -37,7 +37,7 @@ class Fitted:
 class ExtendedModel:
     """Fitted parameters of a verdict for simulations: of effects by effect and name, nuisances by name.
 
-    verdict: kind of the verdict, one of `steps.KINDS`. lattice: response of the printed lattice to a print
+    verdict: kind of the verdict, one of `verdict.KINDS`. lattice: response of the printed lattice to a print
     offset, from virtual tests; None where a power law of slender struts was used.
     """
 

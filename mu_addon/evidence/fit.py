@@ -388,3 +388,8 @@ def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[fl
             at = centre + sign * value * scale
         found.append(bound if at == limit else math.exp(at) if log else at)
     return found[0], found[1]
+
+
+def interval_by_curvature(fit: Fit, key: str) -> tuple[float, float]:
+    """The 95 % interval (low, high) of a fitted value by the curvature of chi squared, in its unit."""
+    return fit.values[key] - 1.96 * fit.sd(key), fit.values[key] + 1.96 * fit.sd(key)

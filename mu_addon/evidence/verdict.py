@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -12,29 +12,21 @@ import numpy as np
 
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
-from .fit import Fit, Fitter, interval
-from .fitted_zeros import FittedZeros, fitted_zeros
-from .gain import Gain, gain
+from .fit import Fitter
+from .fitted_zeros import FittedZeros
+from .gain import Gain
 from .graded import share_taken
 from .hypotheses import ranked
-from .next_experiment import Proposal, propose_experiment
+from .next_experiment import Proposal
 from .noise import Source
 from .plausibility import at_a_bound
 from .record import Record
-from .rivals import with_promising_rivals
 from .selection import TOGETHER, Cause, Selection
-from .sensitivity import (
-    ABSORBED,
-    SEEN,
-    Sensitivity,
-    best_seen,
-    with_true_limits,
-)
-from .simulator import Composite
-from .steps import STEPS, begun, unlikely
+from .sensitivity import ABSORBED, SEEN, Sensitivity, best_seen
 
 Array = np.ndarray[Any, Any]
 
+KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # Of what the best effect takes, what another must take for the verdict to turn on it, and at a bound.
 NEAR, SOME = 0.75, 0.5
 
@@ -43,7 +35,7 @@ NEAR, SOME = 0.75, 0.5
 class Verdict:
     """Verdict of the data on the model: the causes named, their rivals, the gain, the next experiment.
 
-    kind: one of `steps.KINDS`. experiments: all of them, their drives freed of gauge noise
+    kind: one of `KINDS`. experiments: all of them, their drives freed of gauge noise
     (`drive.denoised_drives`). sources: noise by group of series. intervals: 95 % bounds by key, in the
     parameters' units. identifiability: effects that these data cannot show, with
     the reason. set_aside: readings left out, in words (`resolution.wrong_readings`). refused: why models that
@@ -162,69 +154,10 @@ class Verdict:
         }
 
 
-def diagnose(
-    experiments: Sequence[Experiment], simulator: Composite, progress: Callable[[str], None] = lambda _: None
-) -> Verdict:
-    """Judge a model by measured experiments: which effects explain the misfit, and how surely.
-
-    experiments: from `measured.read_folder`; those with the role "held_out" are used for the gain alone.
-    simulator: of their kinds. progress: called with the step in progress. Noise is estimated first and the
-    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where it
-    is significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
-    experiment can be predicted, and where `require_plausible` does.
-    """
-    now = begun(experiments, simulator, progress)
-    for step in STEPS:
-        now = step(now, progress)
-    fitter, chosen, kind, set_aside = now.fitter, now.chosen, now.kind, list(now.set_aside)
-    progress("gain")
-    gained = gain(fitter, chosen.base, chosen.chosen, [e for e in now.experiments if e.role == "held_out"])
-    set_aside += [
-        f"{name} was held out but cannot be predicted, and is not in the gain: {why}"
-        for name, why in gained.refused.items()
-    ]
-    proposal = propose_experiment(fitter, chosen, now.seen)
-    seen = now.seen
-    if kind == "none":
-        # What would have been detected is told.
-        progress("detection limits")
-        seen = with_true_limits(fitter, {p.name: chosen.base.values[p.name] for p in fitter.curved}, seen)
-    if kind == "unexplained" and len(chosen.causes) > 1:
-        chosen = with_promising_rivals(fitter, chosen, progress)
-    known = chosen.chosen if chosen.causes else chosen.base
-    # For an effect that is no cause the curvature suffices.
-    sure = kind != "unexplained"
-    bounds = {k: interval(fitter, known, k) if sure else _by_curvature(known, k) for k in known.keys}
-    identifiability = _identifiability(seen, chosen)
-    return Verdict(
-        kind,
-        chosen,
-        tuple(seen),
-        fitter.sources,
-        fitter.record,
-        gained,
-        proposal,
-        identifiability,
-        bounds,
-        now.experiments,
-        tuple(set_aside),
-        dict(simulator.refused),
-        share_taken(fitter, chosen.base, chosen.chosen),
-        _nearest(fitter, chosen),
-        tuple(unlikely(fitter.curved, chosen.base)),
-        fitted_zeros(fitter, chosen.base),
-    )
-
-
-def _nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
+def nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:
     """Title and share of the misfit of the single explanation that takes most of it; None without any."""
     pool = [f for f in ranked([*found.singles, *found.wider]) if not at_a_bound(f)]
     return (pool[0].effects[0].title, share_taken(fitter, found.base, pool[0])) if pool else None
-
-
-def _by_curvature(fit: Fit, key: str) -> tuple[float, float]:
-    """The 95 % interval (low, high) of a fitted value by the curvature of chi squared, in its unit."""
-    return fit.values[key] - 1.96 * fit.sd(key), fit.values[key] + 1.96 * fit.sd(key)
 
 
 def _among(effect: Effect) -> dict[str, Any] | None:
@@ -236,7 +169,7 @@ def _among(effect: Effect) -> dict[str, Any] | None:
     return {"what": effect.among, "spread": {"value": value, "low95": low, "high95": high, "unit": unit}}
 
 
-def _identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:
+def identifiability(seen: Sequence[Sensitivity], chosen: Selection) -> dict[str, str]:
     """Effects that these data cannot show, with the reason and a way to show them."""
     found = {}
     shown = {f.names[0] for f in chosen.singles if chosen.base.chi2 - f.chi2 >= SEEN**2}

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.evidence.verdict import diagnose
+from mu_addon.evidence.diagnosis import diagnose
 from tests.evidence import analytic
 
 

@@ -3,6 +3,7 @@
 import attrs
 import numpy as np
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import FORCE_SCALE
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
@@ -19,7 +20,6 @@ from mu_addon.evidence.record import record
 from mu_addon.evidence.rivals import causes_of, with_promising_rivals
 from mu_addon.evidence.selection import Selection
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence.bench import experiment
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
 from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
 RANGE_kPa = 40.0

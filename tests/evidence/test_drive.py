@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import denoised, denoised_drives, reading_noise
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
 

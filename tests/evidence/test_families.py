@@ -11,6 +11,7 @@ import pytest
 from benchmarks.evidence.second_code.judging import simulator_of
 from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import made, order
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
@@ -21,7 +22,6 @@ from mu_addon.evidence.prediction.step import PressureStep
 from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
 from mu_addon.evidence.prediction.yielding import yielded
 from mu_addon.evidence.ringing import swinging
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
 from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic, bench

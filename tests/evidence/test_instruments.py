@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.bench import bench_simulators
@@ -13,7 +14,6 @@ from mu_addon.evidence.prediction.camera import read_by_camera
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 from tests.evidence.bench import experiment
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import SLIP
 from mu_addon.evidence.extended import extended_model
 from mu_addon.evidence.hypotheses import by_search
 from mu_addon.evidence.prediction.marker_slip import Recordings, searched, slip_effects, slipped
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence import analytic
 

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from mu_addon.evidence.diagnosis import diagnose, noise_of
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.noise import Source, Whitening, repeated
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.steps import noise_of
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.camera import read_by_camera
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic
 
 HALF_mm = 37.5

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 
 from .bench import experiment
 

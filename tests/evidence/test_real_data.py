@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.evidence.diagnosis import diagnose, noise_of
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.lattice_fem import scalings
 from mu_addon.evidence.prediction.beam import BeamSag
@@ -16,8 +17,6 @@ from mu_addon.evidence.prediction.lattice import LatticeStress
 from mu_addon.evidence.record import record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.steps import noise_of
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import read_folder
 
 from .bench import recovered

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import ConvergenceError
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence.stand_ins import Moduli, made
 
 STRAIN = np.linspace(0.0, 0.1, 24)

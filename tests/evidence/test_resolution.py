@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import reading_noise
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
@@ -25,7 +26,6 @@ from mu_addon.evidence.resolution import (
     wrong_readings,
 )
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import bench
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from benchmarks.evidence.second_code.judging import judged
 from benchmarks.evidence.second_code.sets import order
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record, repeats
@@ -30,7 +31,6 @@ from mu_addon.evidence.scatter import (
     within_scatter,
 )
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence.bench import experiment
 
 SD = 0.02

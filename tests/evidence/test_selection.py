@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.gain import gain
 from mu_addon.evidence.hypotheses import beside, hypotheses, ranked
@@ -16,7 +17,6 @@ from mu_addon.evidence.residuals import dependence_table, strict_table, structur
 from mu_addon.evidence.search import one_more, reselected, select
 from mu_addon.evidence.sensitivity import LEFT, SEEN, best_seen, sensitivities, with_true_limits
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
 RUBBING = {"rate_independent_hysteresis.share": 0.25, "rate_independent_hysteresis.threshold_kPa": 3.0}

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.hold import chamber_pressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.thinning import MOST, thinned
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.measured import table
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table

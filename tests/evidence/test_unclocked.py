@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from benchmarks.evidence.second_code.judging import judged
 from benchmarks.evidence.second_code.sets import Order
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.noise import estimate
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.record import record
@@ -15,7 +16,6 @@ from mu_addon.evidence.residuals import ALTERNATION
 from mu_addon.evidence.scatter import FEW, TIMES
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unclocked import AROUND, IN_A_ROW, MOST, lone, points
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence.bench import experiment
 
 SD = 0.02

@@ -6,11 +6,11 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_volume
 from mu_addon.design.quantity import in_MPa
+from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.unit import UnitPressure, UnitResponse
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_effects import Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses
-from mu_addon.evidence.verdict import diagnose
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import MeshSettings
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
+from mu_addon.evidence.diagnosis import diagnose, noise_of
 from mu_addon.evidence.effect import LIBRARY, Effect, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, extended_model, load_model, stacked
 from mu_addon.evidence.fit import Fitter
@@ -14,8 +15,6 @@ from mu_addon.evidence.prediction.unit import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities, similarity
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.steps import noise_of
-from mu_addon.evidence.verdict import diagnose
 from tests.evidence import analytic, stand_ins
 
 BASE = {"modulus_factor": 1.05}

@@ -62,7 +62,7 @@ class MeasuredFolder:
 
 
 @attrs.frozen(eq=False)
-class Diagnosis:
+class ShownVerdict:
     """Result of a diagnosis: verdict.json and summary.json; stale: why it does not belong to the unit now."""
 
     folder: Path
@@ -117,7 +117,7 @@ def _read_data(folder: Path) -> MeasuredFolder:
     return MeasuredFolder(measured, digest={"experiments_sha256": described, "data": data})
 
 
-def diagnosis(root: Any) -> Diagnosis | None:
+def diagnosis(root: Any) -> ShownVerdict | None:
     """Result of the diagnosis in the unit's folder, or None."""
     folder = folder_of(root)
     files = [folder / name for name in ("summary.json", "verdict.json", "diagnose.toml", "unit.toml")]
@@ -125,7 +125,7 @@ def diagnosis(root: Any) -> Diagnosis | None:
     if known is None:
         return None
     summary, verdict, inputs, unit = known
-    return Diagnosis(folder, str(summary.get("status", "")), _stale(root, inputs, unit), verdict, summary)
+    return ShownVerdict(folder, str(summary.get("status", "")), _stale(root, inputs, unit), verdict, summary)
 
 
 def _read_run(

@@ -12,7 +12,7 @@ import numpy as np
 from ...evidence.gain import Errors
 from ...evidence.residuals import Dependence
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
-from .diagnosis import Curve
+from .judged_data import Curve
 from .words import readable
 
 Array = np.ndarray[Any, Any]

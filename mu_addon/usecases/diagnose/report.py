@@ -23,7 +23,7 @@ from ...report.html import cards, facts_table, figure, note, page, table
 from ...run.context import RunContext
 from ...run.versions import package_versions
 from . import charts as pictures
-from .diagnosis import Curve, Diagnosis, curves
+from .judged_data import Curve, JudgedData, curves
 from .words import advice, alternatives, bare, between, called, in_a_table, listed, readable, sentence, to_do
 
 FILES = {
@@ -41,7 +41,7 @@ MOST_PANELS = 30
 MOST_NOTES = 3
 
 
-def write_report(found: Diagnosis, out: Path, context: RunContext, stopped: str) -> None:
+def write_report(found: JudgedData, out: Path, context: RunContext, stopped: str) -> None:
     """Write report.html; raises OutputError. stopped: why an incomplete run stopped."""
     with context.progress.stage("report"):
         versions = package_versions()
@@ -49,7 +49,7 @@ def write_report(found: Diagnosis, out: Path, context: RunContext, stopped: str)
         write_text(out / "report.html", report(found, out, versions, stopped))
 
 
-def report(found: Diagnosis, out: Path, versions: dict[str, str], stopped: str = "") -> str:
+def report(found: JudgedData, out: Path, versions: dict[str, str], stopped: str = "") -> str:
     """The whole report as HTML text."""
     sections = [
         ("measured", "Measured and predicted", _measured(found)),
@@ -78,14 +78,14 @@ def report(found: Diagnosis, out: Path, versions: dict[str, str], stopped: str =
     )
 
 
-def _notes(found: Diagnosis, stopped: str) -> str:
+def _notes(found: JudgedData, stopped: str) -> str:
     remarks = [f"{r[:1].upper()}{r[1:]}." for r in found.remarks]
     if len(remarks) > MOST_NOTES:
         remarks = [f"There are {len(remarks)} remarks on the data; the section Data lists them."]
     return note(remarks, stopped)
 
 
-def _headline(found: Diagnosis) -> str:
+def _headline(found: JudgedData) -> str:
     verdict = found.verdict
     headline, words = sentence(verdict)
     html = f'<p class="answer">Verdict: <strong>{escape(headline)}</strong>.</p>' + (
@@ -115,7 +115,7 @@ def _headline(found: Diagnosis) -> str:
     return html + cards(facts)
 
 
-def _sizes(found: Diagnosis) -> str:
+def _sizes(found: JudgedData) -> str:
     """Values of the causes with their intervals, where they are too many for a sentence."""
     verdict = found.verdict
     if not (verdict.names and in_a_table(verdict)):
@@ -130,12 +130,12 @@ def _sizes(found: Diagnosis) -> str:
     return table("", head, rows)
 
 
-def _extended_words(found: Diagnosis) -> str:
+def _extended_words(found: JudgedData) -> str:
     names = listed([readable(n) for n in found.verdict.selection.chosen.names]) if found.extends else ""
     return f"with {names}" + ("" if found.verdict.names else " (not named)")
 
 
-def _measured(found: Diagnosis) -> str:
+def _measured(found: JudgedData) -> str:
     drawn, more = _chosen(curves(found))
     # A row an experiment, where each has as many panels.
     wide = ' style="max-width:52rem"' if len(drawn) > len({c.experiment.name for c in drawn}) else ""
@@ -154,7 +154,7 @@ def _measured(found: Diagnosis) -> str:
     return html
 
 
-def _key(found: Diagnosis) -> str:
+def _key(found: JudgedData) -> str:
     marks = [(INK, "●", "measured"), (pictures.BASE, "╌╌", "base model")]
     if found.extends:
         marks.append((CHOSEN, "━━", _extended_words(found)))
@@ -176,7 +176,7 @@ def _chosen(every: Sequence[Curve]) -> tuple[list[Curve], int]:
     return drawn, len(every) - len(drawn)
 
 
-def _causes(found: Diagnosis) -> str:
+def _causes(found: JudgedData) -> str:
     verdict = found.verdict
     if not verdict.selection.causes:
         return ""
@@ -245,7 +245,7 @@ def _at_bound(p: Parameter, low: float, high: float) -> str:
     return f"up to its {' and '.join(sides)} bound" if sides else ""
 
 
-def _rivals(found: Diagnosis) -> str:
+def _rivals(found: JudgedData) -> str:
     selection = found.verdict.selection
     if not selection.singles:
         return ""
@@ -293,7 +293,7 @@ def _rivals(found: Diagnosis) -> str:
     )
 
 
-def _against(found: Diagnosis, f: Fit, rivals: set[str]) -> str:
+def _against(found: JudgedData, f: Fit, rivals: set[str]) -> str:
     selection = found.verdict.selection
     e, gained = f.effects[0], selection.base.chi2 - f.chi2
     at = [bare(p) for k, p in zip(e.keys, e.parameters, strict=True) if _ended(p, f.values[k])]
@@ -322,7 +322,7 @@ def _ended(p: Parameter, value: float) -> bool:
     return any(abs(value - bound) < near and bound != p.null for bound in (p.low, p.high))
 
 
-def _gain(found: Diagnosis) -> str:
+def _gain(found: JudgedData) -> str:
     gain = found.verdict.gain
     if not found.extends:
         return ""
@@ -361,7 +361,7 @@ def _gain(found: Diagnosis) -> str:
     )
 
 
-def _by_quantity(found: Diagnosis) -> str:
+def _by_quantity(found: JudgedData) -> str:
     """Table of errors of every measured quantity, where there are several."""
     every = found.verdict.gain.by_quantity
     if len(every) < 2:
@@ -374,7 +374,7 @@ def _by_quantity(found: Diagnosis) -> str:
     return table("", head, rows)
 
 
-def _dependence(found: Diagnosis) -> str:
+def _dependence(found: JudgedData) -> str:
     selection = found.verdict.selection
     before, after = selection.table_base, selection.table
     if not before:
@@ -417,7 +417,7 @@ def _dependence(found: Diagnosis) -> str:
     )
 
 
-def _dependents(found: Diagnosis, tested: Mapping[str, bool]) -> list[pictures.Dependent]:
+def _dependents(found: JudgedData, tested: Mapping[str, bool]) -> list[pictures.Dependent]:
     """Residuals of the first quantity against the tested ones: name, and True with structure."""
     record, simulator = found.verdict.record, found.simulator
     group = record.groups[0]
@@ -450,7 +450,7 @@ def _dependents(found: Diagnosis, tested: Mapping[str, bool]) -> list[pictures.D
     return drawn[:9]
 
 
-def _identifiability(found: Diagnosis) -> str:
+def _identifiability(found: JudgedData) -> str:
     rows = []
     verdict = found.verdict
     for name, s in sorted(best_seen(verdict.seen).items(), key=lambda item: not item[1].identifiable):
@@ -486,7 +486,7 @@ def _identifiability(found: Diagnosis) -> str:
     )
 
 
-def _noise(found: Diagnosis) -> str:
+def _noise(found: JudgedData) -> str:
     record, rows = found.verdict.record, []
     for group in record.groups:
         members = [s for s in record.series if s.group == group]
@@ -541,7 +541,7 @@ def _noise(found: Diagnosis) -> str:
     )
 
 
-def _data(found: Diagnosis) -> str:
+def _data(found: JudgedData) -> str:
     rows = [
         (
             [

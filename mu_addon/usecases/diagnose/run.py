@@ -13,6 +13,7 @@ import numpy as np
 
 from ...design.parameters import Unit
 from ...errors import InputError
+from ...evidence.diagnosis import diagnose
 from ...evidence.drive import reading_noise
 from ...evidence.extended import ExtendedModel, Fitted, extended_model, stacked
 from ...evidence.prediction import lattice
@@ -20,7 +21,7 @@ from ...evidence.prediction import unit as unit_pressure
 from ...evidence.prediction.effective_pressure import REFERENCE
 from ...evidence.resolution import STAYS, dwell, quantum
 from ...evidence.simulator import Composite, Simulator
-from ...evidence.verdict import Verdict, diagnose
+from ...evidence.verdict import Verdict
 from ...files import write_csv, write_json
 from ...measured import Measured
 from ...measured.kinds import OF_A_UNIT
@@ -30,8 +31,8 @@ from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .diagnosis import Diagnosis, curves
 from .job import LAYOUT, Job, read_job
+from .judged_data import JudgedData, curves
 from .report import write_report
 from .simulators import simulations_plan, simulators_of
 from .words import advice, readable, sentence, to_do
@@ -71,7 +72,7 @@ def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
     return {k: v for k, v in found.items() if k != "status"}
 
 
-def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | None:
+def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | None:
     """Judge the model by measured data; writes verdict.json, model.toml, residuals.csv, report.html.
 
     Where the folder holds this program's verdict on these inputs, nothing is repeated, and None is returned.
@@ -114,7 +115,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> Diagnosis | No
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
-    found = Diagnosis(measured, simulator, verdict, model, unit, tuple(remarks))
+    found = JudgedData(measured, simulator, verdict, model, unit, tuple(remarks))
     write_json(folder / "verdict.json", verdict.as_json())
     found.model.save(folder / "model.toml")
     _write_residuals(found, folder / "residuals.csv")
@@ -260,7 +261,7 @@ def _place(where: str) -> str:
     return Path(path).name + comma + rest
 
 
-def _write_residuals(found: Diagnosis, path: Path) -> None:
+def _write_residuals(found: JudgedData, path: Path) -> None:
     rows = [
         (c.experiment.name, c.experiment.role, c.channel, int(row), m, b, a)
         for c in curves(found)
@@ -272,7 +273,7 @@ def _write_residuals(found: Diagnosis, path: Path) -> None:
     write_csv(path, head, rows)
 
 
-def summary(found: Diagnosis) -> dict[str, Any]:
+def summary(found: JudgedData) -> dict[str, Any]:
     """Every figure of a diagnosis in plain data."""
     verdict = found.verdict
     headline, words = sentence(verdict)

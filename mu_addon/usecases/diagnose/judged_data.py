@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 @attrs.frozen(eq=False)
-class Diagnosis:
+class JudgedData:
     """A verdict with its simulator and data; remarks: of the reader, in words."""
 
     measured: Measured
@@ -61,7 +61,7 @@ class Curve:
         return self.experiment.columns.get(f"{head}_sd_{unit}")
 
 
-def curves(found: Diagnosis) -> list[Curve]:
+def curves(found: JudgedData) -> list[Curve]:
     """Every predicted channel of every experiment, in the order of the folder."""
     simulator = found.simulator
     listed = []

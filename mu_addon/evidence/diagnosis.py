@@ -1,4 +1,4 @@
-"""Steps of a diagnosis: each takes where it stands, and returns where it stands then."""
+"""A diagnosis: its steps in order, each from where it stands to where it stands then, and its verdict."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from ..measured import Experiment
 from .acceptance import too_far
 from .drive import denoised_drives
 from .effect import Effect, Parameter
-from .fit import Fit, Fitter
-from .graded import mainly
+from .fit import Fit, Fitter, interval, interval_by_curvature
+from .fitted_zeros import fitted_zeros
+from .gain import gain
+from .graded import mainly, share_taken
+from .next_experiment import propose_experiment
 from .noise import Source, estimate, span
 from .outliers import NAME as OUTLIER
 from .outliers import without_outliers
@@ -23,18 +26,25 @@ from .plausibility import require_plausible
 from .record import Record, record
 from .residuals import ALTERNATION, BY_TURN, strict_table, structure
 from .resolution import without_unpredicted_readings, without_wrong_readings
-from .rivals import coinciding
+from .rivals import coinciding, with_promising_rivals
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
 from .search import further_owners, one_more, reselected, select, select_owned, select_pooled
 from .selection import FALSE_ALARM_RATE, Selection
-from .sensitivity import WANDERING, Sensitivity, at_bounds, sensitivities, signatures
+from .sensitivity import (
+    WANDERING,
+    Sensitivity,
+    at_bounds,
+    sensitivities,
+    signatures,
+    with_true_limits,
+)
 from .simulator import Composite
 from .thinning import thinned
+from .verdict import Verdict, identifiability, nearest
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str], None]
 
-KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # Effects that may belong to one specimen, or differ among them, if no common one explains the data.
 OPEN = ("unexplained", "unidentifiable")
 # A nuisance this many spreads from its prior value is no longer only a nuisance.
@@ -80,7 +90,7 @@ class Diagnosis:
 
     @property
     def kind(self) -> str:
-        """One of `KINDS`."""
+        """One of `verdict.KINDS`."""
         found = self.chosen
         if (found.left and not self.graded) or found.doubted:
             return "unexplained"
@@ -260,6 +270,59 @@ STEPS = (
     under_bursts,
     by_size,
 )
+
+
+def diagnose(
+    experiments: Sequence[Experiment], simulator: Composite, progress: Callable[[str], None] = lambda _: None
+) -> Verdict:
+    """Judge a model by measured experiments: which effects explain the misfit, and how surely.
+
+    experiments: from `measured.read_folder`; those with the role "held_out" are used for the gain alone.
+    simulator: of their kinds. progress: called with the step in progress. Noise is estimated first and the
+    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where it
+    is significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
+    experiment can be predicted, and where `require_plausible` does.
+    """
+    now = begun(experiments, simulator, progress)
+    for step in STEPS:
+        now = step(now, progress)
+    fitter, chosen, kind, set_aside = now.fitter, now.chosen, now.kind, list(now.set_aside)
+    progress("gain")
+    gained = gain(fitter, chosen.base, chosen.chosen, [e for e in now.experiments if e.role == "held_out"])
+    set_aside += [
+        f"{name} was held out but cannot be predicted, and is not in the gain: {why}"
+        for name, why in gained.refused.items()
+    ]
+    proposal = propose_experiment(fitter, chosen, now.seen)
+    seen = now.seen
+    if kind == "none":
+        # What would have been detected is told.
+        progress("detection limits")
+        seen = with_true_limits(fitter, {p.name: chosen.base.values[p.name] for p in fitter.curved}, seen)
+    if kind == "unexplained" and len(chosen.causes) > 1:
+        chosen = with_promising_rivals(fitter, chosen, progress)
+    known = chosen.chosen if chosen.causes else chosen.base
+    # For an effect that is no cause the curvature suffices.
+    sure = kind != "unexplained"
+    bounds = {k: interval(fitter, known, k) if sure else interval_by_curvature(known, k) for k in known.keys}
+    return Verdict(
+        kind,
+        chosen,
+        tuple(seen),
+        fitter.sources,
+        fitter.record,
+        gained,
+        proposal,
+        identifiability(seen, chosen),
+        bounds,
+        now.experiments,
+        tuple(set_aside),
+        dict(simulator.refused),
+        share_taken(fitter, chosen.base, chosen.chosen),
+        nearest(fitter, chosen),
+        tuple(unlikely(fitter.curved, chosen.base)),
+        fitted_zeros(fitter, chosen.base),
+    )
 
 
 def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
