@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.circumstances import circumstances
 from mu_addon.evidence.effect import SLIP
-from mu_addon.evidence.prediction.unit import TIMED
+from mu_addon.evidence.prediction.unit_pressure import TIMED
 from mu_addon.run.processes import one_thread_each
 from tests.blind import unit_runs
 from tests.blind.injector import OUTSIDE

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import ConvergenceError, InputError
 from ..fem.rotations import rotation, skew
-from .body import frame, relative
 from .joint import MOST_RANGE, Joint, JointAt
 from .rigid_motion import exponential, inverse, motion, rotation_vector, slope
+from .unit_between_plates import frame, relative
 
 Array = np.ndarray[Any, Any]
 

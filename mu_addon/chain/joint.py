@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from .body import PlateState
+from .unit_between_plates import PlateState
 
 Array = np.ndarray[Any, Any]
 

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from .body import PlateBody, PlateState
 from .joint import Joint, fitted
 from .settings import LOADED, PRESSURE_STEP
+from .unit_between_plates import PlateBody, PlateState
 
 if TYPE_CHECKING:
     from ..design.parameters import Unit

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..design.quantity import Description
-    from ..fem.solver import SolverChoice
+    from ..fem.linear_solver import SolverChoice
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
@@ -120,7 +120,7 @@ def add_resin(command: argparse.ArgumentParser) -> None:
 
 def add_solver(command: argparse.ArgumentParser) -> None:
     """--solver and --device."""
-    from ..fem.solver import DEVICE, SOLVER
+    from ..fem.linear_solver import DEVICE, SOLVER
 
     add_setting(command, SOLVER)
     add_setting(command, DEVICE, "auto|cpu|cuda:0")
@@ -128,7 +128,7 @@ def add_solver(command: argparse.ArgumentParser) -> None:
 
 def solver_of(options: argparse.Namespace) -> SolverChoice:
     """The choice of --solver and --device; raises InputError, also for a missing device."""
-    from ..fem.solver import SolverChoice
+    from ..fem.linear_solver import SolverChoice
 
     found = SolverChoice(options.solver, options.device)
     found.require_device()

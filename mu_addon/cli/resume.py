@@ -37,7 +37,7 @@ def add(commands: Commands[Any]) -> None:
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run a folder's inputs, taking finished stages from the cache."""
-    from ..fem.solver import SolverChoice
+    from ..fem.linear_solver import SolverChoice
     from ..usecases.resume import resume
     from .options import solver_of
 

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     """Study job from the options; raises InputError."""
-    from ..homogenize.effective import read_effective
+    from ..homogenize.effective_file import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
     from ..placement.settings import rules_of

@@ -1,4 +1,4 @@
-"""Anchors in the sagittal plane and the windows of them that a waveguide can follow."""
+"""Anchors in the plane of bending and the windows of them that a waveguide can follow."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .noise import Source as Source
     from .noise import Whitening as Whitening
     from .prediction.bench import bench_simulators as bench_simulators
-    from .prediction.unit import UnitPressure as UnitPressure
+    from .prediction.unit_pressure import UnitPressure as UnitPressure
     from .record import Record as Record
     from .simulator import Composite as Composite
     from .simulator import Simulator as Simulator

@@ -15,17 +15,17 @@ from .drive import denoised_drives
 from .effect import Effect, Parameter
 from .fit import Fit, Fitter, interval, interval_by_curvature
 from .fitted_zeros import fitted_zeros
-from .gain import gain
-from .graded import mainly, share_taken
+from .gain_on_unseen import gain
+from .main_causes import mainly, share_taken
 from .next_experiment import propose_experiment
 from .noise import Source, estimate, span
 from .outliers import NAME as OUTLIER
 from .outliers import without_outliers
 from .owned import coincident_effects
 from .plausibility import require_plausible
+from .readings import without_unpredicted_readings, without_wrong_readings
 from .record import Record, record
 from .residuals import ALTERNATION, BY_TURN, strict_table, structure
-from .resolution import without_unpredicted_readings, without_wrong_readings
 from .rivals import coinciding, with_promising_rivals
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
 from .search import further_owners, one_more, reselected, select, select_owned, select_pooled
@@ -77,7 +77,7 @@ class Diagnosis:
 
     again: see `drive.denoised_drives`. set_aside: readings left out, and other remarks, in words. seen:
     sensitivities of the effects. graded: the causes are named although structure is left
-    (`graded.mainly`).
+    (`main_causes.mainly`).
     """
 
     experiments: tuple[Experiment, ...]

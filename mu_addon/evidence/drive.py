@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .readings import STAYS, between_steps, divided, dwell
 from .record import DRIVES
-from .resolution import STAYS, between_steps, divided, dwell
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]

@@ -22,7 +22,7 @@ from ..measured import Experiment
 from ..reading import file_text, parse_toml
 from ..run.cache import Cache
 from ..toml_writer import toml_text
-from .prediction.lattice import KIND, ComputedCell, Scaling
+from .prediction.lattice_compression import KIND, ComputedCell, Scaling
 
 # Gets a block and the finished share.
 Progress = Callable[[str, float], None]

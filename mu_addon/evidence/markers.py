@@ -21,8 +21,8 @@ Array = np.ndarray[Any, Any]
 class Marker:
     """A marker's measured position at rest (3,), the material point (3,) that stands for it, both in mm.
 
-    The frame is that of DESIGN section 2: z along the axis from the inlet, x = 0 the sagittal plane, +y the
-    side with more lattice. axes: measured coordinates; without x, the marker is taken to lie in the sagittal
+    The frame is that of DESIGN section 2: z along the axis from the inlet, x = 0 the plane of bending, +y the
+    side with more lattice. axes: measured coordinates; without x, the marker is taken to lie in the
     plane. distance_mm: between the two, over the measured coordinates.
     """
 

@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
+from .readings import STAYS
 from .record import KNOWN, Record, Series
-from .resolution import STAYS
 
 Array = np.ndarray[Any, Any]
 

@@ -11,9 +11,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ..measured import Experiment
 from .fit import Fit, Fitter
+from .readings import ALIKE, MOST_WRONG, TIMES_MORE
 from .record import KNOWN, Series
 from .residuals import FALSE_ALARM
-from .resolution import ALIKE, MOST_WRONG, TIMES_MORE
 
 Array = np.ndarray[Any, Any]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError, MuError
 from ..measured import Experiment
-from .resolution import display_steps, quantum, stretch
+from .readings import display_steps, quantum, stretch
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]
@@ -30,7 +30,7 @@ class Series:
     prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
     count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: of its
     readings' resolution, in the channel's unit, 0 without one; stays: number of unchanged readings in a row,
-    around a reading (`resolution.stretch`). louder (b,): white noise of each block over the usual, None where
+    around a reading (`readings.stretch`). louder (b,): white noise of each block over the usual, None where
     it is 1 throughout (`scatter.with_bursts`).
     """
 

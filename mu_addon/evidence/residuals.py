@@ -17,8 +17,8 @@ from ..measured.pose import at_rest
 from .fit import Fit, Fitter
 from .noise import cycle_s, harmonics
 from .prediction.effective_pressure import play_operator
-from .prediction.unit import KIND as UNIT
-from .prediction.unit import cycles
+from .prediction.unit_pressure import KIND as UNIT
+from .prediction.unit_pressure import cycles
 from .record import KNOWN, Record, Series, repeats
 from .ringing import modes, ringing
 

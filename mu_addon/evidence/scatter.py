@@ -11,8 +11,8 @@ import numpy as np
 
 from .drive import FEWEST, reading_noise
 from .noise import Source
+from .readings import divided
 from .record import DRIVES, KNOWN, Record, Series, repeats
-from .resolution import divided
 
 Array = np.ndarray[Any, Any]
 

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .resolution import STAYS, dwell
+from .readings import STAYS, dwell
 from .simulator import Composite
 
 Array = np.ndarray[Any, Any]

@@ -24,7 +24,7 @@ from ..measured.pose import Direction, X, down
 from ..meshing.mesh import LATTICE, MEMBRANE
 from ..meshing.settings import CELL_MM, MeshSettings
 from .effect import Effect, Parameter
-from .prediction import beam, coupon, lattice
+from .prediction import beam_deadweight, coupon, lattice_compression
 from .prediction.flat_obstacle import NAME as CONTACT
 
 if TYPE_CHECKING:
@@ -68,9 +68,9 @@ class Body:
 
     finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
     lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
-    `pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None where it is free. drawn:
-    the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small effect.
-    self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
+    `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None where it is free.
+    drawn: the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small
+    effect. self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
     """
 
     unit: Unit
@@ -345,7 +345,7 @@ EFFECTS = {
     for effect in (
         UnitEffect(
             "gravity",
-            _shared(beam.EFFECTS, "gravity"),
+            _shared(beam_deadweight.EFFECTS, "gravity"),
             (0.0, 1300.0, 4000.0),
             load=_weight,
             has_gravity=True,
@@ -362,7 +362,7 @@ EFFECTS = {
         ),
         UnitEffect(
             "overcure",
-            _shared(lattice.EFFECTS, "overcure"),
+            _shared(lattice_compression.EFFECTS, "overcure"),
             (0.0, 0.06, 0.14, 0.25),
             body=_overcured,
             length=1,
@@ -371,7 +371,7 @@ EFFECTS = {
         ),
         UnitEffect(
             "skin_cure",
-            _shared(lattice.EFFECTS, "skin_cure"),
+            _shared(lattice_compression.EFFECTS, "skin_cure"),
             (0.0, 0.04, 0.1, 0.2, 0.4),
             body=_skinned,
             length=1,

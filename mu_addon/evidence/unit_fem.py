@@ -25,10 +25,10 @@ from ..run.pool import each
 from ..run.processes import cores
 from .effect import Parameter
 from .markers import Marker, attached
-from .prediction import blocked_force, pose, step
+from .prediction import blocked_force, pressure_step, unit_pose
 from .prediction.flat_obstacle import NAME as CONTACT
 from .prediction.flat_obstacle import NEAREST, ObstacleResponse
-from .prediction.unit import KIND, UnitResponse, Variant
+from .prediction.unit_pressure import KIND, UnitResponse, Variant
 from .unit_effects import EFFECTS, HELD, Body, UnitEffect
 from .unit_run import Result, Run, effect_of, run
 
@@ -37,7 +37,7 @@ Progress = Callable[[str, float], None]
 
 ANGLE, VOLUME, FORCE = "angle_deg", "volume_mm3", "force_N"
 # Kinds of a unit that bends freely.
-FREE = (KIND, step.KIND, pose.KIND)
+FREE = (KIND, pressure_step.KIND, unit_pose.KIND)
 # Of the pressures' range: the most that a step to which its ends are rounded may be. The quarter of it that
 # rounding may take away lies well within the margin. Steps are 1 and 5 times powers of ten.
 ROUND = 0.06
@@ -174,7 +174,7 @@ def unit_responses(
 ) -> tuple[UnitResponse, ...]:
     """Response of the freely bending unit at each scale and orientation of the experiments given.
 
-    Of unit_pose experiments those are the `pose.STATIONS` about their axis.
+    Of unit_pose experiments those are the `unit_pose.STATIONS` about their axis.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
     `cache` and found again there, also by another call; `progress` is called with what is done and the share.
@@ -248,7 +248,7 @@ def _orientations(experiments: Sequence[Experiment]) -> tuple[tuple[float, Direc
     """Orientations to simulate, in degrees about an axis, each once."""
     found: dict[tuple[float, Direction], None] = {}
     for e in experiments:
-        at = pose.STATIONS if e.kind == pose.KIND else (e.orientation_deg,)
+        at = unit_pose.STATIONS if e.kind == unit_pose.KIND else (e.orientation_deg,)
         found |= dict.fromkeys((deg % 360.0, e.orientation_axis) for deg in at)
     return tuple(sorted(found))
 

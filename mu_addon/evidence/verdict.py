@@ -14,9 +14,9 @@ from ..measured import Experiment
 from .effect import OF, Effect, Parameter
 from .fit import Fitter
 from .fitted_zeros import FittedZeros
-from .gain import Gain
-from .graded import share_taken
+from .gain_on_unseen import Gain
 from .hypotheses import ranked
+from .main_causes import share_taken
 from .next_experiment import Proposal
 from .noise import Source
 from .plausibility import at_a_bound
@@ -38,11 +38,11 @@ class Verdict:
     kind: one of `KINDS`. experiments: all of them, their drives freed of gauge noise
     (`drive.denoised_drives`). sources: noise by group of series. intervals: 95 % bounds by key, in the
     parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings left out, in words (`resolution.wrong_readings`). refused: why models that
+    the reason. set_aside: readings left out, in words (`readings.wrong_readings`). refused: why models that
     were tried have no prediction, by the titles of their effects. share_taken: of the base model's misfit by
-    the chosen one; a verdict `named` or `ambiguous` may leave structure (`graded.mainly`). nearest: title
-    of the best single explanation, named or not, and its share of the misfit. far: nuisances that are far
-    from what was known of them, the farthest first. zeros: of a load cell, where they hide an error.
+    the chosen one; a verdict `named` or `ambiguous` may leave structure (`main_causes.mainly`). nearest:
+    title of the best single explanation, named or not, and its share of the misfit. far: nuisances that are
+    far from what was known of them, the farthest first. zeros: of a load cell, where they hide an error.
     `as_json` is the content of verdict.json.
     """
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from .laws import OgdenRoxburgh as OgdenRoxburgh
     from .laws import Prony as Prony
     from .laws import Yeoh as Yeoh
+    from .linear_solver import SolverChoice as SolverChoice
     from .materials import Layer as Layer
     from .materials import Materials as Materials
     from .model import Model as Model
@@ -55,7 +56,6 @@ if TYPE_CHECKING:
     from .rigid import Sphere as Sphere
     from .self_intersection import crossings as crossings
     from .self_intersection import first_self_intersection as first_self_intersection
-    from .solver import SolverChoice as SolverChoice
     from .state import State as State
     from .state import rest as rest
     from .stress import cauchy as cauchy

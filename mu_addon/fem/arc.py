@@ -16,7 +16,7 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError
-from .inertia import Inertia
+from .indefinite import Inertia
 from .model import MaterialData, Model
 from .newton_settings import NewtonSettings
 from .state import State

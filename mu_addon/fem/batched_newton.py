@@ -12,10 +12,10 @@ from scipy import sparse
 from ..errors import ConvergenceError, InputError
 from ..meshing.mesh import Mesh
 from .conjugate_gradients import Change
-from .descent import Descent
 from .elementwise import element_stiffness, rotations
 from .equilibrium import Equilibrium
 from .factor import IndefiniteError
+from .line_search import Descent
 from .materials import Layer, Materials
 from .model import Model
 from .newton_settings import NewtonSettings

@@ -15,8 +15,8 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from .law_at_points import evaluate
 from .laws import NeoHooke
-from .point import evaluate
 
 if TYPE_CHECKING:
     from .beams import Sections

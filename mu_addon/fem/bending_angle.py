@@ -52,10 +52,10 @@ class TipSection:
 def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
 
-    Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the sagittal (y, z) plane: of
-    cap and lattice, or of a resolved unit's cap and ends of struts.
-    Toward +y because that is how the unit bends when pressure grows; as a right-hand rotation about x it is
-    negative. u: (n, 3) in mm. For many states of one mesh, `TipSection` finds the plane once.
+    Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the plane of bending (y, z):
+    of cap and lattice, or of a resolved unit's cap and ends of struts. Toward +y because that is how the unit
+    bends when pressure grows; as a right-hand rotation about x it is negative. u: (n, 3) in mm. For many
+    states of one mesh, `TipSection` finds the plane once.
     """
     return TipSection.of(mesh).angle_deg(u)
 

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import ConvergenceError
-from .descent import LONGEST_STEP
 from .factor import IndefiniteError
+from .line_search import LONGEST_STEP
 from .model import MaterialData, Model
 from .newton_settings import NewtonSettings
 from .state import State

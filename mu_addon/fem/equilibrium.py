@@ -13,12 +13,12 @@ from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .continuation import limit_pressure
 from .damped import EXACT_BELOW, damped_minimum
-from .descent import Descent
 from .factor import IndefiniteError
+from .line_search import Descent
 from .materials import Materials
 from .model import Model
 from .newton_settings import NewtonSettings
-from .pattern import Pattern
+from .sparsity import Pattern
 from .state import State, extrapolate, rest
 
 if TYPE_CHECKING:

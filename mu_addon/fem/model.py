@@ -18,7 +18,7 @@ from ..meshing.mesh import AXES
 from . import kernels
 from .beam_fibres import fibres_of, mixtures
 from .beams import Beams, frames_along, sections_of
-from .carried import Carried, Folding
+from .carried_nodes import Carried, Folding
 from .conjugate_gradients import ConjugateGradients
 from .elements import Reference, triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
@@ -26,7 +26,7 @@ from .iterative import TwoLevel
 from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
-from .pattern import Pattern, with_entries
+from .sparsity import Pattern, with_entries
 from .ties import TiedBlocks
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..meshing.mesh import Mesh
-from .carried import Carried
+from .carried_nodes import Carried
 from .elements import Reference
 from .model import Model
 from .self_contact import SelfContact

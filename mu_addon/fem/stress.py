@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..meshing.mesh import TET_EDGES
 from .elements import ReferenceGradients, reference_gradients, shape_functions, tet_quadrature
 from .lattice_law import deformation_gradients, stretches
-from .point import stress
+from .law_at_points import stress
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh

@@ -11,7 +11,7 @@ import scipy.linalg
 from .conjugate_gradients import Change, Changes, ConjugateGradients
 from .factor import IndefiniteError, make_factor
 from .model import Model
-from .pattern import Pattern
+from .sparsity import Pattern
 from .triangular import Triangular
 
 Array = np.ndarray[Any, Any]

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from .cell_mesh import mesh_cell as mesh_cell
     from .compression import Compression as Compression
     from .compression import compress as compress
-    from .effective import Effective as Effective
-    from .effective import read_effective as read_effective
-    from .effective import write_effective as write_effective
+    from .effective_file import Effective as Effective
+    from .effective_file import read_effective as read_effective
+    from .effective_file import write_effective as write_effective
     from .elasticity import Elasticity as Elasticity
     from .elasticity import effective_tensor as effective_tensor
     from .elasticity import young_modulus as young_modulus

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..fem.lattice_law import LatticeLaw
-from ..fem.point import evaluate
+from ..fem.law_at_points import evaluate
 
 Array = np.ndarray[Any, Any]
 

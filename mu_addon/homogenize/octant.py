@@ -20,7 +20,7 @@ from ..errors import InputError, MeshingError
 from ..fem.factor import Cholesky, IndefiniteError, SuperLU, make_factor
 from ..fem.materials import Materials
 from ..fem.model import Model
-from ..fem.pattern import Pattern
+from ..fem.sparsity import Pattern
 from ..meshing.mesh import AXES, Array, Mesh
 from ..meshing.tiling import box_of
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..design.quantity import in_MPa
 from ..errors import ConvergenceError, InputError
-from ..fem.point import evaluate
-from ..fem.point import stress as point_stress
+from ..fem.law_at_points import evaluate
+from ..fem.law_at_points import stress as point_stress
 from ..measured import Experiment
 
 Array = np.ndarray[Any, Any]

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..fem.point import evaluate
+from ..fem.law_at_points import evaluate
 from .coupon import MODES, Array, equivalent_stretch, principal_stretches, stretch_of_equivalent
 
 POINTS = 101

@@ -31,7 +31,8 @@ class Experiment:
     lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
     by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
     mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
-    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see `pose.down`.
+    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see
+    `unit_pose.down`.
     strut_mm: diameter that straight round struts were drawn with, None for the unit's.
     gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness of what bears
     the load. accuracy: stated for instruments, by the column that they read, in its unit. sha256: of the

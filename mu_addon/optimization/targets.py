@@ -20,7 +20,7 @@ from .quantities import (
     WallsApart,
     Workspace,
 )
-from .sensor import Disturbance, SensorSlope
+from .sensor_quantities import Disturbance, SensorSlope
 from .structure import Quantity
 from .unit_quantities import Mass, PrintTime, WallThickness
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from ..sensing.guide import Optics
-    from ..sensing.law import Law
-    from ..sensing.signal import Response
+    from ..sensing.light_law import Law
+    from ..sensing.light_signal import Response
 
 Floats = NDArray[np.floating[Any]]
 

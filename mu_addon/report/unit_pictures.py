@@ -1,4 +1,4 @@
-"""Pictures of a unit in a report: cut open along its sagittal plane, at rest and in motion."""
+"""Pictures of a unit in a report: cut open along its plane of bending, at rest and in motion."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def portrait(
 
 
 def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple[Camera, float]:
-    """Camera that frames `parts` after the sagittal cut, and the aspect they fill."""
+    """Camera that frames `parts` after that cut, and the aspect they fill."""
     behind = np.array([0.0, np.inf, np.inf])
     left = [part if part.whole else Part(np.minimum(part.vertices, behind), part.faces) for part in parts]
     axes = Camera((0, 0, 0), towards, (0, 0, 1), 1.0).axes
@@ -84,7 +84,7 @@ def motion(
     colors: Sequence[dict[int, Floats]] = (),
     outside: bool = False,
 ) -> list[Picture]:
-    """One picture for each state, all to one scale, of the mesh cut open along its sagittal plane.
+    """One picture for each state, all to one scale, of the mesh cut open along its plane of bending.
 
     outside: show the half from the other side, uncut.
 

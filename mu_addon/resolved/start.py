@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..fem.carried import following
+from ..fem.carried_nodes import following
 from ..fem.elements import reference_gradients
 from ..fem.equilibrium import Equilibrium
 from ..meshing.mesh import Array, Mesh

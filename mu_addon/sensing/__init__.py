@@ -30,8 +30,12 @@ if TYPE_CHECKING:
     from .guide import Centreline as Centreline
     from .guide import Guide as Guide
     from .guide import Optics as Optics
-    from .law import Law as Law
-    from .law import fit_law as fit_law
+    from .light_law import Law as Law
+    from .light_law import fit_law as fit_law
+    from .light_signal import Response as Response
+    from .light_signal import Signal as Signal
+    from .light_signal import signal_of_nodes as signal_of_nodes
+    from .light_signal import signal_of_states as signal_of_states
     from .recording import Recorder as Recorder
     from .recording import Recording as Recording
     from .recording import read_recording as read_recording
@@ -39,10 +43,6 @@ if TYPE_CHECKING:
     from .samples import Samples as Samples
     from .session import Control as Control
     from .session import run_session as run_session
-    from .signal import Response as Response
-    from .signal import Signal as Signal
-    from .signal import signal_of_nodes as signal_of_nodes
-    from .signal import signal_of_states as signal_of_states
     from .sources import Replay as Replay
     from .sources import SerialLine as SerialLine
     from .sources import Simulated as Simulated

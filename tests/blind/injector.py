@@ -322,7 +322,7 @@ def reached(length, most, wanted):
 
 def judged_unit(unit, experiments):
     """The judge's simulator of unit_pressure experiments made with a unit."""
-    from mu_addon.evidence.prediction.unit import UnitPressure
+    from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 
     kinds = sorted({(e.scale, e.orientation_deg) for e in experiments if e.kind == "unit_pressure"})
     return Composite({"unit_pressure": UnitPressure(unit.responses(kinds), experiments)})

@@ -14,7 +14,7 @@ import attrs
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.selection import RIVAL_DELTA_CHI2
 from mu_addon.evidence.simulator import Composite

@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.evidence.prediction.unit import UnitResponse, Variant
+from mu_addon.evidence.prediction.unit_pressure import UnitResponse, Variant
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import COARSE, FINE, Run, run
 from mu_addon.files import read_npz, write_npz

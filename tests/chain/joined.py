@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from mu_addon.chain.body import frame, tip_nodes
 from mu_addon.chain.chain import GRAVITY_N_PER_G, Loads
 from mu_addon.chain.rigid_motion import motion
+from mu_addon.chain.unit_between_plates import frame, tip_nodes
 from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.errors import InputError
 from mu_addon.fem.dead_loads import gravity

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mu_addon.chain.body import MIRROR, PlateState
 from mu_addon.chain.joint import EXPONENTS, Joint, fitted
+from mu_addon.chain.unit_between_plates import MIRROR, PlateState
 
 RNG = np.random.default_rng(11)
 SIZE = np.array([0.4, 0.4, 0.3, 4.0, 4.0, 3.0])

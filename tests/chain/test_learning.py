@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mu_addon.chain import Chain, Link, Loads, Sampling, learn
-from mu_addon.chain.body import PlateBody
 from mu_addon.chain.rigid_motion import rotation_vector
+from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem import Equilibrium, Model, materials_of

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from mu_addon.evidence.effect import Parameter
-from mu_addon.evidence.prediction.unit import UnitPressure, UnitResponse, Variant
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import Experiment
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mu_addon.evidence.effect import Effect, Parameter
-from mu_addon.evidence.prediction.unit import nuisances
+from mu_addon.evidence.prediction.unit_pressure import nuisances
 from mu_addon.measured import Experiment
 
 

@@ -10,11 +10,11 @@ from mu_addon.evidence.noise import Source
 from mu_addon.evidence.owned import coincident_effects, owned_effects, strain_rate
 from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.pooled import pooled_effects
-from mu_addon.evidence.prediction.beam import EFFECTS as BEAM
+from mu_addon.evidence.prediction.beam_deadweight import EFFECTS as BEAM
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.drift import zeroed
-from mu_addon.evidence.prediction.hold import ChamberPressure
-from mu_addon.evidence.prediction.unit import TIMED
+from mu_addon.evidence.prediction.pressure_hold import ChamberPressure
+from mu_addon.evidence.prediction.unit_pressure import TIMED
 from mu_addon.evidence.prediction.yielding import _borne_by_one
 from mu_addon.evidence.record import record
 from mu_addon.evidence.rivals import causes_of, with_promising_rivals

@@ -5,7 +5,7 @@ import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from tests.evidence import analytic
 

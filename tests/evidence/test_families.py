@@ -15,11 +15,11 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.plausibility import value_at_a_bound
 from mu_addon.evidence.prediction.effective_pressure import in_the_chambers
-from mu_addon.evidence.prediction.hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
 from mu_addon.evidence.prediction.instants import finer
 from mu_addon.evidence.prediction.instruments import filtered
-from mu_addon.evidence.prediction.step import PressureStep
-from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+from mu_addon.evidence.prediction.pressure_hold import ROOM_K, ATMOSPHERE_kPa, chamber_pressure
+from mu_addon.evidence.prediction.pressure_step import PressureStep
+from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
 from mu_addon.evidence.prediction.yielding import yielded
 from mu_addon.evidence.ringing import swinging
 from mu_addon.measured import read_folder

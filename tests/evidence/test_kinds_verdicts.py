@@ -6,8 +6,8 @@ from scipy.linalg import expm
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.blocked_force import BlockedForce
-from mu_addon.evidence.prediction.pose import STATIONS, UnitPose
-from mu_addon.evidence.prediction.step import PressureStep
+from mu_addon.evidence.prediction.pressure_step import PressureStep
+from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose
 from mu_addon.evidence.simulator import Composite
 from tests.evidence import analytic, bench
 from tests.evidence.test_prediction_kinds import forces, held_response

@@ -9,7 +9,7 @@ from mu_addon.design.parameters import Printing, load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import lattice_fem
 from mu_addon.evidence.lattice_fem import OFFSETS_mm, at_offset, block_of, response, scalings
-from mu_addon.evidence.prediction.lattice import SLENDER, LatticeStress
+from mu_addon.evidence.prediction.lattice_compression import SLENDER, LatticeStress
 
 from .test_prediction_lattice import block
 

@@ -7,7 +7,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_fem import UnitSettings, unit_responses
 from mu_addon.measured import read_folder

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from mu_addon.errors import ConvergenceError
-from mu_addon.evidence.prediction.beam import GRAVITY, SHEAR, BeamSag, cantilever
+from mu_addon.evidence.prediction.beam_deadweight import GRAVITY, SHEAR, BeamSag, cantilever
 
 from .bench import experiment, measured, recovered
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.evidence.effect import LIBRARY, SHOWN_BY, Effect, Parameter
-from mu_addon.evidence.prediction.beam import BeamSag
+from mu_addon.evidence.prediction.beam_deadweight import BeamSag
 from mu_addon.evidence.prediction.coupon import CouponStress
-from mu_addon.evidence.prediction.hold import ChamberPressure
-from mu_addon.evidence.prediction.lattice import LatticeStress
-from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+from mu_addon.evidence.prediction.lattice_compression import LatticeStress
+from mu_addon.evidence.prediction.pressure_hold import ChamberPressure
+from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
 from mu_addon.measured.kinds import KINDS
 
 from .bench import experiment, parameters

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from mu_addon.evidence.prediction.hold import KIND, ROOM_K, ATMOSPHERE_kPa, ChamberPressure, chamber_pressure
+from mu_addon.evidence.prediction.pressure_hold import (
+    KIND,
+    ROOM_K,
+    ATMOSPHERE_kPa,
+    ChamberPressure,
+    chamber_pressure,
+)
 from mu_addon.evidence.simulator import Composite
 
 from .bench import experiment, measured, recovered

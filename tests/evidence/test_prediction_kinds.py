@@ -11,9 +11,9 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.prediction.blocked_force import BlockedForce, pressing
-from mu_addon.evidence.prediction.pose import STATIONS, UnitPose, between_stations
-from mu_addon.evidence.prediction.step import PressureStep
-from mu_addon.evidence.prediction.unit import UnitResponse, Variant
+from mu_addon.evidence.prediction.pressure_step import PressureStep
+from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose, between_stations
+from mu_addon.evidence.prediction.unit_pressure import UnitResponse, Variant
 from mu_addon.evidence.ringing import swinging
 from mu_addon.evidence.unit_effects import Body
 from mu_addon.evidence.unit_run import Run, run

@@ -12,7 +12,7 @@ from benchmarks.offset_fit import fit_offset
 from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.lattice import ComputedCell, LatticeStress, Struts
+from mu_addon.evidence.prediction.lattice_compression import ComputedCell, LatticeStress, Struts
 from mu_addon.evidence.simulator import Composite
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import read_folder

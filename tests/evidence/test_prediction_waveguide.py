@@ -5,7 +5,7 @@ import pytest
 
 from mu_addon.evidence.fit import Fitter, interval
 from mu_addon.evidence.noise import Source
-from mu_addon.evidence.prediction.waveguide import WaveguideVoltage
+from mu_addon.evidence.prediction.waveguide_bending import WaveguideVoltage
 from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
 

@@ -10,10 +10,10 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.diagnosis import diagnose, noise_of
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.lattice_fem import scalings
-from mu_addon.evidence.prediction.beam import BeamSag
+from mu_addon.evidence.prediction.beam_deadweight import BeamSag
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.hold import ChamberPressure
-from mu_addon.evidence.prediction.lattice import LatticeStress
+from mu_addon.evidence.prediction.lattice_compression import LatticeStress
+from mu_addon.evidence.prediction.pressure_hold import ChamberPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite

@@ -12,8 +12,7 @@ from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.drive import reading_noise
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.record import record
-from mu_addon.evidence.resolution import (
+from mu_addon.evidence.readings import (
     between_steps,
     clipped_readings,
     display_steps,
@@ -25,6 +24,7 @@ from mu_addon.evidence.resolution import (
     without_unpredicted_readings,
     wrong_readings,
 )
+from mu_addon.evidence.record import record
 from mu_addon.evidence.simulator import Composite
 from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import bench

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses

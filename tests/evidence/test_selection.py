@@ -8,10 +8,10 @@ import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
-from mu_addon.evidence.gain import gain
+from mu_addon.evidence.gain_on_unseen import gain
 from mu_addon.evidence.hypotheses import beside, hypotheses, ranked
 from mu_addon.evidence.noise import Source
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
 from mu_addon.evidence.search import one_more, reselected, select

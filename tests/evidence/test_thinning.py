@@ -8,7 +8,7 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.bench import bench_simulators
-from mu_addon.evidence.prediction.hold import chamber_pressure
+from mu_addon.evidence.prediction.pressure_hold import chamber_pressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.thinning import MOST, thinned
 from mu_addon.measured import table

@@ -13,7 +13,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.evidence.markers import attached, material_points, nearest
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body, down
 from mu_addon.evidence.unit_fem import (
     COARSE,

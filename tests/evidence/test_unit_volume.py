@@ -7,7 +7,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_volume
 from mu_addon.design.quantity import in_MPa
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.prediction.unit import UnitPressure, UnitResponse
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.unit_effects import Body
 from mu_addon.evidence.unit_fem import Run, UnitSettings, run, unit_responses

@@ -11,7 +11,7 @@ from mu_addon.evidence.diagnosis import diagnose, noise_of
 from mu_addon.evidence.effect import LIBRARY, Effect, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, extended_model, load_model, stacked
 from mu_addon.evidence.fit import Fitter
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.sensitivity import best_seen, sensitivities, similarity
 from mu_addon.evidence.simulator import Composite

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from mu_addon.fem.law_at_points import evaluate
 from mu_addon.fem.laws.tensors import mat33
-from mu_addon.fem.point import evaluate
 
 f64 = wp.float64
 

@@ -15,7 +15,7 @@ from mu_addon.fem.arc import ContinuationSettings
 from mu_addon.fem.continuation import limit_pressure, trace_branch
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import LDL, IndefiniteError
-from mu_addon.fem.inertia import Inertia
+from mu_addon.fem.indefinite import Inertia
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON, NewtonSettings

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mu_addon.homogenize.effective import read_effective
+from mu_addon.homogenize.effective_file import read_effective
 
 from .processes import here
 

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from mu_addon.homogenize.effective import read_effective, write_effective
+from mu_addon.homogenize.effective_file import read_effective, write_effective
 
 from ..homogenize.lattice_laws import body_centred
 from .processes import assert_clear_failure, here, run

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mu_addon.fem.laws import Foam
-from mu_addon.homogenize.effective import Effective
+from mu_addon.homogenize.effective_file import Effective
 from mu_addon.homogenize.foam_fit import Misfit
 
 

@@ -6,8 +6,8 @@ import pytest
 from scipy.optimize import brentq
 
 from mu_addon.errors import InputError
+from mu_addon.fem.law_at_points import evaluate
 from mu_addon.fem.laws import Foam
-from mu_addon.fem.point import evaluate
 from mu_addon.homogenize.foam_fit import (
     fit_foam,
     lattice_law,

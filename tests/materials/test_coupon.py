@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.fem.law_at_points import evaluate
 from mu_addon.fem.laws import Foam, MooneyRivlin, NeoHooke, Ogden, Prony, Yeoh
-from mu_addon.fem.point import evaluate
 from mu_addon.materials.coupon import (
     MODES,
     Coupon,

@@ -3,7 +3,7 @@
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.evidence.prediction.unit import pressure_histories
+from mu_addon.evidence.prediction.unit_pressure import pressure_histories
 from mu_addon.measured import read_folder
 
 CSV = "time_s,pressure_kPa,angle_deg\n0,0,0\n1,10,3\n2,20,7\n3,{peak},8\n"

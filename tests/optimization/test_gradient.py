@@ -11,7 +11,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.optimization.freedoms import Freedom, changed_unit
 from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import AirVolume, Angle, RestStiffness, Stretch
-from mu_addon.optimization.sensor import Disturbance
+from mu_addon.optimization.sensor_quantities import Disturbance
 from mu_addon.optimization.structure import Structure, solve
 from mu_addon.optimization.unit_body import Mechanics, UnitBody
 

@@ -11,7 +11,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.wall import Wall
 from mu_addon.errors import InputError
 from mu_addon.fem.bending_angle import TipSection
-from mu_addon.fem.carried import Carried, following
+from mu_addon.fem.carried_nodes import Carried, following
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.obstacle import Obstacle

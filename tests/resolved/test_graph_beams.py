@@ -11,7 +11,7 @@ from mu_addon.design.lattice import filled
 from mu_addon.design.lattices import BODY_CENTRED, LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
-from mu_addon.fem.carried import following
+from mu_addon.fem.carried_nodes import following
 from mu_addon.fem.elements import reference_gradients
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials

@@ -11,7 +11,7 @@ from mu_addon.design.lattice import lattice_of
 from mu_addon.design.solid import build_solid
 from mu_addon.design.surface import volume
 from mu_addon.errors import InputError
-from mu_addon.fem.carried import following
+from mu_addon.fem.carried_nodes import following
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_NEWTON

@@ -25,7 +25,7 @@ from mu_addon.design.surface import stl_bytes, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
-from mu_addon.homogenize.effective import read_effective
+from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.measured.folder import read_folder
 from mu_addon.sensing.recording import read_recording
 from mu_addon.usecases.grip.phases import read_phases, shipped_phases

@@ -27,7 +27,7 @@ from mu_addon.errors import InputError
 from mu_addon.evidence.extended import load_model
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.files import read_npz
-from mu_addon.homogenize.effective import read_effective
+from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.materials.library import read_material
 from mu_addon.measured import table
 from mu_addon.measured.folder import read_folder

@@ -13,7 +13,7 @@ from mu_addon.design.waveguide import waveguide
 from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.sensing.embedded_waveguide import Joints, WaveguideShape, embed_waveguide
 from mu_addon.sensing.guide import Centreline
-from mu_addon.sensing.law import straight_guide
+from mu_addon.sensing.light_law import straight_guide
 from mu_addon.sensing.notched import well_angles, with_wells
 
 from .bars import bent_to_a_circle, body, of_window

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from mu_addon.evidence.prediction.lattice import Struts
+from mu_addon.evidence.prediction.lattice_compression import Struts
 from tests.evidence import analytic
 
 SCALES = (0.75, 1.0, 1.5)

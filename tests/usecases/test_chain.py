@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mu_addon.chain.body import PlateBody
+from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.cli.main import main
 from mu_addon.errors import InputError
 from mu_addon.usecases.chain.job import LAYOUT, read_chain, read_job, read_pressures

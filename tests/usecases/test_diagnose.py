@@ -15,8 +15,8 @@ from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.evidence.effect import LIBRARY, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
-from mu_addon.evidence.prediction.lattice import LatticeStress
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.lattice_compression import LatticeStress
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end

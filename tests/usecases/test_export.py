@@ -208,7 +208,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
     def missing(*_):
         raise meshing_lattice.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
 
-    monkeypatch.setattr("mu_addon.meshing.step.load_gmsh", missing)
+    monkeypatch.setattr("mu_addon.meshing.step_file.load_gmsh", missing)
     job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
     context, messages = run(EXPORT, job, tmp_path)
     assert context.status == 0

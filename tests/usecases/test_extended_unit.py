@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import ExtendedModel, Fitted
-from mu_addon.evidence.prediction.lattice import LatticeStress
+from mu_addon.evidence.prediction.lattice_compression import LatticeStress
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import Experiment
 from mu_addon.usecases.simulate_and_place.extended_unit import extend, read_extended, require_same_print

@@ -7,7 +7,7 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.homogenize.effective import read_effective
+from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress

@@ -16,7 +16,7 @@ from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import ExtendedModel, Fitted
-from mu_addon.evidence.prediction.unit import UnitPressure
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body
 from mu_addon.evidence.unit_fem import Run, run
 from mu_addon.fem.bending_angle import bending_angle_deg

@@ -9,8 +9,8 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.fem.linear_solver import SolverChoice
 from mu_addon.fem.protocol import Protocol
-from mu_addon.fem.solver import SolverChoice
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.run.folder import keep_inputs

@@ -15,9 +15,9 @@ from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.blocked_force import BlockedForce
-from mu_addon.evidence.prediction.pose import STATIONS, UnitPose
-from mu_addon.evidence.prediction.step import PressureStep
-from mu_addon.evidence.prediction.unit import UnitPressure, UnitResponse, Variant
+from mu_addon.evidence.prediction.pressure_step import PressureStep
+from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose
+from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
 from mu_addon.evidence.verdict import Verdict
 from mu_addon.measured import Experiment, read_folder

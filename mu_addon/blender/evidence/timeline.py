@@ -93,7 +93,7 @@ def _angles(frame: Any, course: Course, frames: Any, long: float) -> list[Any]:
 def _markers(frame: Any, course: Course, frames: Any, radius: float) -> list[Any]:
     """A ball for each marker as measured, a ring around it for each model's.
 
-    One that was not seen along x moves in the sagittal plane.
+    One that was not seen along x moves in the plane of bending.
     """
     made = []
     for row, (series, channels) in enumerate(course.series.items()):

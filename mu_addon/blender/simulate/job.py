@@ -62,7 +62,7 @@ def job_of(root: Any) -> Job:
     """Study job from a unit's properties; raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
-        from ...fem.solver import SolverChoice
+        from ...fem.linear_solver import SolverChoice
         from ...meshing.settings import QUICK, RESOLVED, MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:

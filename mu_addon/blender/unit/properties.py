@@ -21,7 +21,7 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
-from ...fem.solver import DEVICE, SOLVER
+from ...fem.linear_solver import DEVICE, SOLVER
 from ...meshing.settings import SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
 from ..shared.registration import property_group_factory

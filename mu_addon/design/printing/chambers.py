@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .runs import Parts, parts_of, runs_of
+from .cell_runs import Parts, parts_of, runs_of
 from .voxels import VoxelRows
 
 Array = NDArray[np.float64]

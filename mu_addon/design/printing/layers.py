@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from .runs import Runs, joined, meeting
+from .cell_runs import Runs, joined, meeting
 from .voxels import VoxelRows
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..surface import Triangles, Vertices
-from .runs import Runs
+from .cell_runs import Runs
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

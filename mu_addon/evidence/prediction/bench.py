@@ -7,11 +7,12 @@ from types import MappingProxyType
 
 from ...measured import Experiment
 from ..simulator import Simulator
-from . import beam, coupon, hold, lattice, waveguide
+from . import beam_deadweight, coupon, lattice_compression, pressure_hold, waveguide_bending
 
 
 def bench_simulators(
-    experiments: Sequence[Experiment], scalings: Mapping[str, lattice.Scaling] = MappingProxyType({})
+    experiments: Sequence[Experiment],
+    scalings: Mapping[str, lattice_compression.Scaling] = MappingProxyType({}),
 ) -> dict[str, Simulator]:
     """Simulators of the kinds among the experiments, by kind; unit_pressure has none here.
 
@@ -19,11 +20,11 @@ def bench_simulators(
     struts where none is given.
     """
     every: dict[str, Simulator] = {
-        beam.KIND: beam.BeamSag(),
+        beam_deadweight.KIND: beam_deadweight.BeamSag(),
         coupon.KIND: coupon.CouponStress(experiments),
-        hold.KIND: hold.ChamberPressure(experiments),
-        lattice.KIND: lattice.LatticeStress(experiments, scalings),
-        waveguide.KIND: waveguide.WaveguideVoltage(),
+        pressure_hold.KIND: pressure_hold.ChamberPressure(experiments),
+        lattice_compression.KIND: lattice_compression.LatticeStress(experiments, scalings),
+        waveguide_bending.KIND: waveguide_bending.WaveguideVoltage(),
     }
     kinds = {e.kind for e in experiments}
     return {kind: simulator for kind, simulator in every.items() if kind in kinds}

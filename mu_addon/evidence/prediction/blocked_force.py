@@ -16,7 +16,7 @@ from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
 from .instruments import amplified, amplifier, before_the_gauge, filtered
-from .unit import (
+from .unit_pressure import (
     GAUGE_SHARE,
     REFERENCE_C,
     RELAXING,

@@ -17,7 +17,7 @@ from .drift import drift, drifts, largest_reading
 from .effective_pressure import decades_lag, first_order_lag, spread_lag
 from .instants import finer
 from .instruments import FILTERED, amplified, amplifier, filtered
-from .unit import REFERENCE_C, RELAXING, SPREADING, TIMED
+from .unit_pressure import REFERENCE_C, RELAXING, SPREADING, TIMED
 from .yielding import bouc_wen, elastic_strain, yielded, yielding
 
 Array = np.ndarray[Any, Any]

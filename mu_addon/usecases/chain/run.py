@@ -10,11 +10,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...chain.body import frame, spread
 from ...chain.chain import Chain, ChainState, Link, Loads
 from ...chain.inverse import Reach, reach_point
 from ...chain.learning import Learned, learn
 from ...chain.settings import REFINE
+from ...chain.unit_between_plates import frame, spread
 from ...design.parameters import Unit
 from ...errors import ConvergenceError
 from ...fem.state import State

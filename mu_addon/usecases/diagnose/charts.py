@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...evidence.gain import Errors
+from ...evidence.gain_on_unseen import Errors
 from ...evidence.residuals import Dependence
 from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from .judged_data import Curve

@@ -16,10 +16,9 @@ from ...errors import InputError
 from ...evidence.diagnosis import diagnose
 from ...evidence.drive import reading_noise
 from ...evidence.extended import ExtendedModel, Fitted, extended_model, stacked
-from ...evidence.prediction import lattice
-from ...evidence.prediction import unit as unit_pressure
+from ...evidence.prediction import lattice_compression, unit_pressure
 from ...evidence.prediction.effective_pressure import REFERENCE
-from ...evidence.resolution import STAYS, dwell, quantum
+from ...evidence.readings import STAYS, dwell, quantum
 from ...evidence.simulator import Composite, Simulator
 from ...evidence.verdict import Verdict
 from ...files import write_csv, write_json
@@ -98,8 +97,8 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         of_a_unit = any(e.kind in OF_A_UNIT for e in measured.experiments)
         settings = settings.further(verdict.in_question) if of_a_unit else None
     notes += _known_before(job, simulator)
-    model, block = _extended_model(verdict, simulator), simulators.get(lattice.KIND)
-    if isinstance(block, lattice.LatticeStress) and block.computed:
+    model, block = _extended_model(verdict, simulator), simulators.get(lattice_compression.KIND)
+    if isinstance(block, lattice_compression.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
         notes += _resin(model, unit)
     model = with_reference(model, simulators)
@@ -188,7 +187,7 @@ def _known_before(job: Job, simulator: Composite) -> list[str]:
 
 def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
     """Resin's modulus that corresponds to the fitted modulus of a computed block, in words."""
-    fitted = model.nuisances.get(lattice.MODULUS.name)
+    fitted = model.nuisances.get(lattice_compression.MODULUS.name)
     if fitted is None or model.lattice is None or unit is None:
         return []
     drawn = float(model.lattice.modulus_MPa(1.0, 0.0, 1.0))

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...design.parameters import Unit
 from ...errors import InputError
-from ...evidence.prediction import blocked_force, lattice, pose, step
-from ...evidence.prediction import unit as unit_pressure
+from ...evidence.prediction import blocked_force, lattice_compression, pressure_step, unit_pose, unit_pressure
 from ...evidence.prediction.bench import bench_simulators
 from ...evidence.simulator import Simulator
 from ...measured import Experiment
@@ -30,8 +29,8 @@ TOUCHING_KPA, TOUCHING = -8.0, 2.0
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
     unit_pressure.KIND: unit_pressure.UnitPressure,
-    step.KIND: step.PressureStep,
-    pose.KIND: pose.UnitPose,
+    pressure_step.KIND: pressure_step.PressureStep,
+    unit_pose.KIND: unit_pose.UnitPose,
 }
 
 
@@ -68,7 +67,7 @@ def simulators_of(
     `cache`.
     """
     remarks: list[str] = []
-    scalings: Mapping[str, lattice.Scaling] = {}
+    scalings: Mapping[str, lattice_compression.Scaling] = {}
     if any(e.cells for e in experiments):
         assert unit is not None
         from ...evidence.lattice_fem import scalings as computed

@@ -11,7 +11,7 @@ import numpy as np
 from ...evidence.effect import FORCE_SCALE, OF, SLIP, Effect, Parameter
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
-from ...evidence.prediction.unit import MODULUS
+from ...evidence.prediction.unit_pressure import MODULUS
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.selection import Cause

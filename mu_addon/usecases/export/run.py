@@ -192,7 +192,7 @@ class Export:
         self._add(name, "actuator and waveguide as meshes, lattice as beams, nominal size, mm", measured)
 
     def _step(self, solid: Solid) -> None:
-        from ...meshing.step import bodies, step_volume, write_step
+        from ...meshing.step_file import bodies, step_volume, write_step
 
         d = self.job.unit.dimensions
         try:

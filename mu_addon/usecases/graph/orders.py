@@ -16,7 +16,7 @@ from ...design.settings import PRINTER
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...homogenize.effective import Effective, read_effective
+from ...homogenize.effective_file import Effective, read_effective
 from ...measured import Measured
 from ...meshing.settings import HOMOGENISED, MeshSettings
 from ...placement.settings import PRINTED, rules_of

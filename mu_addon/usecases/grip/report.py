@@ -15,9 +15,9 @@ from ...report.html import cards, facts_table, figure, note, page, picture_figur
 from ...report.results import Picture
 from ...run.versions import package_versions
 from . import charts as pictures
-from .gripping import Gripping
 from .path_deviation import published_deviations
 from .phases import MEANING
+from .stages import Gripping
 
 FILES = {
     "grip.toml": "inputs of this run",

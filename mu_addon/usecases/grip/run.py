@@ -12,11 +12,11 @@ from ...meshing.settings import MeshSettings
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .grasp import Cube
-from .gripping import Gripping
 from .job import LAYOUT, Job, plan_of, read_job
 from .path_deviation import path_deviations
 from .report import write_report
 from .settings import REFINE, SIDES
+from .stages import Gripping
 
 
 def grip(job: Job, folder: Path, context: RunContext) -> Gripping:

@@ -15,7 +15,7 @@ from ...fem.materials import Materials
 from ...files import write_bytes, write_csv
 from ...homogenize.cell_mesh import cell_materials, mesh_cell
 from ...homogenize.compression import Compressed, Compression, Friction, compress
-from ...homogenize.effective import Effective, effective, write_effective
+from ...homogenize.effective_file import Effective, effective, write_effective
 from ...homogenize.elasticity import Elasticity, effective_tensor
 from ...homogenize.foam_fit import FoamFit, fit_foam
 from ...homogenize.modulus import Curve, moduli

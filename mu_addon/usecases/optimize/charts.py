@@ -98,7 +98,7 @@ def course(found: Optimised) -> str:
 
 
 def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None = None) -> str:
-    """SVG of a unit cut along its sagittal plane, all units at one scale: wall, chambers, struts, envelope.
+    """SVG of a unit cut along its plane of bending, all units at one scale: wall, chambers, struts, envelope.
 
     Struts are those of the half cell on one side of the plane, at their own thickness. body: in place of the
     lattice's box.
@@ -158,7 +158,7 @@ def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float, b
 
 
 def _strut_outlines(d: Dimensions) -> list[Array]:
-    """Outlines of the struts beside the sagittal plane: y and z in mm of each in turn."""
+    """Outlines of the struts beside the plane of bending: y and z in mm of each in turn."""
     lattice = lattice_of(d)
     rows = struts_beside_section(lattice)
     first, last = (lattice.nodes[lattice.struts[rows, end]][:, None, 1:] for end in (0, 1))

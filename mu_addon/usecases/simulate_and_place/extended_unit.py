@@ -13,9 +13,9 @@ from ...design.strut_cell import strut_cell
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, Fitted, load_model
 from ...evidence.lattice_fem import printed
-from ...evidence.prediction.lattice import SLENDER, ComputedCell
+from ...evidence.prediction.lattice_compression import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
-from ...homogenize.effective import Effective
+from ...homogenize.effective_file import Effective
 from ..diagnose.words import readable
 from .named_effects import NAMES, NamedEffects, law_within
 

@@ -18,6 +18,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.rigid_body import RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
+from ...fem.linear_solver import SolverChoice
 from ...fem.newton_settings import (
     CONTACT_NEWTON,
     RESOLVED_CONTACT_NEWTON,
@@ -26,7 +27,6 @@ from ...fem.newton_settings import (
     NewtonSettings,
 )
 from ...fem.protocol import Protocol, read_protocol
-from ...fem.solver import SolverChoice
 from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
 from ...placement.graph import Limits
 from ...placement.settings import PRINTED, RULES
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     # The inputs of a study are made without the solver: Blender's window waits for them.
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...homogenize.effective import Effective
+    from ...homogenize.effective_file import Effective
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
@@ -371,7 +371,7 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
     if "simulate" in tables:
         job["protocol"] = read_protocol(folder / FILES["protocol"])
         if "lattice" in tables["simulate"]:
-            from ...homogenize.effective import read_effective
+            from ...homogenize.effective_file import read_effective
 
             job["lattice"] = read_effective(folder / FILES["lattice"])
         if "obstacles" in tables["simulate"]:

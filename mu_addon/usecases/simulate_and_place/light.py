@@ -15,8 +15,15 @@ from ...report.results import Checks, Signals
 from ...run.cache import Cache, key
 from ...sensing.embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from ...sensing.guide import Optics
-from ...sensing.law import CURVATURE_OF_WELLS, Law, features, fit_law
-from ...sensing.signal import best_sets, differential_pairs, pareto, response, signal_of_nodes, traced_signal
+from ...sensing.light_law import CURVATURE_OF_WELLS, Law, features, fit_law
+from ...sensing.light_signal import (
+    best_sets,
+    differential_pairs,
+    pareto,
+    response,
+    signal_of_nodes,
+    traced_signal,
+)
 
 if TYPE_CHECKING:
     from ...design.dimensions import Dimensions

@@ -17,7 +17,7 @@ from ...homogenize.foam_response import ellipticity
 from ...meshing.mesh import LATTICE
 
 if TYPE_CHECKING:
-    from ...homogenize.effective import Effective
+    from ...homogenize.effective_file import Effective
     from ...meshing.mesh import Mesh
     from .job import Job
 

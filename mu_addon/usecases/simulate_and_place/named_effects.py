@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import InputError, did_you_mean
 from ...evidence.effect import LIBRARY, Parameter
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
-from ...evidence.prediction.unit import RELAXING, SPREADING, TIMED, TWO_VOLUMES
+from ...evidence.prediction.unit_pressure import RELAXING, SPREADING, TIMED, TWO_VOLUMES
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
 from .settings import ORIENTATION

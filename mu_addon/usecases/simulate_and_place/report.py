@@ -97,7 +97,7 @@ def _headline(r: ReportData) -> str:
     sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
     section = figure(
         plots.unit_with_paths(r.view, r.paths, chosen, rule.j_hat if rule is not None else None),
-        "Left: the unit cut open along its sagittal plane, inlet below, with anchors P1 to "
+        "Left: the unit cut open along the plane in which it bends, inlet below, with anchors P1 to "
         f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
         + (", with its mean deviation in mm." if rule is not None else "."),
         "Section of the unit, and the candidate paths beside it"

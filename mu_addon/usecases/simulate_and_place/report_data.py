@@ -26,7 +26,7 @@ from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
 
 if TYPE_CHECKING:
-    from ...homogenize.effective import Effective
+    from ...homogenize.effective_file import Effective
     from .named_effects import NamedEffects
     from .study import Study
 

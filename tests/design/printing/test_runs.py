@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_edt, label
 
 from mu_addon.design import shapes
+from mu_addon.design.printing.cell_runs import meeting, parts_of, runs_of
 from mu_addon.design.printing.chambers import DEEP, distance_field
 from mu_addon.design.printing.layers import regions
-from mu_addon.design.printing.runs import meeting, parts_of, runs_of
 from mu_addon.design.printing.slices import Layers, slices
 from mu_addon.design.printing.voxels import voxel_rows
 

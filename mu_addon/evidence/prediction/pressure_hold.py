@@ -16,7 +16,7 @@ from ..effect import Effect, Parameter
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import lag_weights
 from .instruments import CURVE, as_read, gauge
-from .unit import GAUGE_SHARE
+from .unit_pressure import GAUGE_SHARE
 
 Array = np.ndarray[Any, Any]
 

@@ -8,7 +8,7 @@ import pytest
 
 from mu_addon.errors import InputError, OutputError
 from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam
-from mu_addon.homogenize.effective import (
+from mu_addon.homogenize.effective_file import (
     effective,
     parse_effective,
     read_effective,

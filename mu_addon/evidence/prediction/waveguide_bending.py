@@ -10,7 +10,7 @@ import numpy as np
 from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .effective_pressure import play_operator
-from .unit import TIMED
+from .unit_pressure import TIMED
 
 Array = np.ndarray[Any, Any]
 

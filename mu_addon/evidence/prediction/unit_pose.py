@@ -14,7 +14,7 @@ from ...measured import Experiment
 from ..effect import Effect, Parameter
 from .drift import largest_reading
 from .instruments import before_the_gauge
-from .unit import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
+from .unit_pressure import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
 
 Array = np.ndarray[Any, Any]
 

@@ -26,7 +26,7 @@ from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
 from ...sensing.embedded_waveguide import Joints, embed_waveguide
-from ...sensing.signal import Signal, traced_signal
+from ...sensing.light_signal import Signal, traced_signal
 from ..simulate_and_place.job import in_time_newton
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job

@@ -8,7 +8,7 @@ import numpy as np
 
 from .factor import LDL, IndefiniteError
 from .model import Model
-from .pattern import Pattern
+from .sparsity import Pattern
 
 Array = np.ndarray[Any, Any]
 

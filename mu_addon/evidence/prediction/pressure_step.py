@@ -12,7 +12,7 @@ from ...measured import Experiment
 from ..effect import Effect, Parameter
 from ..ringing import swinging
 from .instants import SHARE, finer
-from .unit import UnitPressure, UnitResponse
+from .unit_pressure import UnitPressure, UnitResponse
 
 Array = np.ndarray[Any, Any]
 

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..meshing.mesh import Mesh
 from .embedded_waveguide import EmbeddedWaveguide, Joints, embed_waveguide
 from .guide import Optics
-from .law import Law, features, fit_law, traced
+from .light_law import Law, features, fit_law, traced
 
 Array = np.ndarray[Any, Any]
 

@@ -11,7 +11,7 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.sensing.guide import Centreline, Optics, arc
-from mu_addon.sensing.law import FEATURES, MISFIT, Law, features, fit_law, straight_guide, traced
+from mu_addon.sensing.light_law import FEATURES, MISFIT, Law, features, fit_law, straight_guide, traced
 from mu_addon.sensing.notched import well_angles
 
 D = load_preset("mu-1.0x").dimensions

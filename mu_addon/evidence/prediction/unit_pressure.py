@@ -72,11 +72,11 @@ class UnitResponse:
     """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
-    of their effect. orientation_deg, orientation_axis: see `pose.down`. walls: by the side of the unit they
-    stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and along their end slopes beyond the
-    last pressures. discrepancy: standard deviation between codes of the same physics, as a smooth change of
-    the pressure over the largest one; 0 where the response is exact. gap_mm: of the load cell that holds the
-    tip, where one does. Raises InputError for fewer than four pressures and for shapes that do not match.
+    of their effect. orientation_deg, orientation_axis: see `unit_pose.down`. walls: by the side of the unit
+    they stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and along their end slopes beyond
+    the last pressures. discrepancy: standard deviation between codes of the same physics, as a smooth change
+    of the pressure over the largest one; 0 where the response is exact. gap_mm: of the load cell that holds
+    the tip, where one does. Raises InputError for fewer than four pressures and for shapes that do not match.
     """
 
     channels: tuple[str, ...]

@@ -11,8 +11,8 @@ from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.sensing.guide import Optics
-from mu_addon.sensing.law import FEATURES, Law, features
-from mu_addon.sensing.signal import (
+from mu_addon.sensing.light_law import FEATURES, Law, features
+from mu_addon.sensing.light_signal import (
     best_sets,
     differential_pairs,
     pareto,

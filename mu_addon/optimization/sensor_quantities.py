@@ -16,8 +16,8 @@ from ..fem.kinematics import probe
 from ..placement.deviation import centreline
 from ..sensing.embedded_waveguide import Joints, embed_waveguide
 from ..sensing.guide import Optics
-from ..sensing.law import Law, fit_law
-from ..sensing.signal import response, signal_of_nodes
+from ..sensing.light_law import Law, fit_law
+from ..sensing.light_signal import response, signal_of_nodes
 from .structure import WITHOUT, Condition, States, Structure
 
 Array = np.ndarray[Any, Any]
