@@ -11,6 +11,7 @@ import numpy as np
 
 from ..measured import Experiment
 from .acceptance import too_far
+from .detection_limits import at_bounds, with_true_limits
 from .drive import denoised_drives
 from .effect import Effect, Parameter
 from .fit import Fit, Fitter, interval, interval_by_curvature
@@ -33,10 +34,8 @@ from .selection import FALSE_ALARM_RATE, Selection
 from .sensitivity import (
     WANDERING,
     Sensitivity,
-    at_bounds,
     sensitivities,
     signatures,
-    with_true_limits,
 )
 from .simulator import Composite
 from .thinning import thinned

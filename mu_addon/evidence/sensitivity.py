@@ -19,9 +19,6 @@ Array = np.ndarray[Any, Any]
 
 # Delta chi squared of 16: detected in nearly every data set, corrected for a library of some 25 effects.
 SEEN = 4.0
-# Share of it that the base model must leave of data made with an effect of its limit, and the factor by which
-# a limit of less is raised.
-LEFT, RAISED = 0.8, 1.4
 # Root of delta chi squared below which an effect, at its largest, explains nothing visible.
 WORTH = 2.0
 # Below this share an effect is a nuisance by another name.
@@ -154,67 +151,6 @@ def sensitivities(
             share = rest / whole if whole > 0 else 0.0
             found.append(Sensitivity(e, shape, left, share, limit, absorbed))
     return found
-
-
-def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]) -> list[Sensitivity]:
-    """The same sensitivities, with `at_bounds` computed for effects not visible to first order.
-
-    The base model is fitted to the prediction at each bound of the size, and `at_bounds` is the root of the
-    chi squared left (no unit) beyond that without the effect. Bounds without a solution are skipped.
-    """
-    judged, plain = [], _missed(fitter, values, values)
-    for s in found:
-        if s.linear or s.unabsorbed <= ABSORBED:
-            judged.append(s)
-            continue
-        p, most = s.effect.parameters[0], 0.0
-        for bound in {p.low, p.high} - {p.null}:
-            chi2 = _missed(fitter, values, {**values, **s.shape, s.effect.keys[0]: bound}) - plain
-            if math.isfinite(chi2):
-                most = max(most, math.sqrt(max(chi2, 0.0)))
-        judged.append(attrs.evolve(s, at_bounds=most))
-    return judged
-
-
-def with_true_limits(
-    fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]
-) -> list[Sensitivity]:
-    """The same sensitivities, the limit of each effect's best shape at least where data made with it differ.
-
-    To first order nuisances absorb an effect as much as a small one; a large one they may follow further, as
-    another modulus does a thinner wall. The base model is fitted to the prediction with the effect of its
-    limit, of either sign, and the limit raised until that leaves `LEFT` of its delta chi squared; to infinity
-    beyond the effect's bounds. values: of the nuisances, by name and in their units.
-    """
-    best = {id(s) for s in best_seen(found).values()}
-    judged, plain = [], _missed(fitter, values, values)
-    for s in found:
-        p, limit, key = s.effect.parameters[0], s.limit, s.effect.keys[0]
-        while id(s) in best and s.linear and math.isfinite(limit):
-            sizes = [p.null + sign * limit for sign in (-1.0, 1.0)]
-            within = [size for size in sizes if p.low <= size <= p.high]
-            left = [_missed(fitter, values, {**values, **s.shape, key: size}) - plain for size in within]
-            if not left:
-                limit = math.inf
-            elif min(left) >= LEFT * SEEN**2:
-                break
-            else:
-                limit *= RAISED
-        judged.append(attrs.evolve(s, limit=limit))
-    return judged
-
-
-def _missed(fitter: Fitter, values: Mapping[str, float], truth: Mapping[str, float]) -> float:
-    """Chi squared of the base model's fit, from values, to the prediction of others; inf where there is none.
-
-    Without noise, so that of the values themselves it is what these cost by prior knowledge.
-    """
-    try:
-        imagined = attrs.evolve(fitter.record, values=fitter.predict(truth))
-        return Fitter(imagined, fitter.simulator, fitter.sources, None, fitter.whitening).fit((), values).chi2
-    except MuError:
-        # Not every law has a solution there.
-        return math.inf
 
 
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:

@@ -9,7 +9,7 @@ import warp as wp
 
 from ..errors import InputError
 from ..meshing.mesh import AXES, TRIANGLE_EDGES
-from . import kernels
+from . import follower_pressure
 from .laws.tensors import mat33
 from .model import MaterialData, Model
 
@@ -68,7 +68,7 @@ class CloggedModel(Model):
         residual = super().residual(u, pressure, m)
         lost = -self.share_lost * pressure
         inputs = [lost, self._x, self._lost_faces, *self._face_rule, 0, self._lost_force]
-        wp.launch(kernels.pressure_force, len(self._beyond), inputs, device=self.device)
+        wp.launch(follower_pressure.pressure_force, len(self._beyond), inputs, device=self.device)
         np.add.at(residual, self.mesh.cavity[self._beyond], self._lost_force.numpy())
         self._add_cone(residual, self.mesh.nodes + u, lost)
         return residual
@@ -81,11 +81,18 @@ class CloggedModel(Model):
         self._place(u)
         self._launch_layers("stiffness", m, [self._mean_slope, self._block_parts])
         inputs = [self._x, self._faces, *self._face_rule, self._element_blocks, self._block_parts]
-        wp.launch(kernels.pressure_stiffness, len(self.mesh.cavity), [pressure, *inputs], device=self.device)
+        wp.launch(
+            follower_pressure.pressure_stiffness,
+            len(self.mesh.cavity),
+            [pressure, *inputs],
+            device=self.device,
+        )
         if self.share_lost:
             inputs = [self._x, self._lost_faces, *self._face_rule, 0, self._lost_blocks]
             lost = -self.share_lost * pressure
-            wp.launch(kernels.pressure_stiffness, len(self._beyond), [lost, *inputs], device=self.device)
+            wp.launch(
+                follower_pressure.pressure_stiffness, len(self._beyond), [lost, *inputs], device=self.device
+            )
             parts = self._block_parts.numpy()
             at = self._element_blocks + self._beyond[:, None] * self._pairs + np.arange(self._pairs)
             parts[at.ravel()] += self._lost_blocks.numpy()
@@ -99,7 +106,7 @@ class CloggedModel(Model):
         """
         self._place(u)
         inputs = [self._x, self._lost_faces, *self._face_rule, self._lost_volume]
-        wp.launch(kernels.enclosed_volume, len(self._beyond), inputs, device=self.device)
+        wp.launch(follower_pressure.enclosed_volume, len(self._beyond), inputs, device=self.device)
         x = self.mesh.nodes + u
         apex = self._apex(x)
         _, area = self._cone(x, apex)

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..errors import InputError
 from ..meshing.mesh import AXES
-from . import kernels
+from . import follower_pressure, kernels
 from .beam_fibres import fibres_of, mixtures
 from .beams import Beams, frames_along, sections_of
 from .carried_nodes import Carried, Folding
@@ -569,7 +569,7 @@ class Model:
         if len(self.mesh.cavity) == 0:
             return 0.0
         inputs = [self._x, self._faces, *self._face_rule, self._face_volume]
-        wp.launch(kernels.enclosed_volume, len(self.mesh.cavity), inputs, device=self.device)
+        wp.launch(follower_pressure.enclosed_volume, len(self.mesh.cavity), inputs, device=self.device)
         return float(self._face_volume.numpy().sum())
 
     def cavity_volume(self, u: Array) -> float:
@@ -605,7 +605,7 @@ class Model:
         self._launch_layers("force", m, [self._mean_slope, self._element_force])
         for part_MPa, first, faces in self._pressures(pressure):
             inputs = [part_MPa, self._x, faces, *self._face_rule, first, self._face_force]
-            wp.launch(kernels.pressure_force, len(faces), inputs, device=self.device)
+            wp.launch(follower_pressure.pressure_force, len(faces), inputs, device=self.device)
         inputs = [self._parts, *self._node_lists, self._residual]
         wp.launch(kernels.gather_vectors, len(self.mesh.nodes), inputs, device=self.device)
         residual: Array = self._residual.numpy().copy()
@@ -639,7 +639,7 @@ class Model:
         for part_MPa, first, faces in self._pressures(pressure):
             inputs = [part_MPa, self._x, faces, *self._face_rule]
             inputs += [self._element_blocks + first * per_face, self._block_parts]
-            wp.launch(kernels.pressure_stiffness, len(faces), inputs, device=self.device)
+            wp.launch(follower_pressure.pressure_stiffness, len(faces), inputs, device=self.device)
         values = self._values(u, pressure, m, convex)
         if self.self_contact is None and self.pattern is self._own_pattern:
             return values

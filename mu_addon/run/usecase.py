@@ -11,8 +11,7 @@ import attrs
 from .context import RunContext
 from .folder import FolderLayout, begin
 from .processes import require_memory
-from .progress_estimate import Plan
-from .remaining import remaining, shares_done
+from .progress_estimate import Plan, remaining, shares_done
 
 Job = TypeVar("Job")
 

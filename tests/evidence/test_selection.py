@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.evidence.detection_limits import LEFT, with_true_limits
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
 from mu_addon.evidence.gain_on_unseen import gain
@@ -15,7 +16,7 @@ from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import record
 from mu_addon.evidence.residuals import dependence_table, strict_table, structure
 from mu_addon.evidence.search import one_more, reselected, select
-from mu_addon.evidence.sensitivity import LEFT, SEEN, best_seen, sensitivities, with_true_limits
+from mu_addon.evidence.sensitivity import SEEN, best_seen, sensitivities
 from mu_addon.evidence.simulator import Composite
 from tests.evidence import analytic, stand_ins
 

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from mu_addon.errors import InputError
-from mu_addon.fem import kernels
+from mu_addon.fem import follower_pressure
 from mu_addon.fem.model import Model
 from mu_addon.meshing.mesh import Mesh
 
@@ -58,5 +58,5 @@ class CavitiesModel(Model):
     def _volumes_mm3(self) -> Array:
         for (_, faces), out in zip(self._parts_of_cavity, self._volumes, strict=True):
             inputs = [self._x, faces, *self._face_rule, out]
-            wp.launch(kernels.enclosed_volume, len(faces), inputs, device=self.device)
+            wp.launch(follower_pressure.enclosed_volume, len(faces), inputs, device=self.device)
         return np.array([out.numpy().sum() for out in self._volumes])

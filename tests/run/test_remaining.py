@@ -4,7 +4,7 @@ import pytest
 
 from mu_addon.errors import MuError
 from mu_addon.run.progress import Progress, log_file
-from mu_addon.run.remaining import LOADED_S, remaining, shares_done
+from mu_addon.run.progress_estimate import LOADED_S, remaining, shares_done
 
 PLAN = (("mesh", 10.0), ("Model A", 100.0), ("report", 20.0))
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..evidence import state as evidence
 from ..grading import state as grading
 from ..gripper import object as gripper_object
-from ..jobs.panel import whole
 from ..live_bending import words as live_words
 from ..node_tree import following
 from ..shared import scene_units
@@ -22,16 +20,11 @@ from ..shared.panels import (
     parameters,
     wrapped,
 )
-from ..simulate import study_folder as studies
-from ..simulate.job import SIMULATION
-from ..simulate.panel import start_words
 from . import drawing, figures
 from . import object as unit_object
 from .broken import broken
-from .fields import path_symbol
+from .next_step import next_step
 
-LETTERS = 14
-"""Letters of a running stage's name; a longer one is numbered."""
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
 
 
@@ -119,7 +112,7 @@ def _head(layout, root) -> None:
     row = box.row(align=True)
     row.alert = False
     if not mending:
-        _next_step(row, root)
+        next_step(row, root)
         return
     if len(mending) > 1:
         row = row.split(factor=0.8, align=True)
@@ -129,30 +122,6 @@ def _head(layout, root) -> None:
         fix_button(grid, root, repair.section, repair.name, repair.value, found.text)
     if len(mending) > 1:
         row.operator("mu.fit_all", text=f"All {len(mending)}")
-
-
-def _next_step(row, root) -> None:
-    """Draw the button of the next action on a unit, or the running job's progress, of the same height."""
-    for kind in (SIMULATION, evidence.DIAGNOSIS):
-        if kind.is_running(root):
-            fraction, text = whole(kind.child(root), LETTERS)
-            row.progress(factor=fraction, text=text)
-            return
-    data = evidence.measured_data(root)
-    if data is not None and data.measured is not None and evidence.diagnosis(root) is None:
-        row.operator("mu.evidence_diagnose", text="Diagnose the Data", icon="VIEWZOOM")
-        return
-    found = studies.findings(root)
-    if found is None or found.stale or not found.run.complete:
-        row.operator("mu.simulate", text=start_words(root), icon="PLAY")
-        return
-    best = found.ranking[0][0] if found.ranking else ""
-    if best and root.mu_unit.path != best:
-        row.operator("mu.path", text=f"Use Path {path_symbol(best)}", icon="CON_FOLLOWPATH").name = best
-    elif not unit_object.solid_is_current(root):
-        row.operator("mu.solid", text="Build Solid", icon="MESH_DATA")
-    else:
-        row.operator("mu.print_check", text="Check the Print", icon="VIEWZOOM")
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
