@@ -109,7 +109,7 @@ def path():
 
 def simulate():
     study = root().mu_unit.study
-    study.command, study.detail = "place", "full"
+    study.command = "place"
     if RUNS:
         study.folder = RUNS
     stage = ""

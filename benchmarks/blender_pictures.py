@@ -65,7 +65,7 @@ def prepare():
             bpy.ops.mu.add(preset="mu-1.0x")
         root = bpy.context.view_layer.objects.active
         if name == "printed":
-            root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
+            root.mu_unit.study.command = "simulate"
         if name == "evidence":
             root.mu_evidence.folder = "//blocks"
         assert start() == {"FINISHED"}
@@ -78,7 +78,7 @@ def prepare():
 
 
 def _two_runs():
-    """A unit that was ranked with two walls, homogenised."""
+    """A unit that was ranked with two walls."""
     import mu_addon
     from mu_addon.blender.simulate.job import SIMULATION
 
@@ -88,7 +88,6 @@ def _two_runs():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "runs.blend"))
     assert bpy.ops.mu.add(preset="mu-1.0x") == {"FINISHED"}
     unit = bpy.context.view_layer.objects.active
-    unit.mu_unit.study.command, unit.mu_unit.study.detail = "place", "full"
     for wall in (1.0, 0.9):
         unit.mu_unit.chambers.wall_mm = wall
         assert bpy.ops.mu.simulate() == {"FINISHED"}
@@ -356,8 +355,6 @@ def simulate():
     yield from new("MU_PT_simulate")
     yield from added(preset="mu-0.75x")
     seen_from(20)
-    study = root().mu_unit.study
-    study.command, study.detail = "place", "full"
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     child = SIMULATION.child(root())
     while child.state == "running" and child.progress.get("stage") != "Model A":
@@ -455,8 +452,7 @@ def sensor_live():
     calibration = module("sensing.calibration")
     yield from new("MU_PT_sensor")
     yield from added(preset="mu-0.75x", path="alpha4")
-    study = root().mu_unit.study
-    study.command, study.detail = "simulate", "quick"
+    root().mu_unit.study.command = "simulate"
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     child = SIMULATION.child(root())
     while child.state in ("running", "waiting"):
@@ -569,7 +565,6 @@ def leave():
     yield from new()
     yield from added(preset="mu-0.75x")
     assert called(bpy.ops.wm.save_as_mainfile, filepath=str(FOLDER / "left.blend")) == {"FINISHED"}
-    root().mu_unit.study.command, root().mu_unit.study.detail = "place", "full"
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     yield 2.0
     assert called(bpy.ops.wm.save_mainfile) == {"FINISHED"}

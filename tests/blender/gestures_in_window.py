@@ -341,7 +341,7 @@ def in_trees():
 def while_running():
     root = only()
     select(root)
-    root.mu_unit.study.detail, root.mu_unit.study.command = "quick", "simulate"
+    root.mu_unit.study.command = "simulate"
     gesture("Simulate")
     assert called(bpy.ops.mu.simulate) == {"FINISHED"}
     child = SIMULATION.child(root)

@@ -11,7 +11,7 @@ from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
-from mu_addon.meshing.settings import QUICK, RESOLVED, MeshSettings
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.usecases.simulate_and_place import history
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 from mu_addon.usecases.simulate_and_place.motion_files import write_model_a
@@ -47,11 +47,11 @@ def write_bent_motion(folder, angles=ANGLES, pressures=PRESSURES, refine=0.5, un
 def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     """A finished run in a unit's home folder, as if ended at a time: bent `more` times as far.
 
-    full: on the default mesh, as its inputs say, else a quick look; ranked: whether it ranked paths, too.
+    full: on the default mesh, as its inputs say, else on a coarse one; ranked: whether it ranked paths, too.
     Returns the run.
     """
     chambers = attrs.evolve(UNIT.chambers, wall_mm=wall_mm)
-    mesh = MeshSettings(fidelity=RESOLVED) if full else QUICK
+    mesh = MeshSettings(refine=1.0 if full else 0.5, fidelity=RESOLVED)
     job = Job(attrs.evolve(UNIT, chambers=chambers), grasp(), mesh=mesh)
     if not ranked:
         job = attrs.evolve(job, stages=("design", "simulate"))

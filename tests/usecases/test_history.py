@@ -8,7 +8,6 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.meshing import settings
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
 from mu_addon.usecases.simulate_and_place import history
@@ -16,7 +15,7 @@ from mu_addon.usecases.simulate_and_place.comparison import compare
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 
 FULL = Job(load_preset("mu-0.75x"), grasp(), mesh=MeshSettings(fidelity="resolved"))
-QUICK = attrs.evolve(FULL, mesh=settings.QUICK)
+COARSE = attrs.evolve(FULL, mesh=MeshSettings(refine=0.5, fidelity="resolved"))
 MOTION = attrs.evolve(FULL, stages=("design", "simulate"))
 SHORT = {"status": "complete", "angle_deg": {"-20": -3.0, "40": 6.0}, "seconds": {"Model A": 40.0}}
 RANKED = SHORT | {
@@ -46,25 +45,26 @@ def design_of(job):
 
 
 @pytest.mark.parametrize(
-    ("mesh", "detail"),
+    ("mesh", "printed"),
     [
-        (MeshSettings(), "full"),
-        (settings.QUICK, "quick"),
-        (MeshSettings(order=1), "full"),
-        (MeshSettings(fidelity="resolved"), "resolved"),
-        (MeshSettings(fidelity="solid"), "resolved"),
+        (MeshSettings(), False),
+        (MeshSettings(refine=0.5, fidelity="resolved"), True),
+        (MeshSettings(refine=0.5, order=1), False),
+        (MeshSettings(fidelity="resolved"), True),
+        (MeshSettings(fidelity="solid"), True),
     ],
 )
-def test_a_run_knows_its_detail(tmp_path, mesh, detail):
-    assert ran(tmp_path, attrs.evolve(MOTION, mesh=mesh), SHORT, 100).detail == detail
+def test_a_run_knows_its_model_and_mesh(tmp_path, mesh, printed):
+    run = ran(tmp_path, attrs.evolve(MOTION, mesh=mesh), SHORT, 100)
+    assert (run.printed, run.refine) == (printed, mesh.refine)
 
 
 def test_every_run_is_kept_and_a_small_one_replaces_no_large_one(tmp_path):
     large = ran(tmp_path, FULL, RANKED, 100)
-    quick = ran(tmp_path, QUICK, RANKED | {"seconds": {"Model A": 20.0}}, 200)
-    assert large.folder != quick.folder
+    coarse = ran(tmp_path, COARSE, RANKED | {"seconds": {"Model A": 20.0}}, 200)
+    assert large.folder != coarse.folder
     found = history.runs(tmp_path)
-    assert [run.title for run in found] == ["Quick look", "Ranking"]
+    assert [run.title for run in found] == ["Ranking, mesh 0.5", "Ranking"]
     assert [run.seconds for run in found] == [20.0, 480.0]
     best = history.best_of(found, design_of(FULL))
     assert best.key == large.key
@@ -158,7 +158,7 @@ def test_names_and_stars(tmp_path):
 
 def test_a_removed_run_frees_its_folder_and_nothing_else(tmp_path):
     kept = ran(tmp_path, FULL, RANKED, 100)
-    gone = ran(tmp_path, QUICK, SHORT, 200)
+    gone = ran(tmp_path, COARSE, SHORT, 200)
     (gone.folder / "motion").mkdir()
     (gone.folder / "motion" / "mesh.npz").write_bytes(b"x" * 5000)
     assert history.bytes_of(gone) > 5000

@@ -67,7 +67,7 @@ def _ranking(context: Any) -> list[Any]:
     """A unit cut open with its candidate paths, ready for *Place the Sensor*."""
     root = _unit(context)
     root.mu_unit.cut = root.mu_unit.candidates = True
-    root.mu_unit.study.command, root.mu_unit.study.detail = "place", "full"
+    root.mu_unit.study.command = "place"
     context.view_layer.update()
     viewports.frame([root])
     return [root]
@@ -76,7 +76,7 @@ def _ranking(context: Any) -> list[Any]:
 def _obstacle(context: Any) -> list[Any]:
     """A unit beside a box that it bends against, ready for *Motion Only*."""
     root = _unit(context)
-    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "quick"
+    root.mu_unit.study.command = "simulate"
     bpy.ops.mu.obstacle_box(size=(20.0, 12.0, 12.0), gap=0.6)
     context.view_layer.objects.active = root
     context.view_layer.update()

@@ -66,9 +66,7 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
                 column.prop(props, "cube_height")
             column.prop(props, "density_g_per_ml")
             column.prop(props, "friction")
-            layout.prop(props, "homogenised", text="Homogenised")
-            if not props.homogenised:
-                layout.prop(props, "self_contact")
+            layout.prop(props, "self_contact")
         child = grasps.GRASP.child(root)
         start_button(layout, child, "mu.grasp", "PLAY")
         job_state(layout, child, "see below", JOB)

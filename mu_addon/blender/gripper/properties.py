@@ -108,11 +108,6 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
                 ("part", "Part to Print", "Only the printable part as STL and 3MF"),
             ],
         ),
-        "homogenised": BoolProperty(
-            name="Homogenised Lattice",
-            description="Simulate a continuum in place of the printed struts: quicker, but its fingers press "
-            "more than twice as hard as printed ones",
-        ),
         "self_contact": blender_property(SELF_CONTACT, name="Self-Contact"),
         "folder": StringProperty(
             name="Grasp Folder",

@@ -62,9 +62,7 @@ def _more(layout, props) -> None:
     if not body:
         return
     body.prop(props, "robust")
-    body.prop(props, "homogenised")
-    if not props.homogenised:
-        body.prop(props, "self_contact")
+    body.prop(props, "self_contact")
     row = body.row()
     row.prop(props, "has_gravity")
     if props.has_gravity:

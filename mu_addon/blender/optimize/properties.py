@@ -275,13 +275,6 @@ class MU_PG_optimize(bpy.types.PropertyGroup):
     targets: CollectionProperty(type=MU_PG_target, description="Targets of the unit")
     freedoms: CollectionProperty(type=MU_PG_freedom, description="What may change")
     robust: blender_property(ROBUST)
-    homogenised: BoolProperty(
-        name="Homogenised Lattice",
-        description="Simulate a continuum in place of the printed struts: a third of the time, but angles "
-        "from half to twice those of the printed body. A sensor's path or a lattice's modulus needs it; "
-        "the search then uses it automatically",
-        default=False,
-    )
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     has_gravity: BoolProperty(
         name="Own Weight",

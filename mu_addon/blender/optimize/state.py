@@ -12,7 +12,7 @@ from ...design.nearest import tied
 from ...design.parameters import SECTIONS, Unit, read_unit
 from ...design.quantity import describe
 from ...errors import InputError, MuError
-from ...meshing.settings import HOMOGENISED, RESOLVED, MeshSettings
+from ...meshing.settings import RESOLVED, MeshSettings
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
 from ...usecases.optimize.expected import search_plan
@@ -86,11 +86,10 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
     taken = {} if found is None else found.seconds
     if found is not None and found.simulated and "search" in taken:
         taken = {**taken, "search": taken["search"] * units / found.simulated}
-    settings = MeshSettings(refine=s.refine, fidelity=HOMOGENISED if s.homogenised else RESOLVED)
-    apart = s.self_contact and not s.homogenised
+    settings = MeshSettings(refine=s.refine, fidelity=RESOLVED)
     return [
         (name, taken.get(name, seconds))
-        for name, seconds in search_plan(units, settings, s.check_refine, apart)
+        for name, seconds in search_plan(units, settings, s.check_refine, s.self_contact)
     ]
 
 
@@ -162,9 +161,7 @@ def document(root: Any) -> dict[str, Any]:
     """Content of design.toml from the panel's targets and freedoms."""
     s = root.mu_optimize
     more: dict[str, Any] = {"orientation_deg": exact(s.orientation_deg)} if s.has_gravity else {}
-    if s.homogenised:
-        more["fidelity"] = HOMOGENISED
-    elif s.self_contact:
+    if s.self_contact:
         more["self_contact"] = True
     return more | {
         "format": 1,

@@ -52,7 +52,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if not found.run.complete:
             wrapped(layout, sentence(found.run.state), "INFO")
         if found.caveat:
-            icon = "INFO" if found.run.detail == "quick" else "ERROR"
+            icon = "INFO" if found.run.printed else "ERROR"
             wrapped(layout, sentence(found.caveat), icon)
         column = layout.column(align=True)
         column.active = not found.stale

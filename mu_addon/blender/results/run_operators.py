@@ -85,7 +85,8 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
             from_unit(props, run.unit)
             props.title = title
             props.study.command = "place" if "place" in run.tables else "simulate"
-            props.study.detail = run.detail
+            if run.printed:
+                props.study.refine = run.refine
         unit_object.rebuild(root)
         if studies.design_of(root) != run.design:
             # Bodies, obstacles and named effects belong to the scene, and stay.

@@ -10,6 +10,7 @@ from ...errors import InputError
 from ..body import state as bodies
 from ..jobs.start_child import JobKind
 from ..obstacles import state as obstacles
+from ..unit.fields import exact
 from ..unit.properties import to_unit
 from . import effects, timings
 from . import study_folder as studies
@@ -31,19 +32,21 @@ def announced(root: Any) -> tuple[float, bool]:
 
 def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
     """The plan, and True if all its long stages were measured: for this unit, else another one."""
-    from ...usecases.simulate_and_place.expected import SOLVED, seconds_of, stage_names
+    from ...usecases.simulate_and_place.expected import SOLVED, of_mesh, seconds_of, stage_names
 
     settings = root.mu_unit.study
-    names = stage_names(settings.command == "place", settings.detail != "quick", settings.paths == "graph")
-    alike = (run.summary.get("seconds") for run in studies.runs_of(root) if run.detail == settings.detail)
+    refine = exact(settings.refine)
+    names = stage_names(settings.command == "place", True, settings.paths == "graph")
+    runs = (run for run in studies.runs_of(root) if run.printed and run.refine == refine)
+    alike = (run.summary.get("seconds") for run in runs)
     own = next((s for s in alike if isinstance(s, dict) and {*names} - {"report"} <= {*s}), {})
-    taken = {**timings.measured(settings.detail), **own}
+    taken = {**timings.measured(refine), **own}
 
     def seconds(name: str) -> float:
         value = taken.get(name)
         if isinstance(value, int | float) and value >= 0.0:
             return float(value)
-        return seconds_of(name, settings.detail)
+        return seconds_of(name, True, of_mesh(refine, True))
 
     return [(name, seconds(name)) for name in names], all(name in taken for name in names if name in SOLVED)
 
@@ -63,7 +66,7 @@ def job_of(root: Any) -> Job:
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
         from ...fem.linear_solver import SolverChoice
-        from ...meshing.settings import QUICK, RESOLVED, MeshSettings
+        from ...meshing.settings import RESOLVED, MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
@@ -72,15 +75,11 @@ def job_of(root: Any) -> Job:
 
     settings, unit = root.mu_unit.study, to_unit(root.mu_unit)
     stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
-    extra: dict[str, Any] = {}
+    extra: dict[str, Any] = {"self_contact": settings.self_contact}
     if settings.command == "place":
         extra["paths"] = settings.paths
-    if settings.detail != "full":
-        quick = settings.detail == "quick"
-        extra["mesh"] = QUICK if quick else MeshSettings(fidelity=RESOLVED)
-        extra |= {"self_contact": settings.self_contact, "mesh_check": not quick}
-        if settings.self_contact:
-            extra["self_friction"] = round(settings.self_friction, 6)
+    if settings.self_contact:
+        extra["self_friction"] = round(settings.self_friction, 6)
     body = bodies.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)
@@ -91,6 +90,7 @@ def job_of(root: Any) -> Job:
         obstacles=obstacles.rigid_bodies(root, unit),
         effects=effects.named_effects(root),
         stages=stages,
+        mesh=MeshSettings(refine=exact(settings.refine), fidelity=RESOLVED),
         solver=SolverChoice(settings.solver, settings.device),
         **extra,
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ...meshing.gmsh_libraries import install_libraries, missing_libraries
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import UnitPanel, folded_place, wrapped
@@ -29,18 +28,14 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
                 "still work. Install the extension built for this Blender and system.",
                 "ERROR",
             )
-        elif root.mu_unit.study.detail == "full" and (lacking := missing_libraries()):
-            text = f"Without {', '.join(lacking)}, units are meshed more slowly and less accurately."
-            wrapped(layout.box(), f"{text} To have it, {install_libraries(lacking)}", "ERROR")
         study = root.mu_unit.study
         layout.prop(study, "command")
         if study.command == "place":
             layout.prop(study, "paths")
-        layout.prop(study, "detail")
-        if study.detail != "full":
-            layout.prop(study, "self_contact")
-            if study.self_contact:
-                layout.prop(study, "self_friction")
+        layout.prop(study, "refine")
+        layout.prop(study, "self_contact")
+        if study.self_contact:
+            layout.prop(study, "self_friction")
         layout.prop(study, "protocol")
         _effects(layout, root)
         child = SIMULATION.child(root)

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ...errors import MuError
+from ...meshing.settings import REFINE
 from ...usecases.simulate_and_place import history
 from ...usecases.simulate_and_place.history import Run
 from ..body import state as bodies
@@ -24,11 +25,9 @@ from . import effects
 CONTACT = "contact.csv"
 
 
-CAVEATS = {
-    "quick": "quick look: up to 12 % less angle under vacuum than on the default mesh",
-    "full": "homogenised: under vacuum it bends half as far as printed struts",
-}
-"""Known error of a study by its detail, found for mu-1.0x (docs/engineering/verification.md)."""
+# Of mu-1.0x at a refinement of 0.5 (docs/engineering/verification.md).
+COARSE = "coarse mesh: angles up to 12 % too small under vacuum, 2 % under pressure"
+CONTINUUM = "homogenised: under vacuum it bends half as far as printed struts"
 
 
 @attrs.frozen
@@ -46,7 +45,9 @@ class Findings:
     @property
     def caveat(self) -> str:
         """Known error of the run's model, in words; empty for printed struts on the default mesh."""
-        return CAVEATS.get(self.run.detail, "")
+        if not self.run.printed:
+            return CONTINUUM
+        return COARSE if self.run.refine < REFINE.default else ""
 
     @property
     def angles(self) -> list[tuple[float, float]]:

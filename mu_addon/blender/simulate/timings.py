@@ -25,22 +25,23 @@ def _file() -> Path:
     return user_folder() / "timings.json"
 
 
-def measured(detail: str) -> dict[str, float]:
-    """Seconds of each stage of the last simulation of that detail here; empty before the first one."""
+def measured(refine: float) -> dict[str, float]:
+    """Seconds of each stage of the last simulation on such a mesh here; empty before the first one."""
     path = _file()
-    found: Any = (_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}).get(detail)
+    every = _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
+    found: Any = every.get(f"{refine:g}")
     if not isinstance(found, dict):
         return {}
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
 
 
-def note(detail: str, seconds: dict[str, float]) -> None:
+def note(refine: float, seconds: dict[str, float]) -> None:
     """Store the seconds of a simulation's stages if it ended well. Raises OutputError."""
-    before = measured(detail)
+    before = measured(refine)
     real = {name: s for name, s in seconds.items() if s >= LEAST_SHARE * before.get(name, 0.0)}
     path = _file()
     every: dict[str, Any] = dict(_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {})
-    write_text(path, json.dumps({**every, detail: {**before, **real}}, indent=1) + "\n")
+    write_text(path, json.dumps({**every, f"{refine:g}": {**before, **real}}, indent=1) + "\n")
 
 
 def _ended(key: str) -> None:
@@ -51,7 +52,7 @@ def _ended(key: str) -> None:
         run = history.read_run(child.folder.parent)
         seconds = run.summary.get("seconds")
         if isinstance(seconds, dict):
-            note(run.detail, {str(name): float(s) for name, s in seconds.items()})
+            note(run.refine, {str(name): float(s) for name, s in seconds.items()})
     except (MuError, *UNREADABLE):
         # A failure to store the timings is not reported; the results are there.
         return

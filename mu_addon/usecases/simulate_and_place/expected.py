@@ -21,18 +21,14 @@ FULL_S = {
 """Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
 UNSOLVED_REPORT_S = 7.0
 """Seconds of a report on a unit that was not simulated."""
-BY_DETAIL_S = {
-    "full": {},
-    "resolved": {
-        "mesh": 10.0,
-        "Model A": 350.0,
-        "candidates": 2200.0,
-        "mesh check": 450.0,
-        "check of the best paths": 2200.0,
-    },
-    "quick": {"Model A": 100.0, "candidates": 620.0, "mesh check": 130.0, "check of the best paths": 620.0},
+PRINTED_S = {
+    "mesh": 10.0,
+    "Model A": 350.0,
+    "candidates": 2200.0,
+    "mesh check": 450.0,
+    "check of the best paths": 2200.0,
 }
-"""Seconds of stages by a study's detail, where they differ from `FULL_S`."""
+"""The same of a printed body, where they differ."""
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
 """Seconds that a stage takes on any mesh, of those that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
@@ -84,9 +80,17 @@ def work(job: Job, pressures_kPa: Iterable[float]) -> float:
     return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
 
 
-def seconds_of(name: str, detail: str) -> float:
-    """Seconds of a stage on two cores by the study's detail, a key of `BY_DETAIL_S`."""
-    return BY_DETAIL_S[detail].get(name) or FULL_S[BEST if name.startswith("solid with ") else name]
+def seconds_of(name: str, printed: bool, factor: float = 1.0) -> float:
+    """Seconds of a stage on two cores. factor: work by that of the shipped protocol on the default mesh."""
+    seconds = FULL_S[BEST if name.startswith("solid with ") else name]
+    if printed:
+        seconds = PRINTED_S.get(name, seconds)
+    return max(LEAST_S.get(name, 0.0), seconds * (factor if name in LEAST_S or name in SOLVED else 1.0))
+
+
+def of_mesh(refine: float, printed: bool) -> float:
+    """Work on a mesh of that refinement, in units of the work on the default one."""
+    return float(refine ** (BY_WALL if printed and refine < 1.0 else BY_REFINEMENT))
 
 
 def plan_of(job: Job) -> Plan:
@@ -95,17 +99,13 @@ def plan_of(job: Job) -> Plan:
     names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
     if job.path:
         names.insert(1, f"solid with {job.path}")
-    detail = "resolved" if job.mesh.resolved else "full"
+    printed = job.mesh.resolved
     if not simulates:
-        return [*((name, seconds_of(name, detail)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
+        return [*((name, seconds_of(name, printed)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
     _, pressure = job.samples
     states = work(job, np.unique(pressure)) if not job.in_time else len(pressure)
     shipped = work(job, _SHIPPED)
-    by = BY_WALL if job.mesh.resolved and job.mesh.refine < 1.0 else BY_REFINEMENT
-    factor = job.mesh.refine**by * max(states, 1) / shipped * (LINEAR if job.mesh.order == 1 else 1.0)
-
-    def seconds(name: str) -> float:
-        scaled = factor if name in LEAST_S or name in SOLVED else 1.0
-        return max(LEAST_S.get(name, 0.0), scaled * seconds_of(name, detail))
-
-    return [(name, seconds(name)) for name in names]
+    factor = of_mesh(job.mesh.refine, printed) * max(states, 1) / shipped
+    if job.mesh.order == 1:
+        factor *= LINEAR
+    return [(name, seconds_of(name, printed, factor)) for name in names]

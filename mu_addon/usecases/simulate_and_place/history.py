@@ -24,7 +24,7 @@ from ...design.parameters import Unit, read_unit
 from ...design.rigid_body import read_rigid_bodies
 from ...errors import InputError, MuError
 from ...files import make_folder, output_error, write_text
-from ...meshing.settings import HOMOGENISED, QUICK
+from ...meshing.settings import HOMOGENISED, REFINE
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.cache import key
 from ...run.folder import ALWAYS, OWN
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from .job import Job
 
 RUNS, LABEL = "runs", "label.toml"
-DETAILS = ("full", "quick", "resolved")
-"""Details of a run, the least accurate first; see `Run.detail`."""
 HOME, STALE = "home", "stale"
 """Keys of the runs of older versions: in the home folder itself, and the one set aside by its next."""
 SUMMARY, OUTPUTS = "summary.json", "blender"
@@ -114,12 +112,18 @@ class Run:
         return self.complete or bool(self.angles)
 
     @property
-    def detail(self) -> str:
-        """`resolved`, struts as printed; `quick`, the same on a coarse mesh; or `full`, homogenised."""
-        mesh = self.tables.get("simulate", {}).get("mesh") or {}
-        if mesh.get("fidelity", HOMOGENISED) == HOMOGENISED:
-            return "full"
-        return "quick" if mesh.get("refine", 1.0) <= QUICK.refine else "resolved"
+    def _mesh(self) -> dict[str, Any]:
+        return self.tables.get("simulate", {}).get("mesh") or {}
+
+    @property
+    def printed(self) -> bool:
+        """True if struts are simulated as printed; False for a homogenised lattice."""
+        return self._mesh.get("fidelity", HOMOGENISED) != HOMOGENISED
+
+    @property
+    def refine(self) -> float:
+        """Refinement of the mesh: every element size is divided by it."""
+        return float(self._mesh.get("refine", REFINE.default))
 
     @property
     def job(self) -> str:
@@ -133,7 +137,8 @@ class Run:
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
         # What was found tells a motion from a ranking; both words would not fit into a list.
-        return self.name or {"full": "Homogenised", "resolved": what, "quick": "Quick look"}[self.detail]
+        what = what if self.printed else "Homogenised"
+        return self.name or (what if self.refine == REFINE.default else f"{what}, mesh {self.refine:g}")
 
     @property
     def seconds(self) -> float:
@@ -249,14 +254,14 @@ def read_run(folder: Path) -> Run:
 def best_of(found: Sequence[Run], design: str) -> Run | None:
     """Run whose results are shown for a design: the best of those made of it, or else the latest of all.
 
-    Complete before incomplete, printed struts before a quick look before a homogenised one, a ranking before
-    the motion alone, then the latest, so that a coarser run replaces no finer one. A run that has just begun
-    is shown only if there is no other.
+    Complete before incomplete, printed struts before a homogenised lattice, a finer mesh before a coarser
+    one, a ranking before the motion alone, then the latest. A run that has just begun is shown only if there
+    is no other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
     if ready:
-        return max(ready, key=lambda r: (r.complete, DETAILS.index(r.detail), bool(r.rule), r.changed_s))
+        return max(ready, key=lambda r: (r.complete, r.printed, r.refine, bool(r.rule), r.changed_s))
     others = [run for run in found if run.has_results]
     return next(iter(ordered(others or own)), None)
 

@@ -94,7 +94,7 @@ def blender(each_bpy, blenders, tmp_path_factory):
     return run
 
 
-# What a quick look takes, with one path of the whole lattice beside the ten of the anchors.
+# A coarse ranking, with one path of the whole lattice beside the ten of the anchors.
 PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.4", "--rule", "volume_fraction"]
 PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2", "--checks", "2"]
 PLACE += ["--no-report"]
@@ -121,7 +121,7 @@ def study(placed, tmp_path):
 
 @pytest.fixture(scope="session")
 def finished_runs(tmp_path_factory):
-    """Home folder of a unit with three runs: full, a quick look at it, and the motion of a thicker wall."""
+    """Home folder of three runs: on the default mesh, on a coarse one, and the motion of a thicker wall."""
     home = tmp_path_factory.mktemp("finished") / "home"
     write_bent_run(home, 1000, full=True)
     write_bent_run(home, 2000)

@@ -152,7 +152,8 @@ def applied(folder, clogged):
     root = add()
     root.mu_evidence.folder, root.mu_unit.study.folder = str(clogged / "data"), "//study"
     study = root.mu_unit.study
-    study.command, study.detail = "simulate", "full"
+    (folder / "inflate.csv").write_text("time_s,pressure_kPa\n0,0\n2,5\n")
+    study.command, study.refine, study.protocol = "simulate", 0.3, "//inflate.csv"
     unit = to_unit(root.mu_unit)
     assert not effects.named_effects(root)
     assert "With named effects" not in drawn(panels.MU_PT_simulate)

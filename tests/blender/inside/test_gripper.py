@@ -147,8 +147,6 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     props.detail = "paths"
     grasps.write_inputs(root, tmp_path / "paths")
     assert read_job(tmp_path / "paths").rules == ("printed",)
-    props.homogenised = True
-    assert not grasps.job_of(root).self_contact, "it is of printed struts alone"
     props.detail = "part"
     assert grasps.job_of(root).cubes == ()
     assert "was not grasped yet" in drawn()

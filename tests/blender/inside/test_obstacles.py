@@ -161,10 +161,13 @@ def test_a_box_in_the_way_is_met_and_its_move_makes_the_study_stale(tmp_path):
         child = SIMULATION.child(root)
         watch(lambda: child.state != "running")
         assert child.state == "done", child.error
-        return dict(studies.findings(root).angles)[40.0]
+        return dict(studies.findings(root).angles)[20.0]
 
     root = add(preset="mu-0.75x")
-    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "full"
+    protocol = tmp_path / "inflate.csv"
+    protocol.write_text("time_s,pressure_kPa\n0,0\n8,20\n")
+    study = root.mu_unit.study
+    study.command, study.refine, study.protocol = "simulate", 0.3, str(protocol)
     free = bent("/free")
     assert studies.contact_forces(root) == []
     assert bpy.ops.mu.obstacle_box(size=(20, 12, 12), gap=0.6) == {"FINISHED"}

@@ -32,9 +32,9 @@ def started(home):
 
 
 def keys(root):
-    """Keys of the runs by what they are: the full one, the quick one, that of the thicker wall."""
-    found = {("thick" if r.unit.chambers.wall_mm > 1 else r.detail): r.key for r in studies.runs_of(root)}
-    return found["resolved"], found["quick"], found["thick"]
+    """Keys of the runs by what they are: on the default mesh, on a coarse one, that of the thicker wall."""
+    found = {("thick" if r.unit.chambers.wall_mm > 1 else r.refine): r.key for r in studies.runs_of(root)}
+    return found[1.0], found[0.5], found["thick"]
 
 
 def caches(root):
@@ -43,12 +43,12 @@ def caches(root):
 
 def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run(home):
     root = started(home)
-    full, quick, thick = keys(root)
+    full, coarse, thick = keys(root)
     listed = bpy.context.window_manager.mu_runs
-    assert [entry.key for entry in listed.entries] == [thick, quick, full], "the latest first"
+    assert [entry.key for entry in listed.entries] == [thick, coarse, full], "the latest first"
     assert studies.shown_run(root).key == full
     assert listed.entries[listed.index].key == full
-    assert "Quick look" not in drawn(PANELS)
+    assert "Coarse mesh" not in drawn(PANELS)
     # Another parameter: its own run is shown at once; then none, and the last one says that it is stale.
     root.mu_unit.chambers.wall_mm = 1.1
     assert (studies.findings(root).run.key, studies.findings(root).stale) == (thick, False)
@@ -59,8 +59,8 @@ def test_a_small_run_replaces_no_large_one_and_undoing_a_parameter_finds_its_run
     assert (studies.findings(root).run.key, studies.findings(root).stale) == (full, False)
     # A click shows another one, until the unit changes.
     listed.index = 1
-    assert studies.findings(root).run.key == quick
-    assert "Quick look" in drawn(PANELS)
+    assert studies.findings(root).run.key == coarse
+    assert "Coarse mesh" in drawn(PANELS)
     root.mu_unit.chambers.wall_mm = 1.1
     root.mu_unit.chambers.wall_mm = 0.9
     assert studies.findings(root).run.key == full
@@ -136,13 +136,13 @@ def test_names_and_stars_are_kept_with_the_run(home):
 
 def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
     root = started(home)
-    full, quick, thick = keys(root)
+    full, coarse, thick = keys(root)
     assert "is the one that is shown" in refused(bpy.ops.mu.run_compare, key=full)
     assert "Compare with another run" in refused(bpy.ops.mu.field_show, field="run_difference_mm")
     assert bpy.ops.mu.run_compare(key=thick) == {"FINISHED"}
     texts = drawn(PANELS)
     assert "Wall (mm) 0.9 1.1" in texts, texts
-    assert "Ranking Quick" in texts, "the columns are named by the runs"
+    assert "Ranking Motion," in texts, "the columns are named by the runs"
     assert "At 40 kPa (deg) +50.00 +40.00" in texts, texts
     assert bpy.ops.mu.field_show(field="run_difference_mm") == {"FINISHED"}
     scene = bpy.context.scene
@@ -155,10 +155,10 @@ def test_two_runs_side_by_side_and_as_a_difference_on_the_unit(home):
         [rest[1] * np.cos(turn) + rest[2] * np.sin(turn), rest[2] * np.cos(turn) - rest[1] * np.sin(turn)]
     )
     assert abs(found.value - np.linalg.norm(arcs[:, 0] - arcs[:, 1])) < 0.02 * found.value
-    assert bpy.ops.mu.run_compare(key=quick) == {"FINISHED"}
+    assert bpy.ops.mu.run_compare(key=coarse) == {"FINISHED"}
     bpy.ops.mu.field_show(field="run_difference_mm")
     assert places.largest(root).value == 0.0, "both are written of the same bending"
-    assert bpy.ops.mu.run_compare(key=quick) == {"FINISHED"}
+    assert bpy.ops.mu.run_compare(key=coarse) == {"FINISHED"}
     assert root.mu_unit.study.against == ""
 
 
@@ -219,10 +219,10 @@ def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
 
 def test_deleting_a_run_frees_its_folder_and_takes_away_what_it_shows(home):
     root = started(home)
-    _, quick, thick = keys(root)
+    _, coarse, thick = keys(root)
     bpy.ops.mu.field_show(field="von_mises_kPa")
-    bpy.ops.mu.run_compare(key=quick)
-    assert bpy.ops.mu.run_remove(key=quick) == {"FINISHED"}
+    bpy.ops.mu.run_compare(key=coarse)
+    assert bpy.ops.mu.run_remove(key=coarse) == {"FINISHED"}
     assert root.mu_unit.study.against == ""
     assert motion_parts.parts(root), "that of another run stays"
     assert bpy.ops.mu.run_remove() == {"FINISHED"}

@@ -23,8 +23,7 @@ from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.errors import InputError
-from mu_addon.meshing import gmsh_libraries
-from mu_addon.meshing.settings import QUICK
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 
 from .acting import add, refused
@@ -96,15 +95,6 @@ def test_without_the_solver_geometry_works_and_the_panel_says_why(monkeypatch):
     assert bpy.ops.mu.solid() == {"FINISHED"}
 
 
-def test_a_missing_system_library_is_told_before_a_run(monkeypatch):
-    root = add()
-    monkeypatch.setitem(gmsh_libraries.SYSTEM_LIBRARIES, "libnone.so.1", "libnone1")
-    assert "apt install" not in drawn(), "the grid of the printed body needs no gmsh"
-    root.mu_unit.study.detail = "full"
-    assert "Without libnone.so.1, units are meshed" in drawn()
-    assert "apt install libnone1" in drawn()
-
-
 def test_a_fold_is_red_while_a_rule_is_broken_inside():
     root = add()
     layout, header = MagicMock(), MagicMock()
@@ -173,17 +163,16 @@ def test_two_simulations_of_one_unit_are_refused():
 
 
 @pytest.mark.slow
-def test_a_quick_look_from_start_to_stale(tmp_path):
+def test_a_motion_from_start_to_stale(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = add(preset="mu-0.75x")
-    root.mu_unit.chambers.count = 3
+    root.mu_unit.chambers.count = 2
     # Of its thirteen instants few have a pressure of their own.
     protocol = tmp_path / "both.csv"
     rows = "0,0\n1.5,5\n3,5\n"
     protocol.write_text(f"time_s,pressure_kPa\n{rows}")
     study = root.mu_unit.study
-    study.command, study.detail, study.protocol = "simulate", "quick", str(protocol)
-    assert job_of(root).mesh == QUICK
+    study.command, study.refine, study.protocol = "simulate", 0.35, str(protocol)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     child = SIMULATION.child(root)
     fractions = []
@@ -196,7 +185,7 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     assert found.angles[-1][0] == 5.0
     assert found.angles[-1][1] > 0
     assert "kPa" in drawn()
-    assert "Quick look: up to 12 % less angle under vacuum" in drawn()
+    assert "Coarse mesh: angles up to 12 % too small" in drawn()
     assert "Stale" not in drawn()
     root.mu_unit.chambers.wall_mm = 1.0
     assert studies.findings(root).stale
@@ -210,20 +199,19 @@ def test_a_quick_look_from_start_to_stale(tmp_path):
     assert json.loads(summary.read_text())["status"] == "complete"
 
 
-def test_printed_struts_are_the_resolved_model_and_may_keep_apart():
+def test_the_printed_body_is_simulated_on_the_mesh_that_is_asked_for():
     root = add()
     study = root.mu_unit.study
     study.command = "simulate"
-    assert job_of(root).mesh.fidelity == "resolved"
+    assert job_of(root).mesh == MeshSettings(refine=0.5, fidelity="resolved")
     assert job_of(root).self_contact
+    study.refine = 0.7
+    assert job_of(root).mesh.refine == 0.7
     study.self_contact = False
     assert not job_of(root).self_contact
-    study.detail, study.self_contact = "full", True
-    assert job_of(root).mesh.fidelity == "homogenised"
-    assert not job_of(root).self_contact, "it is of printed struts alone"
 
 
-@pytest.mark.nightly("test_printed_struts_are_the_resolved_model_and_may_keep_apart")
+@pytest.mark.nightly("test_a_motion_from_start_to_stale")
 def test_printed_struts_are_simulated_and_played(tmp_path):
     """A short unit, inflated a little: its motion is that of its struts, drawn up to their wall."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "struts.blend"))
@@ -231,7 +219,7 @@ def test_printed_struts_are_simulated_and_played(tmp_path):
     root.mu_unit.chambers.count = 3
     protocol = tmp_path / "inflate.csv"
     protocol.write_text("time_s,pressure_kPa\n0,0\n1,2\n")
-    root.mu_unit.study.command, root.mu_unit.study.detail = "simulate", "resolved"
+    root.mu_unit.study.command = "simulate"
     root.mu_unit.study.protocol = str(protocol)
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     child = SIMULATION.child(root)
