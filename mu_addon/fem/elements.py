@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-import warp as wp
 
 from ..errors import MeshingError
 from ..meshing.mesh import TET_EDGES, TRIANGLE_EDGES
 from ..meshing.quality import shapes
 
 if TYPE_CHECKING:
+    import warp as wp
+
     from ..meshing.mesh import Mesh
 
 Array = np.ndarray[Any, Any]
@@ -170,6 +171,9 @@ class Reference:
     @cached_property
     def on_device(self) -> tuple[wp.array, wp.array]:
         """Gradients (m, q, k) and resisting volumes (m, q) as kernels take them."""
+        # Imported late: the panels read motions in a Blender that may lack it.
+        import warp as wp
+
         here = self.device == "cpu"
         volumes = np.ascontiguousarray(self.resisting_volumes)
         return (
