@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import math
 import os
 import re
 import stat
@@ -137,6 +138,11 @@ def parse_json(text: str | bytes, origin: str, remedy: str = "let the program wr
 def is_number(value: Any) -> bool:
     """Return True if a value from a file is a number; `true` and `false` are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def is_finite(value: Any) -> bool:
+    """Return True if a value from a file is a number, and neither infinite nor nan."""
+    return is_number(value) and math.isfinite(value)
 
 
 def _require_sense(value: Any, text: str | bytes, origin: str, remedy: str) -> None:

@@ -57,12 +57,12 @@ def select(
             pool = hypotheses(fitter, levels[-1][:1], effects, progress)
         if not pool or of_the_law(chosen, pool[0], taken):
             break
-        p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
+        p = false_alarm_probability(chosen, seen, gain_of(fitter, chosen, pool[0]))
         p_best = p if level == 0 else p_best
         # The best single effect may be neither of two that act together.
         if level and (p < FALSE_ALARM_RATE or structure(strict_table(fitter, chosen))):
             pool = hypotheses(fitter, other_seeds(levels[-1]), effects, progress, known=pool)
-            p = false_alarm_probability(fitter, chosen, seen, gain_of(fitter, chosen, pool[0]))
+            p = false_alarm_probability(chosen, seen, gain_of(fitter, chosen, pool[0]))
         if level == 0 and p >= FALSE_ALARM_RATE:
             pair = _hidden_pair(fitter, effects, seen, base, pool, progress)
             if pair is not None:
@@ -118,7 +118,7 @@ def _hidden_pair(
     as if without cause. The probability that noise gains as much is that of the best of all pairs.
     """
     raw = base.chi2 - singles[0].chi2 - by_gauges(fitter, base, singles[0])
-    if false_alarm_probability(fitter, base, seen, raw) >= FALSE_ALARM_RATE:
+    if false_alarm_probability(base, seen, raw) >= FALSE_ALARM_RATE:
         return None
     pool = hypotheses(fitter, singles[:SEEDS], effects, progress)
     if not pool:
@@ -143,7 +143,7 @@ def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit,
         found.append((less.chi2, less, attrs.evolve(chosen, effects=(*less.effects, e))))
     _, less, last = min(found, key=lambda f: f[0])
     gain = gain_of(fitter, less, last)
-    p = false_alarm_probability(fitter, less, seen, gain)
+    p = false_alarm_probability(less, seen, gain)
     return less if p >= FALSE_ALARM_RATE or of_the_law(less, last, base.chi2 - chosen.chi2) else chosen
 
 
@@ -162,7 +162,7 @@ def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) ->
         less = fitter.best([o for o in chosen.effects if o is not e], [chosen.values])
         own = attrs.evolve(chosen, effects=(*less.effects, e))
         gain = less.chi2 - chosen.chi2 - by_search(own) + by_search(less)
-        p = false_alarm_probability(fitter, less, seen, gain - by_gauges(fitter, less, own))
+        p = false_alarm_probability(less, seen, gain - by_gauges(fitter, less, own))
         ps.append(p)
         if p >= FALSE_ALARM_RATE:
             doubted = (
@@ -239,7 +239,7 @@ def _grown(
         if not pool or not _leads(found, pool, singles):
             continue
         best = pool[0]
-        p = false_alarm_probability(fitter, seed, seen, gain_of(fitter, seed, best))
+        p = false_alarm_probability(seed, seen, gain_of(fitter, seed, best))
         if not accepted(fitter, found, seed, best, p):
             continue
         level = [f for f in [*pool, *_of_as_many(best, singles)] if len(f.effects) == 1]

@@ -49,7 +49,7 @@ def by_gauges(fitter: Fitter, less: Fit, more: Fit) -> float:
     return 2.0 * max(without.chi2 - other.best(more.effects, starts).chi2, 0.0)
 
 
-def false_alarm_probability(fitter: Fitter, fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
+def false_alarm_probability(fit: Fit, seen: Sequence[Sensitivity], gain: float) -> float:
     """Probability that noise alone lets some effect of the library gain as much on top of a fit.
 
     The parametric bootstrap of the linearised library: gains are squares of the noise along each effect's

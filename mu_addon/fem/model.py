@@ -187,7 +187,7 @@ class Model:
         fixed[mesh.tied] = True
         self._hold_beams(fixed)
         self.free = np.nonzero(~fixed.ravel())[0]
-        self._build_pattern(fixed)
+        self._build_pattern()
 
     @property
     def volumes(self) -> Array:
@@ -205,7 +205,7 @@ class Model:
     def _put(self, a: Array, dtype: Any) -> wp.array:
         return wp.array(np.ascontiguousarray(a), dtype=dtype, device=self.device)
 
-    def _build_pattern(self, fixed: Array) -> None:
+    def _build_pattern(self) -> None:
         mesh = self.mesh
         n = len(mesh.nodes)
         ends = []

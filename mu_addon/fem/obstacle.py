@@ -174,7 +174,7 @@ class Obstacle:
         face = self._near(u)
         y, g, n, _ = self._points(u, face)
         memory, old = self._of(face)
-        new = self._lagged(memory, y, g, n)
+        new = self._lagged(memory, g, n)
         most = float((self._area[face] * self.friction * new.pressure).sum())
         less, more = (self._tractions(y, memory, lag) for lag in (old, new))
         change = float((self._area[face] * np.linalg.norm(more - less, axis=-1)).sum())
@@ -185,8 +185,8 @@ class Obstacle:
         if not self.friction:
             return
         face, m = self._near(u), self.memory
-        y, g, n, _ = self._points(u, face)
-        new = self._lagged(self._of(face)[0], y, g, n)
+        _, g, n, _ = self._points(u, face)
+        new = self._lagged(self._of(face)[0], g, n)
         self.lag = Lag(np.zeros_like(m.pressure), m.normal.copy(), np.ones_like(m.pressure))
         self.lag.pressure[face], self.lag.normal[face] = new.pressure, new.normal
         self.lag.counts[face] = new.counts
@@ -382,7 +382,7 @@ class Obstacle:
         s, d, k = np.maximum(-gap, 0.0), self.depth_mm, self.stiffness
         return np.where(s < d, k * s**2 / (2 * d), k * (s - d / 2)), np.where(s < d, k * s / d, k)
 
-    def _lagged(self, memory: Memory, y: Array, gap: Array, normal: Array) -> Lag:
+    def _lagged(self, memory: Memory, gap: Array, normal: Array) -> Lag:
         return Lag(self._pressure(gap)[0], normal, friction.met(memory.gap, gap))
 
     def _of(self, face: Array) -> tuple[Memory, Lag]:

@@ -10,6 +10,7 @@ import attrs
 
 from ..design.body import Body
 from ..errors import InputError, did_you_mean
+from ..reading import is_finite
 from .quantities import (
     AirVolume,
     Angle,
@@ -198,9 +199,9 @@ def _name(kind: str, table: Mapping[str, Any]) -> str:
     if "path" in table:
         words += f" of {table['path']}"
     if "pressure_kPa" in table:
-        words += f" at {table['pressure_kPa']:g} kPa" if _is_number(table["pressure_kPa"]) else ""
+        words += f" at {table['pressure_kPa']:g} kPa" if is_finite(table["pressure_kPa"]) else ""
     if "gap_mm" in table:
-        words += f" on a wall at {table['gap_mm']:g} mm" if _is_number(table["gap_mm"]) else ""
+        words += f" on a wall at {table['gap_mm']:g} mm" if is_finite(table["gap_mm"]) else ""
     return f"{words} along {table['direction']}" if "direction" in table else words
 
 
@@ -242,7 +243,7 @@ def _curve(table: Mapping[str, Any], where: str, supplies: Supplies) -> list[Tar
     """A target at every point (pressure in kPa, value) of a curve."""
     points = table["points"]
     good = isinstance(points, list) and len(points) >= 2
-    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(_is_number, p)) for p in points):
+    if not good or not all(isinstance(p, list) and len(p) == 2 and all(map(is_finite, p)) for p in points):
         raise InputError(
             f"points = {points!r} is not a curve", f"{where}, points", "write [[-15, -20], [30, 40]]"
         )
@@ -338,7 +339,7 @@ def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str, why: str)
 
 def _pressures(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
     given = table.get("pressures_kPa")
-    if not isinstance(given, list) or not given or not all(_is_number(p) for p in given):
+    if not isinstance(given, list) or not given or not all(is_finite(p) for p in given):
         raise InputError(
             f"pressures_kPa = {given!r} is not a list of pressures", f"{where}, pressures_kPa",
             "write pressures_kPa = [-15, 30]",
@@ -361,10 +362,6 @@ def _pressure(table: Mapping[str, Any], where: str) -> float:
 
 def _number(table: Mapping[str, Any], key: str, where: str) -> float:
     value = table.get(key)
-    if not _is_number(value):
+    if not is_finite(value):
         raise InputError(f"{key} = {value!r} is not a number", f"{where}, {key}", f"write {key} = ..")
     return float(value)  # type: ignore[arg-type]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

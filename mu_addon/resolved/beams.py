@@ -146,7 +146,7 @@ class Layers:
         turn = np.full(len(mesh.nodes), -1)
         turn[own] = len(mesh.nodes) + np.arange(len(own))
         beams = np.column_stack([first, turn[first], second, turn[second]])
-        carried = self._carried(mesh, whole, axis, turn)
+        carried = self._carried(whole, axis, turn)
         return attrs.evolve(
             mesh,
             nodes=np.vstack([mesh.nodes, places]),
@@ -164,7 +164,7 @@ class Layers:
         first = np.unique(beam, return_index=True)[1][-len(mesh.beams) :]
         return self.strut[first], self.layer[first]
 
-    def _carried(self, mesh: Mesh, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
+    def _carried(self, whole: Array, axis: Array, turn: Array) -> tuple[Array, Array, Array]:
         """Carried nodes (c,), their carriers (c, 4) and the first one's shares (c,)."""
         used = whole[self.strut, self.layer]
         pairs = np.unique(self.of_element[used])

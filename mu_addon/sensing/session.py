@@ -98,7 +98,7 @@ def run_session(
     try:
         running = True
         while running:
-            running = _take(pieces, view, clock) and not control.stop.is_set()
+            running = _take(pieces, view) and not control.stop.is_set()
             while not control.marks.empty():
                 view.event("mark", clock.now(), text=control.marks.get())
             if seconds is not None and clock.now() - clock.start >= seconds:
@@ -107,7 +107,7 @@ def run_session(
         control.stop.set()
         reader.join(timeout=5.0)
         while not pieces.empty():
-            _take(pieces, view, clock)
+            _take(pieces, view)
         view.take(view.decoder.finish(clock.now()), clock.now())
         status = view.end(clock.now())
         recorder.close()
@@ -173,7 +173,7 @@ class _Failure(_Piece):
     error: Exception = attrs.field(kw_only=True)
 
 
-def _take(pieces: queue.SimpleQueue[_Piece], view: _View, clock: _Clock) -> bool:
+def _take(pieces: queue.SimpleQueue[_Piece], view: _View) -> bool:
     """Decode, record and show new bytes, waiting a little; False at the end."""
     try:
         piece = pieces.get(timeout=0.05)

@@ -13,10 +13,13 @@ import numpy as np
 
 from mu_addon.design.gripper import load_gripper
 from mu_addon.errors import ConvergenceError
+from mu_addon.fem.unit_materials import materials_of
+from mu_addon.meshing.homogenised_unit import mesh_unit
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key
 from mu_addon.usecases.grip.grasp import Cube
-from mu_addon.usecases.grip.run import gripper_path_deviations
+from mu_addon.usecases.grip.path_deviation import path_deviations
 from mu_addon.usecases.grip.settings import SIDES
 
 from .published import GRIPPER
@@ -54,7 +57,8 @@ def solved(task: Task, cache: Cache) -> Array | str:
         return str(kept["failed"]) if "failed" in kept else kept["J_hat"]
     cube = Cube(task.cube_mm) if task.cube_mm else None
     try:
-        found = gripper_path_deviations(task.refine, task.rule, cube, gripper)
+        mesh = mesh_unit(gripper.unit, MeshSettings(refine=task.refine))
+        found = path_deviations(gripper, mesh, materials_of(gripper.unit, mesh), task.rule, cube).J_hat_mm
     except ConvergenceError as error:
         cache.put("gripper", name, {"failed": np.array(error.what)})
         return error.what

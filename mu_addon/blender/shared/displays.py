@@ -27,12 +27,11 @@ LEGEND = "mu_legend"
 TWIN = "mu_twin"
 """Mark of the objects that move as the real unit does, see `sensor.twin`."""
 LIVE = "mu_live_part"
-"""Mark of the objects that show a unit bent while it is designed, see `live.state`."""
+"""Mark of the objects that show a unit bent while it is designed, see `live_bending.state`."""
 PAINTED = "mu_painted"
 """Mark of the object on which factors of the struts are painted, see `grading.state`."""
 GRIPPER = "mu_grip"
 """Mark of the cube of a gripper and the parts that play its grasp, see `gripper.object`."""
-MARKS = (PART, MOTION, EVIDENCE, CHECK, LAYER, LEGEND, TWIN, LIVE, PAINTED, GRIPPER)
 OWNER = "mu_of"
 """On each: UUID of its unit or gripper."""
 

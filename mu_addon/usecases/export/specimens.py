@@ -198,7 +198,7 @@ def make_specimens(job: Job, folder: Path, context: RunContext) -> None:
     _write_template(every, folder / TEMPLATE)
     context.summary |= {"resin": resin.name, "density_g_per_ml": resin.density_g_per_ml, "specimens": rows}
     write_json(folder / "manifest.json", context.summary)
-    write_text(folder / "sheet.html", _page(unit, resin, every, rows))
+    write_text(folder / "sheet.html", _page(unit, resin, rows))
 
 
 def _written(specimen: Specimen, folder: Path, resin: Material) -> dict[str, Any]:
@@ -259,7 +259,7 @@ def _write_template(every: list[Specimen], folder: Path) -> None:
     write_text(folder / "experiments.toml", "\n".join(lines) + "\n")
 
 
-def _page(unit: Unit, resin: Material, every: list[Specimen], rows: list[dict[str, Any]]) -> str:
+def _page(unit: Unit, resin: Material, rows: list[dict[str, Any]]) -> str:
     parts = [
         (
             [

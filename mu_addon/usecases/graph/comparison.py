@@ -16,6 +16,7 @@ from ...errors import InputError
 from ...files import write_csv
 from ...graph.evaluation import Finished
 from ...materials.library import load_material
+from ...reading import is_number
 from ...report.charts import BY_LENGTH, BY_START, QUIET, canvas
 from ...report.html import figure, number, table
 from ..parameter_study.results import figures
@@ -42,7 +43,7 @@ class Comparison:
         """Number of studies, and their largest angles less that of the first, in a few words."""
         angles = self.results.get("angle_highest_deg", ())
         more = [
-            f"{difference(angles[0], a):+.1f}" for a in angles[1:] if _is_number(a) and _is_number(angles[0])
+            f"{difference(angles[0], a):+.1f}" for a in angles[1:] if is_number(a) and is_number(angles[0])
         ]
         return f"{len(self.names)} side by side" + (f", {', '.join(more)} deg" if more else "")
 
@@ -135,13 +136,9 @@ def _angles(summary: Mapping[str, Any]) -> tuple[np.ndarray[Any, Any], np.ndarra
 
 def difference(first: Any, value: Any) -> Any:
     """Difference of a value from the first, "" if they are not numbers."""
-    if _is_number(first) and _is_number(value):
+    if is_number(first) and is_number(value):
         return value - first
     return ""
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def write_comparison(found: Comparison, path: Path) -> None:

@@ -5,17 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...design.gripper import Gripper, load_gripper
-from ...fem.unit_materials import materials_of
-from ...meshing.homogenised_unit import mesh_unit
-from ...meshing.settings import MeshSettings
 from ...run.context import RunContext
 from ...run.usecase import UseCase
-from .grasp import Cube
 from .job import LAYOUT, Job, plan_of, read_job
-from .path_deviation import path_deviations
 from .report import write_report
-from .settings import REFINE, SIDES
 from .stages import Gripping
 
 
@@ -25,21 +18,6 @@ def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
     context.report = lambda stopped: write_report(run, stopped)
     run.run()
     return run
-
-
-def gripper_path_deviations(
-    refine: float = REFINE.default,
-    rule: str = "volume_fraction",
-    cube: Cube | None = Cube(SIDES[-1]),  # noqa: B008 - frozen
-    gripper: Gripper | None = None,
-) -> dict[str, float]:
-    """J_hat in mm by path of a finger of the gripper: on a cube, or closing on nothing with None.
-
-    refine: of the analysis mesh. To be set beside the gripper column of the paper's Table I.
-    """
-    chosen = gripper or load_gripper("gripper")
-    mesh = mesh_unit(chosen.unit, MeshSettings(refine=refine))
-    return path_deviations(chosen, mesh, materials_of(chosen.unit, mesh), rule, cube).J_hat_mm
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:

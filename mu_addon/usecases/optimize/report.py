@@ -13,7 +13,7 @@ from ...report.html import cards, facts_table, figure, note, number, page, table
 from ...run.progress import Progress
 from ...run.versions import package_versions
 from . import charts
-from .words import sensitivities
+from .words import sensitivities, shown
 
 if TYPE_CHECKING:
     from .run import Optimised, Proposal
@@ -85,8 +85,8 @@ def _units(found: Optimised) -> str:
         (
             [
                 f.name,
-                _shown(found.design.start[n]),
-                *(_shown(p.observed.design[n]) for p in found.proposals),
+                shown(found.design.start[n]),
+                *(shown(p.observed.design[n]) for p in found.proposals),
             ],
             False,
         )
@@ -192,7 +192,3 @@ def _inputs(found: Optimised) -> str:
         + table("", [("freedom", ""), ("range", "")], free)
         + facts_table("setting", "", facts)
     )
-
-
-def _shown(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -60,7 +60,7 @@ def changes(freedoms: Sequence[Freedom], start: Sequence[Any], design: Sequence[
 
     changed = [i for i in range(len(freedoms)) if design[i] != start[i]]
     return [
-        f"{freedoms[i].name}: {_shown(start[i])} to {_shown(design[i])} {freedoms[i].unit}".rstrip()
+        f"{freedoms[i].name}: {shown(start[i])} to {shown(design[i])} {freedoms[i].unit}".rstrip()
         + _at_bound(freedoms[i], design[i])
         for i in sorted(changed, key=size, reverse=True)
     ]
@@ -101,5 +101,6 @@ def _at_bound(freedom: Freedom, value: Any) -> str:
     return " (its lower bound)" if place < 1e-3 else " (its upper bound)" if place > 1 - 1e-3 else ""
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A freedom's value in a text."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from ...evidence.prediction.effective_pressure import in_the_chambers, remembere
 from ...evidence.prediction.unit_pressure import RELAXING, SPREADING, TIMED, TWO_VOLUMES
 from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
 from ...fem.newton_settings import NewtonSettings
+from ...reading import is_finite
 from .settings import ORIENTATION
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class NamedEffects:
 
     def __attrs_post_init__(self) -> None:
         turn = self.orientation_deg
-        if not _is_number(turn) or abs(turn) > 360:
+        if not is_finite(turn) or abs(turn) > 360:
             raise InputError(
                 f"orientation_deg = {turn!r} is not a valid orientation",
                 self.where,
@@ -200,10 +200,6 @@ class NamedEffects:
         return found
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _laws(name: str) -> tuple[tuple[Parameter, ...], ...]:
     """Sets of parameters by which an effect may be given, one for each law."""
     if name in STATIC:
@@ -257,7 +253,7 @@ def _in_words(name: str, given: Mapping[str, float]) -> str:
 
 
 def _size(p: Parameter, size: Any, where: str) -> float:
-    if not _is_number(size) or not p.low <= size <= p.high:
+    if not is_finite(size) or not p.low <= size <= p.high:
         unit = f" {p.unit}" if p.unit else ""
         raise InputError(
             f"{p.name} = {size!r} is out of bounds", where, f"give {p.low:g} to {p.high:g}{unit}"

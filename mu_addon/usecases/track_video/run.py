@@ -22,7 +22,7 @@ from ...measured.pose import AT_REST, SAMPLES
 from ...measured.table import Remark, read_table
 from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
-from ...reading import file_text, unreadable
+from ...reading import file_text, is_finite, unreadable
 from ...run.context import RunContext
 from ...table_cells.own import own_text
 from ...toml_writer import toml_text
@@ -201,7 +201,7 @@ def _markers(
                 )
             if key == "name":
                 continue
-            if not (isinstance(value, list) and len(value) == 2 and all(_finite(v) for v in value)):
+            if not (isinstance(value, list) and len(value) == 2 and all(is_finite(v) for v in value)):
                 raise InputError(
                     f"{key} = {value!r} of marker {name!r} is not a pair of numbers",
                     origin,
@@ -211,10 +211,6 @@ def _markers(
     if not names:
         raise InputError("no marker is defined", origin, "define each marker under [[marker]]")
     return pixels, places
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def read_pressure(path: Path) -> tuple[Array, Array]:
