@@ -111,7 +111,8 @@ def read_by_camera(
     view = _view(values)
     excess = get("camera_scale.excess", 0.0)
     turned = np.radians(drift("angle_drift", time_s, values))
-    if not (short or lens or excess or view or np.any(turned)):
+    turns = bool(np.any(turned))
+    if not (short or lens or excess or view or turns):
         return y
     across, along = 1.0 - max(short, 0.0), 1.0 + min(short, 0.0)
     half = 0.5 * LENGTH_mm * scale
@@ -122,20 +123,23 @@ def read_by_camera(
             turned_away, farther = view
             place = np.stack([across_mm, along_mm])
             across_mm, along_mm = turned_away @ place / (1.0 + farther @ place / half)
-        far = lens * (across_mm**2 + along_mm**2) / half**2
-        grown = (1.0 + excess) * (1.0 + far)
+        grown: Any = 1.0 + excess
+        if lens:
+            grown = grown * (1.0 + lens * (across_mm**2 + along_mm**2) / half**2)
         return across * grown * across_mm, along * grown * along_mm
 
     found = y.copy()
     for i, channel in enumerate(channels):
         if channel == ANGLE:
-            misread = _angle_misread(np.radians(y[i]), view, lens, across / along)
+            misread: Any = 0.0
+            if view or lens or short:
+                misread = _angle_misread(np.radians(y[i]), view, lens, across / along)
             found[i] = y[i] + np.degrees(misread + turned)
         elif channel.startswith("marker") and channel.endswith("_y_mm"):
             other = channel.replace("_y_mm", "_z_mm")
             k = channels.index(other) if other in channels else None
             place = picture(y[i], y[k] - half if k is not None else np.zeros_like(y[i]))
-            found[i] = np.cos(turned) * place[0] + np.sin(turned) * place[1]
+            found[i] = np.cos(turned) * place[0] + np.sin(turned) * place[1] if turns else place[0]
             if k is not None:
                 found[k] = half - np.sin(turned) * place[0] + np.cos(turned) * place[1]
     return found
@@ -149,9 +153,12 @@ def _view(values: Mapping[str, float]) -> tuple[Array, Array] | None:
     v over its distance.
     """
     get = values.get
-    farther = np.array([get("camera_perspective.across", 0.0), get("camera_perspective.along", 0.0)])
-    away = np.eye(2)
-    if off := np.radians(get("camera_perspective.view_deg", 0.0)):
+    first = get("camera_perspective.across", 0.0), get("camera_perspective.along", 0.0)
+    off = np.radians(get("camera_perspective.view_deg", 0.0))
+    if not (off or any(first)):
+        return None
+    farther, away = np.array(first), np.eye(2)
+    if off:
         way = np.radians(get("camera_perspective.farther_deg", 45.0))
         n = np.array([np.cos(way), np.sin(way)])
         away = away + (np.cos(off) - 1.0) * np.outer(n, n)

@@ -196,6 +196,8 @@ def slipped(
     sits on: by twice the angle of the line from the inlet, as on an arc. Along one axis it stays as it is.
     """
     found = y
+    if not any(key.startswith(SLIP) for key in values):
+        return y
     for number, axes in markers(channels).items():
         get, key = values.get, f"{SLIP}.marker{number}"
         rows = [channels.index(f"marker{number}_{axis}_mm") for axis in axes]

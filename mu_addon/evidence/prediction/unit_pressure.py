@@ -394,6 +394,9 @@ class UnitPressure:
             *slips,
         )
         self._sizes = {e.name: e.keys[0] for e in static.values()} | {n: p.name for n, p in errors.items()}
+        after = (e.name for e in (*camera, *slips))
+        self._after = (*after, *self._sizes.values(), *self._zeros[self.channels_known], *DISCREPANCIES)
+        self._effective: dict[Any, tuple[Experiment, Array]] = {}
         self.reference_kPa = max(float(np.abs(r.pressures_kPa).max()) for r in self._responses)
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
@@ -409,7 +412,7 @@ class UnitPressure:
         Raises InputError where no response is near the experiment's scale and orientation.
         """
         response = self._response(experiment)
-        pressure = self.discrepant(self.effective_kPa(experiment, values), values)
+        pressure = self.discrepant(self._remembered_kPa(experiment, values), values)
         static = self.static(values)
         if "gravity" in static:
             # Weight bends a stiffer unit less, in proportion.
@@ -440,6 +443,17 @@ class UnitPressure:
             return pressure
         x = pressure / self.reference_kPa
         return np.asarray(pressure + self.reference_kPa * (second * x**2 + third * x**3))
+
+    def _remembered_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
+        """`effective_kPa`, kept: derivatives by what acts after it (camera, static effects) need it again."""
+        own = frozenset((k, v) for k, v in values.items() if not k.startswith(self._after))
+        key = experiment.name, id(experiment), own
+        if key not in self._effective:
+            if len(self._effective) >= REMEMBERED:
+                self._effective.clear()
+            # With the experiment, whose identity could otherwise be reused.
+            self._effective[key] = experiment, self.effective_kPa(experiment, values)
+        return self._effective[key][1]
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Pressure (n,) in kPa at which the base unit stands where the unit of these values stands.
