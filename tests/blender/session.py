@@ -15,6 +15,7 @@ import pytest
 from .. import costs
 
 ROOT = Path(__file__).resolve().parents[2]
+COARSE = Path(__file__).parent / "coarse" / "site-packages"
 OTHERS = [path for path in os.environ.get("MU_BPY", "").split(os.pathsep) if path]
 PASSED_ON = "PATH", "LD_LIBRARY_PATH", "LANG", "WARP_CACHE_PATH"
 PATIENCE_S = 3600.0
@@ -62,7 +63,7 @@ class Blender:
             # A process that ends as these do leaves its folder of temporary files.
             "TMPDIR": str(self.folder),
             "OPENBLAS_NUM_THREADS": "1",
-            "PYTHONPATH": str(ROOT),
+            "PYTHONPATH": os.pathsep.join([str(ROOT), str(COARSE)]),
         }
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(
