@@ -81,7 +81,7 @@ def dates():
     if not PAGE.exists():
         return {}
     rows = [line.split("|") for line in PAGE.read_text(encoding="utf-8").splitlines()]
-    return {row[0].strip("` "): row[2].strip() for row in rows if len(row) == 3 and "::" in row[0]}
+    return {row[0].strip("` "): "".join(row[2:]).strip() for row in rows if len(row) > 1 and "::" in row[0]}
 
 
 def write(passed=()):
@@ -91,9 +91,8 @@ def write(passed=()):
     for (file, name), (where, quick) in every().items():
         test = f"{file}::{name}"
         guard = quick if where == file else f"{where}::{quick}"
-        rows.append(
-            f"`{test}` | `{guard}` | {today if test in passed else known.get(test, '')}".rstrip() + "\n"
-        )
+        date = today if test in passed else known.get(test, "")
+        rows.append(f"`{test}` | `{guard}`" + (f" | {date}" if date else "") + "\n")
     PAGE.write_text(HEAD + "".join(rows), encoding="utf-8")
 
 

@@ -61,6 +61,7 @@ def test_a_gauge_s_noise_has_no_name(hidden, names):
     assert found.kind == ("named" if names else "none")
 
 
+@pytest.mark.nightly("test_a_gauge_s_noise_has_no_name")
 def test_a_gauge_too_noisy_for_such_data_is_no_cause():
     made = analytic.measured(np.random.default_rng(1), {"modulus_factor": 1.05}, dt=0.25, count=4)
     made = noisy(made, 0.2)

@@ -248,6 +248,10 @@ def judged(tmp_path, part, number, battery=BATTERY):
     return of, diagnose(experiments, simulator_of(experiments))
 
 
+ANY_LAW = pytest.mark.nightly("test_a_mechanism_is_named_whatever_its_law")
+ANOTHER_LAW = pytest.mark.nightly("test_another_law_of_a_mechanism_is_named")
+
+
 @pytest.mark.parametrize(
     ("part", "number"),
     [
@@ -258,16 +262,16 @@ def judged(tmp_path, part, number, battery=BATTERY):
         ("single", 38),
         ("single", 130),
         # The same with a late clock, on an uneven clock of whose samples one stands out: mainly these two.
-        ("two", 22),
+        pytest.param("two", 22, marks=ANY_LAW),
         # Blocked force behind two volumes.
-        ("single", 44),
+        pytest.param("single", 44, marks=ANY_LAW),
         # Resin that relaxes in half a second, with structure at the steps: mainly that.
-        pytest.param("single", 133, marks=pytest.mark.slow),
+        pytest.param("single", 133, marks=ANY_LAW),
         # A line of two volumes: inertia and a resin at its bound had stood in for it, behind noise of 0.7
         # degrees where 0.04 is true.
-        pytest.param("single", 86, marks=pytest.mark.slow),
+        pytest.param("single", 86, marks=ANY_LAW),
         # Two modes and a resin that relaxes: inertia alone was named, with chi squared 139 a reading.
-        pytest.param("two", 23, marks=pytest.mark.slow),
+        pytest.param("two", 23, marks=ANY_LAW),
     ],
 )  # fmt: skip
 def test_a_mechanism_is_named_whatever_its_law(tmp_path, part, number):
@@ -276,7 +280,16 @@ def test_a_mechanism_is_named_whatever_its_law(tmp_path, part, number):
     assert all(math.isfinite(v) for ends in verdict.intervals.values() for v in ends)
 
 
-@pytest.mark.parametrize(("battery", "number"), [(LATER, 52), (LATER, 76), (26112611, 4)])
+@pytest.mark.parametrize(
+    ("battery", "number"),
+    [
+        (LATER, 52),
+        (LATER, 76),
+        pytest.param(
+            26112611, 4, marks=pytest.mark.nightly("test_no_reading_that_is_wrong_decides_a_verdict")
+        ),
+    ],
+)
 def test_no_reading_that_is_wrong_decides_a_verdict(tmp_path, battery, number):
     """A reading by 12 standard deviations off while a coupon is unloaded, one by 25 as a unit is let go; and
     some for which a filter of the load cell had been doubted.
@@ -286,6 +299,7 @@ def test_no_reading_that_is_wrong_decides_a_verdict(tmp_path, battery, number):
     assert any("farther from the fit" in words for words in verdict.set_aside)
 
 
+@pytest.mark.nightly("test_a_leak_that_ends_is_not_taken_for_warmth")
 def test_effects_that_leave_equally_little_are_told_as_a_choice(tmp_path):
     """A lag of the air line, with samples lost at a step, where a load cell does as well."""
     of, verdict = judged(tmp_path, "single", 44, LATER)
@@ -312,6 +326,7 @@ def test_a_valve_that_opens_is_a_leak(tmp_path):
     assert low < of.faults["outside_valve"]["opens_kPa"] < high
 
 
+@pytest.mark.nightly("test_another_law_of_a_mechanism_is_named")
 def test_one_mechanism_by_another_law_comes_before_two(tmp_path):
     """A valve that is tight after 52 s: cooling and a drift of the gauge were named together."""
     of, verdict = judged(tmp_path, "outside", 32, 260911)
@@ -344,15 +359,15 @@ def test_what_happened_at_one_moment_is_no_choice_of_drifts(tmp_path):
         (LATER, "single", 79),
         # A load cell's filter of two poles, and Bouc and Wen's friction.
         (LATER, "single", 11),
-        (LATER, "single", 51),
+        pytest.param(LATER, "single", 51, marks=ANOTHER_LAW),
         # Samples lost while a step was made.
-        (LATER, "single", 42),
+        pytest.param(LATER, "single", 42, marks=ANOTHER_LAW),
         # Cells that close, and a resin that creeps: one hundredth of a hundredth remains.
-        (LATER, "two", 5),
+        pytest.param(LATER, "two", 5, marks=ANOTHER_LAW),
         # A line of two volumes seen through steps: inertia at its largest damping, and a resin at its bound.
-        (260911, "single", 86),
+        pytest.param(260911, "single", 86, marks=ANOTHER_LAW),
         # A filter on an uneven clock: where the coupon was turned between two samples decides.
-        (260911, "single", 57),
+        pytest.param(260911, "single", 57, marks=ANOTHER_LAW),
     ],
 )
 def test_another_law_of_a_mechanism_is_named(tmp_path, battery, part, number):

@@ -265,13 +265,16 @@ def by_camera(y, scale=1.0, tilt=0.0, lens=0.0):
     return y
 
 
+CAMERA = pytest.mark.nightly("test_a_camera_s_fault_is_told_from_the_unit_s")
+
+
 @pytest.mark.parametrize(
     ("camera", "name"),
     [
         ({}, None),
-        ({"scale": 1.03}, "camera_scale"),
+        pytest.param({"scale": 1.03}, "camera_scale", marks=CAMERA),
         ({"tilt": 0.25}, "camera_tilt"),
-        ({"lens": 0.02}, "lens_distortion"),
+        pytest.param({"lens": 0.02}, "lens_distortion", marks=CAMERA),
     ],
     ids=["without a fault", "scale", "tilt", "lens"],
 )

@@ -177,7 +177,7 @@ def test_a_line_that_lags_is_found_by_the_blocked_force():
     assert of_presses(lag_s=0.3).names == ("line_lag",)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_line_that_lags_is_found_by_the_blocked_force")
 def test_a_cell_that_stands_off_is_among_what_looks_like_it():
     """A gap takes the force of a pressure away, and so does a gauge's zero: the set must have both."""
     verdict = of_presses(gap=0.8)

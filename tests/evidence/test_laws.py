@@ -152,6 +152,7 @@ def judged(tmp_path, faults, noise="white", level=0.0015, kind="coupon", seed=5)
     return diagnose(experiments, simulator_of(experiments))
 
 
+@pytest.mark.nightly("test_two_effects_by_other_laws_are_both_named")
 def test_a_stretched_exponential_is_viscoelasticity_and_nothing_beside_it(tmp_path):
     """Before, a lag of the load cell and Mullins' softening made up for what one law missed."""
     hidden = {"share": 0.13, "time_s": 8.0, "beta": 0.5}

@@ -80,6 +80,7 @@ def test_the_choice_of_a_specimen_names_nothing_in_clean_sets(seeds, count):
         assert judged(chambers([0.0] * count, seed=seed)).kind == "none"
 
 
+@pytest.mark.nightly("test_a_leak_of_all_is_nobody_s_own")
 def test_a_gauge_that_slipped_in_one_hold_is_no_effect_of_its_specimen():
     """At one moment: neither a leak nor a drift."""
     made = chambers([0.0, 0.0, 0.0])

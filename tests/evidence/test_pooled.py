@@ -97,7 +97,7 @@ def test_moduli_that_all_differ_have_a_spread_and_none_of_them_is_named_alone():
     assert not extended_model(found).effects
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/evidence/test_instruments.py::test_a_camera_s_fault_is_told_from_the_unit_s")
 def test_a_camera_that_is_set_up_anew_in_each_session_has_a_zero_of_each():
     zeros, made = (0.0, 1.1, -0.8, 0.5), []
     for k, zero in enumerate(zeros):

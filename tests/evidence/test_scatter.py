@@ -291,12 +291,15 @@ def test_what_records_are_off_by_within_their_scatter_is_slow_noise():
     assert "ambient light of experiment guide 71" in found.set_aside[-1]
 
 
+MISLED = pytest.mark.nightly("test_sets_of_the_second_code_that_had_misled")
+
+
 @pytest.mark.parametrize(
     ("part", "number", "kind"),
     [
         ("outside", 14, "unexplained"),
-        ("outside", 36, "unexplained"),
-        ("lab", 39, "unexplained"),
+        pytest.param("outside", 36, "unexplained", marks=MISLED),
+        pytest.param("lab", 39, "unexplained", marks=MISLED),
         ("clean", 75, "none"),
     ],
 )

@@ -215,7 +215,14 @@ def angle():
 STIFFER = [name for name in EFFECTS if name not in ("gravity", "mesh_error")]
 
 
-@pytest.mark.parametrize("name", STIFFER)
+GROWS = pytest.mark.nightly("test_an_effect_grows_from_nothing_and_the_right_way")
+# Layered, and with a law of its own: the two that stand for the others by day.
+BY_DAY = ("anisotropy", "strain_stiffening")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in BY_DAY else pytest.param(name, marks=GROWS) for name in STIFFER]
+)
 def test_an_effect_grows_from_nothing_and_the_right_way(name, angle):
     e = EFFECTS[name]
     body = Body(UNIT, ROUGH, FINER)
