@@ -36,7 +36,7 @@ def unit(tmp_path_factory):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, unit, with_light):
     folder = with_light(tmp_path_factory.mktemp("place") / "out")
-    done = here("place", *unit, "--out", folder, *COARSE, "--refine", "0.4", "--workers", "1")
+    done = here("place", *unit, "--out", folder, *COARSE, "--refine", "0.3", "--workers", "1")
     assert done.returncode == 0, done.stderr
     return folder, done
 

@@ -38,7 +38,7 @@ def test_surfaces_of_any_part_of_a_turn_are_closed_and_hold_its_volume(turn):
         assert volume(surface.vertices, surface.triangles) == pytest.approx(share * exact, rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("tests/meshing/test_surface.py::test_nested_spheres_are_told_apart")
 def test_a_body_that_is_no_mirror_image_is_meshed_whole(tmp_path):
     d, shear = SHORT.dimensions, 0.15
     drawn = cylinder(18.75, 25.0, 6.25, -1.0, d.height + 1.0, 32)
@@ -57,7 +57,7 @@ def test_a_body_that_is_no_mirror_image_is_meshed_whole(tmp_path):
     assert again.hash() == mesh.hash()
 
 
-@pytest.mark.nightly("test_a_body_that_is_no_mirror_image_is_meshed_whole")
+@pytest.mark.nightly("tests/meshing/test_surface.py::test_nested_spheres_are_told_apart")
 def test_bodies_bend_as_their_shape_says(tmp_path):
     """A box that is wider on one side bends; a body that is round about the axis has no side to bend to.
 

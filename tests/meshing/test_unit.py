@@ -324,7 +324,7 @@ def test_without_gmsh_pytetwild_is_asked_and_the_user_told(
     assert asked == [unit.dimensions]
 
 
-@pytest.mark.nightly("tests/meshing/test_body.py::test_a_body_that_is_no_mirror_image_is_meshed_whole")
+@pytest.mark.nightly("tests/meshing/test_surface.py::test_nested_spheres_are_told_apart")
 @pytest.mark.usefixtures("no_glu")
 def test_pytetwild_meshes_a_unit_instead() -> None:
     small = attrs.evolve(Unit(), chambers=attrs.evolve(Unit().chambers, count=3, wall_mm=1.5))

@@ -1,5 +1,6 @@
 """Struts of lattices of any kind as beams: moduli of frames, and units against the same mesh of solids."""
 
+import functools
 import math
 
 import attrs
@@ -87,17 +88,22 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def meshes(unit, folder):
-    def of(fidelity, fraction):
+    """The unit's mesh of one of these names, made when it is asked for."""
+    kinds = {"half": (RESOLVED, "half"), "full": (RESOLVED, "full"), "solid": (SOLID, "half")}
+
+    @functools.cache
+    def of(name):
+        fidelity, fraction = kinds[name]
         settings = MeshSettings(fidelity=fidelity, refine=0.5, fraction=fraction)
         return mesh_printed(unit, settings, cache=folder)
 
-    return {"half": of(RESOLVED, "half"), "full": of(RESOLVED, "full"), "solid": of(SOLID, "half")}
+    return of
 
 
 @pytest.fixture(scope="module")
 def sensed(unit, meshes):
     path = np.array([[0.0, 25.0, 12.5 * (k + 0.5)] for k in range(3)])
-    return {name: with_waveguide(meshes[name], bar_of(unit, path), unit) for name in ("half", "solid")}
+    return {name: with_waveguide(meshes(name), bar_of(unit, path), unit) for name in ("half", "solid")}
 
 
 def bent(unit, mesh, kPa=5.0):
@@ -156,7 +162,7 @@ def test_a_block_between_plates_is_as_stiff_as_swept_ones():
 
 @pytest.mark.nightly("test_a_block_between_plates_is_as_stiff_as_swept_ones")
 def test_a_unit_bends_as_its_solid_struts_do_and_half_of_it_as_the_whole(unit, meshes, sensed):
-    found = {name: bent(unit, mesh) for name, mesh in meshes.items()}
+    found = {name: bent(unit, meshes(name)) for name in ("half", "full", "solid")}
     (half, few), (full, _), (solid, many) = (found[name] for name in ("half", "full", "solid"))
     assert half == pytest.approx(full, rel=1e-3)
     assert half == pytest.approx(solid, rel=0.03)
@@ -167,7 +173,7 @@ def test_a_unit_bends_as_its_solid_struts_do_and_half_of_it_as_the_whole(unit, m
 
 
 def test_a_rigid_motion_strains_no_beam_and_carries_its_nodes(meshes):
-    mesh = meshes["full"]
+    mesh = meshes("half")
     turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
     u = np.array([1.0, 2.0, 3.0]) + turn.apply(mesh.nodes) - mesh.nodes
     wanted = u.copy()
@@ -179,7 +185,7 @@ def test_a_rigid_motion_strains_no_beam_and_carries_its_nodes(meshes):
 
 def test_what_a_beam_takes_is_what_solids_no_longer_resist(unit, meshes):
     """Elements within a beam resist nothing; of one that reaches into a beam the part outside does."""
-    mesh, solid = meshes["half"], meshes["solid"]
+    mesh, solid = meshes("half"), meshes("solid")
     assert (mesh.tets == solid.tets).all()
     assert (mesh.filled == solid.filled).all(), "all weigh what they did"
     cut = (mesh.in_beams > 0.0).any(axis=1)
@@ -204,7 +210,7 @@ def test_what_a_beam_takes_is_what_solids_no_longer_resist(unit, meshes):
 
 def test_struts_that_a_waveguide_meets_are_solid_again(meshes, sensed):
     """Where bar and struts are as wide the joint is whole again: nothing is missing, nothing doubled."""
-    plain, found, by_solids = meshes["half"], sensed["half"], sensed["solid"]
+    plain, found, by_solids = meshes("half"), sensed["half"], sensed["solid"]
     assert 0 < len(found.beams) < len(plain.beams)
     own = len(plain.tets)
     held = np.zeros(len(found.nodes), bool)
