@@ -16,7 +16,7 @@ from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import InputError, MeshingError
 from .lattice import GmshUnavailable, Sizes, lattice_mesh
-from .membrane import Membrane, Meridian, division, membrane_mesh, stations
+from .membrane import Membrane, WallGrid
 from .mesh import (
     LATTICE,
     MEMBRANE,
@@ -30,7 +30,7 @@ from .mesh import (
     oriented,
     second_order,
 )
-from .morph import harmonic
+from .morph import Harmonic
 from .quality import GAUSS, check_positive, folded_corners, shapes
 from .revolved import region_at, unit_surfaces
 from .settings import CELL_MM, MeshSettings
@@ -101,18 +101,8 @@ def mesh_unit(
 
 def _structured(d: Dimensions, settings: MeshSettings, report: Progress) -> Mesh:
     """Half mesh: a revolved membrane in a lattice region filled by gmsh."""
-    size = d.cell / CELL_MM / settings.refine
-    meridian = Meridian.of(d)
     report("mesh of the membrane", 0.0)
-    membrane = membrane_mesh(
-        meridian,
-        turn=math.pi,
-        p=stations(meridian, settings.meridian_mm * size),
-        # Alternating diagonals mirror each other about y = 0 only if both quarters have as many sectors.
-        sectors=2 * division(d.R * math.pi / 2, settings.hoop_mm * size),
-        layers=max(1, int(settings.through_wall * settings.refine + 0.5)),
-        rings=division(d.r, settings.hoop_mm * size),
-    )
+    membrane = WallGrid.under(settings, d).membrane
     report("mesh of the lattice", 0.2)
     added, tets = _lattice(d, settings, membrane)
     nodes = np.vstack([membrane.nodes, added])
@@ -269,4 +259,4 @@ def _harmonic(nodes: Array, tets: Array, moved: Array, prescribed: Array) -> Arr
     slopes = np.einsum("qnr,mrd->mqnd", gradient, np.linalg.inv((x[:, 1:] - x[:, :1]).transpose(0, 2, 1)))
     # Not weighed by the elements' volumes, so that small ones are the stiff ones.
     local = np.einsum("mqad,mqbd->mab", slopes, slopes)
-    return harmonic(len(nodes), tets, local, moved, prescribed)
+    return Harmonic(len(nodes), tets, local, prescribed).between(moved)

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.profile import outer_radius, outer_slope
-from ..errors import InputError
+from ..errors import InputError, MeshingError
 from .mesh import Array, boundary_faces, edges_of, oriented
+from .settings import CELL_MM, MeshSettings
 
 # A cube split in five, in the two mirror images that alternate so that diagonals of neighbours meet;
 # a corner is numbered 4 i + 2 j + k.
@@ -138,17 +139,14 @@ class Membrane:
     middles: Array
 
 
-def membrane_mesh(
-    meridian: Meridian, turn: float, p: Array, sectors: int, layers: int, rings: int
-) -> Membrane:
-    """Linear tetrahedra of the membrane: the grid of stations p (n,) in mm revolved over an angle.
+def membrane_mesh(meridian: Meridian, p: Array, sectors: int, layers: int, rings: int) -> Membrane:
+    """Linear tetrahedra of the membrane at x >= 0: the grid of stations p (n,) in mm revolved from +y to -y.
 
-    turn: pi/2 or pi, in radians from +y towards +x. sectors: elements around; layers: through the wall;
-    rings: from wall to axis in the caps.
+    sectors: elements around; layers: through the wall; rings: from wall to axis in the caps.
     """
     low, high = meridian.cuts
     q = np.concatenate([np.linspace(0, 1, layers + 1), 1 + np.arange(1, rings + 1) / rings])
-    angle = np.linspace(0, turn, sectors + 1)
+    angle = np.linspace(0, math.pi, sectors + 1)
     at_cap = (p <= low) | (p >= high)
     ids = np.full((len(p), sectors + 1, len(q)), -1)
     exists = np.broadcast_to(((q <= 1)[None, :] | at_cap[:, None])[:, None, :], ids.shape).copy()
@@ -157,7 +155,7 @@ def membrane_mesh(
     ids[:, 1:, -1] = ids[:, :1, -1]
     i, j, k = np.nonzero(exists)
     coordinates = np.column_stack([p[i], angle[j], q[k]])
-    nodes = _revolved(meridian, coordinates, turn)
+    nodes = _revolved(meridian, coordinates)
 
     capped = (p[1:] <= low) | (p[:-1] >= high)
     tets = oriented(nodes, _five_each(ids, capped[:, None] | (q[1:] <= 1)[None, :]))
@@ -167,7 +165,7 @@ def membrane_mesh(
     # On the axis the angle means nothing: an edge that starts there runs in the plane of its other end.
     axial = ends[..., 2] == 2.0
     ends[..., 1] = np.where(axial & ~axial[:, ::-1], ends[:, ::-1, 1], ends[..., 1])
-    middles = _revolved(meridian, ends.mean(axis=1), turn)
+    middles = _revolved(meridian, ends.mean(axis=1))
 
     faces, _ = boundary_faces(tets)
     depth, height = coordinates[:, 2], coordinates[:, 0]
@@ -194,12 +192,59 @@ def _five_each(ids: Array, solid: Array) -> Array:
     return tets[np.all(np.diff(ordered, axis=1) > 0, axis=1)]
 
 
-def _revolved(meridian: Meridian, coordinates: Array, turn: float) -> Array:
-    """Points (n, 3) in mm from (p, angle, q), exactly on the mirror planes at both ends of the turn."""
+def _revolved(meridian: Meridian, coordinates: Array) -> Array:
+    """Points (n, 3) in mm from (p, angle, q), exactly on the mirror plane at both ends of the turn."""
     p, angle, q = coordinates.T
     radius, z = meridian.point(p, q).T
     x, y = radius * np.sin(angle), radius * np.cos(angle)
     x[(angle == 0) | (angle == np.pi)] = 0.0
-    if turn < np.pi:
-        y[angle == turn] = 0.0
     return np.column_stack([x, y, z])
+
+
+class WallGrid:
+    """Grid of a unit's wall and caps at x >= 0, repeated node by node for units near to it."""
+
+    def __init__(self, d: Dimensions, meridian_mm: float, hoop_mm: float, layers: int) -> None:
+        """d: as printed; meridian_mm, hoop_mm: of elements along the meridian and around; layers: of them."""
+        self.meridian = Meridian.of(d)
+        self._heights = stations(self.meridian, meridian_mm)
+        # Alternating diagonals mirror each other about y = 0 only if both quarters have as many sectors.
+        self._counts = 2 * division(d.R * math.pi / 2, hoop_mm), layers, division(d.r, hoop_mm)
+        self.membrane = membrane_mesh(self.meridian, self._heights, *self._counts)
+
+    @classmethod
+    def under(cls, settings: MeshSettings, d: Dimensions) -> WallGrid:
+        """The grid of a homogenised unit's wall under the settings; d: as printed."""
+        size = d.cell / CELL_MM / settings.refine
+        layers = max(1, int(settings.through_wall * settings.refine + 0.5))
+        return cls(d, settings.meridian_mm * size, settings.hoop_mm * size, layers)
+
+    def of(self, b: Dimensions) -> Membrane:
+        """Membrane of other dimensions of the same cell and envelope; raises MeshingError."""
+        a = self.meridian.d
+        if a.count != b.count or not np.allclose(a.bounds, b.bounds, rtol=0, atol=1e-9 * a.cell):
+            raise unmovable("its envelope differs")
+        second = Meridian.of(b)
+        breaks = [_breaks(m) for m in (self.meridian, second)]
+        order = np.argsort(breaks[0])
+        from_, to = (x[order] for x in breaks)
+        if not (np.diff(to) > 0).all():
+            raise unmovable("its profile differs")
+        made = membrane_mesh(second, np.interp(self._heights, from_, to), *self._counts)
+        if not np.array_equal(self.membrane.tets, made.tets):
+            raise unmovable("its membrane folds")
+        return made
+
+
+def _breaks(meridian: Meridian) -> Array:
+    """Heights on the profile where a part ends: cuts, arcs, ends."""
+    d = meridian.d
+    joints = np.arange(d.count)[:, None] * d.cell + np.array([0.0, d.b, d.cell / 2, d.cell - d.b])
+    return np.concatenate([joints.ravel(), [d.height], meridian.cuts])
+
+
+def unmovable(why: str) -> MeshingError:
+    """Error of a mesh that cannot be moved to another unit."""
+    return MeshingError(
+        f"the mesh of a unit cannot be moved: {why}", "unit", "make a new mesh of the other unit"
+    )

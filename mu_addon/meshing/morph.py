@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
-from .membrane import Membrane, division
+from .membrane import Membrane, WallGrid, unmovable
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh, edge_keys, edges_of
 from .quality import check_positive
-from .settings import CELL_MM, MeshSettings
-from .wall_grid import WallGrid, unmovable
+from .settings import MeshSettings
 
 
 class Harmonic:
@@ -49,11 +46,6 @@ class Harmonic:
         return result
 
 
-def harmonic(nodes: int, cells: Array, local: Array, moved: Array, prescribed: Array) -> Array:
-    """Displacements (nodes, 3) in mm: `moved` where `prescribed`, harmonic elsewhere; see `Harmonic`."""
-    return Harmonic(nodes, cells, local, prescribed).between(moved)
-
-
 class Morph:
     """Moves the half mesh that gmsh made of a unit under some settings to other units.
 
@@ -63,16 +55,8 @@ class Morph:
     def __init__(self, mesh: Mesh, drawn: Unit, settings: MeshSettings) -> None:
         """Raises MeshingError where the mesh is not that of the unit by gmsh under the settings."""
         a = drawn.printed
-        self.mesh, self.drawn, self._settings = mesh, drawn, settings
-        size = a.cell / CELL_MM / settings.refine
-        self._grid = WallGrid(
-            a,
-            settings.meridian_mm * size,
-            math.pi,
-            2 * division(a.R * math.pi / 2, settings.hoop_mm * size),
-            max(1, int(settings.through_wall * settings.refine + 0.5)),
-            division(a.r, settings.hoop_mm * size),
-        )
+        self.mesh, self.drawn = mesh, drawn
+        self._grid = WallGrid.under(settings, a)
         self._before = self._grid.membrane
         count = len(self._before.nodes)
         close = 1e-6 * a.cell

@@ -18,11 +18,11 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.elements import even_points, shape_functions, shape_gradients
 from ..fem.embedding import Footholds
+from ..meshing.membrane import unmovable
 from ..meshing.mesh import Array, Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
-from ..meshing.wall_grid import unmovable
 from .beams import Layers, rotation_nodes
 from .joints import zones_of
 from .lattice import clearance, cuts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,11 +15,10 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.embedding import embed
 from ..meshing.homogenised_unit import mesh_unit
-from ..meshing.membrane import Membrane, division
+from ..meshing.membrane import Membrane, WallGrid
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, SOLID, MeshSettings
-from ..meshing.wall_grid import WallGrid
 from .beams import REACH, with_beams
 from .frame import frame_zones
 from .graph_beams import with_graph_beams
@@ -150,14 +148,7 @@ def mesh_printed(
 def wall_grid(d: Dimensions, sizes: Sizes) -> WallGrid:
     """Grid of a unit's wall and caps at x >= 0."""
     scale = d.cell / CELL_MM
-    return WallGrid(
-        d,
-        sizes.meridian_mm * scale,
-        math.pi,
-        2 * division(d.R * math.pi / 2, sizes.hoop_mm * scale),
-        sizes.through_wall,
-        division(d.r, sizes.hoop_mm * scale),
-    )
+    return WallGrid(d, sizes.meridian_mm * scale, sizes.hoop_mm * scale, sizes.through_wall)
 
 
 def wall_mesh(d: Dimensions, sizes: Sizes) -> Mesh:

@@ -7,7 +7,6 @@ and with them every element: two seeds are two meshes that nobody would call dif
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +17,7 @@ from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import MeshingError
 from mu_addon.meshing.lattice import gmsh_model, load_gmsh
-from mu_addon.meshing.membrane import Meridian, division, membrane_mesh, stations
+from mu_addon.meshing.membrane import WallGrid
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Array, Mesh, edges_of, mirror, oriented, second_order
 from mu_addon.meshing.quality import check_positive
 
@@ -65,15 +64,7 @@ def unstructured_mesh(unit: Unit, recipe: Recipe, seed: int) -> Mesh:
 
 def _whole_membrane(d: Dimensions, meridian_mm: float, hoop_mm: float) -> tuple[Mesh, Array]:
     """The membrane all around, straight-sided, and its outer triangles (f, 3), normals out of the solid."""
-    meridian = Meridian.of(d)
-    half = membrane_mesh(
-        meridian,
-        turn=math.pi,
-        p=stations(meridian, meridian_mm),
-        sectors=2 * division(d.R * math.pi / 2, hoop_mm),
-        layers=1,
-        rings=division(d.r, hoop_mm),
-    )
+    half = WallGrid(d, meridian_mm, hoop_mm, 1).membrane
     ends = np.empty(0, np.int32)
     region = np.full(len(half.tets), MEMBRANE)
     mesh = Mesh(half.nodes, half.tets, region, half.cavity, ends, ends, ("x",))
