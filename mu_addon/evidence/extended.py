@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -15,7 +14,7 @@ from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
 from ..reading import file_text, is_number, parse_toml
 from ..toml_writer import Commented, toml_text
-from .effect import LIBRARY, SLIP
+from .effect import LIBRARY, SLIP, Parameter
 from .verdict import Verdict
 
 
@@ -101,11 +100,11 @@ def _numbers(f: Fitted) -> dict[str, float | str]:
     return {k: v for k, v in numbers.items() if math.isfinite(v)} | {"unit": f.unit}
 
 
-def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType({})) -> ExtendedModel:
+def extended_model(verdict: Verdict, nuisances: Iterable[Parameter] = ()) -> ExtendedModel:
     """The model of a verdict: the base with the named effects, or alone where none is named.
 
-    units: of the nuisances, by name; empty where one is missing. Intervals are the verdict's 95 % ones, nan
-    where it has none.
+    nuisances: of the simulator, which give their units. Those that these data do not determine are left out.
+    Intervals are the verdict's 95 % ones, nan where it has none.
     """
     found = verdict.selection
     fit = found.chosen if verdict.names else found.base
@@ -121,8 +120,10 @@ def extended_model(verdict: Verdict, units: Mapping[str, str] = MappingProxyType
             # Two kinds of experiments may have one mechanism by parameters of their own.
             of_name = effects.setdefault(e.name, {})
             of_name |= {p.name: fitted(k, p.unit) for k, p in zip(e.keys, e.parameters, strict=True)}
-    nuisances = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k}
-    return ExtendedModel(verdict.kind, effects, nuisances)
+    units = {p.name: p.unit for p in nuisances}
+    seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
+    known = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k and k in seen}
+    return ExtendedModel(verdict.kind, effects, known)
 
 
 def load_model(path: Path) -> ExtendedModel:

@@ -97,7 +97,8 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         of_a_unit = any(e.kind in OF_A_UNIT for e in measured.experiments)
         settings = settings.further(verdict.in_question) if of_a_unit else None
     notes += _known_before(job, simulator)
-    model, block = _extended_model(verdict, simulator), simulators.get(lattice_compression.KIND)
+    model = extended_model(verdict, simulator.nuisances)
+    block = simulators.get(lattice_compression.KIND)
     if isinstance(block, lattice_compression.LatticeStress) and block.computed:
         model = attrs.evolve(model, lattice=block.computed)
         notes += _resin(model, unit)
@@ -146,14 +147,6 @@ def _first_look(
     with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
         pass
     return {"verdict": verdict.kind, "headline": headline, "sentence": words}
-
-
-def _extended_model(verdict: Verdict, simulator: Composite) -> ExtendedModel:
-    """The extended model, without nuisances that these data do not determine."""
-    model = extended_model(verdict, {p.name: p.unit for p in simulator.nuisances})
-    fit = verdict.selection.chosen if verdict.names else verdict.selection.base
-    seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
-    return attrs.evolve(model, nuisances={k: f for k, f in model.nuisances.items() if k in seen})
 
 
 def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) -> ExtendedModel:
