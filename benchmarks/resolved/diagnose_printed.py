@@ -1,10 +1,11 @@
 """Verdicts with the printed body as base, on data made by the printed body on another mesh.
 
     python -m benchmarks.resolved.diagnose_printed FOLDER [--only clean,gravity] [--refine 1.2] [--seed 1]
+        [--low 0] [--fidelity homogenised]
 
 A unit of three chambers is bent through suction and pressure; each set hides one static effect or a gauge's
-zero, and is diagnosed as `diagnose --fidelity resolved` does. All sets have one protocol: the simulations of
-the first serve them all. Prints a row a set, with seconds by the clock and of the processor.
+zero, and is diagnosed as `diagnose` does, or by the homogenised lattice. All sets have one protocol: the
+simulations of the first serve them all. Prints a row a set, with seconds by the clock and of the processor.
 """
 
 from __future__ import annotations
@@ -62,13 +63,13 @@ def angles(name: str, refine: float, folder: Path) -> np.ndarray:
     return np.asarray(np.load(kept))
 
 
-def trials(name: str, rng: np.random.Generator, bent: np.ndarray) -> list[Trial]:
-    """Readings of a ladder, a slow and a fast wave of pressure."""
+def trials(name: str, rng: np.random.Generator, bent: np.ndarray, low: float = LOW_kPa) -> list[Trial]:
+    """Readings of a ladder, a slow and a fast wave of pressure, from `low` in kPa."""
     from scipy.interpolate import CubicSpline
 
     reached = np.isfinite(bent)
     bends = CubicSpline(np.array(PRESSURES_kPa)[reached], bent[reached])
-    low, high = LOW_kPa, HIGH_kPa
+    high = HIGH_kPa
     protocols = {
         "ladder": ([0, 20, 60, 100, 140, 180, 200], [0, high / 2, high / 2, high, low / 2, low, 0]),
         "slow": ([0, 40, 120, 200, 240], [0, high, low, high, 0]),
@@ -92,6 +93,8 @@ def main() -> None:
     parser.add_argument("--only", default=",".join(SETS))
     parser.add_argument("--refine", type=float, default=1.2, help="of the mesh that the data are of")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--low", type=float, default=LOW_kPa, help="least pressure, kPa")
+    parser.add_argument("--fidelity", default=RESOLVED, help="of the base")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     unit = given.folder / "unit.toml"
@@ -103,13 +106,15 @@ def main() -> None:
     )
     for name in given.only.split(","):
         bent = angles(name, given.refine, given.folder)
-        data = given.folder / f"{name}-{given.refine:g}-{given.seed}"
+        data = given.folder / f"{name}-{given.refine:g}-{given.seed}-from{given.low:g}"
         if not data.exists():
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
-            write(data, trials(name, rng, bent))
+            write(data, trials(name, rng, bent, given.low))
         began, used = time.time(), _processor_s()
-        found = verdict_on(data, unit, given.folder / "diagnosis", "--fidelity", RESOLVED)
-        write_text(given.folder / f"{data.name}.json", json.dumps(found, indent=1))
+        found = verdict_on(
+            data, unit, given.folder / f"diagnosis-{given.fidelity}", "--fidelity", given.fidelity
+        )
+        write_text(given.folder / f"{data.name}-{given.fidelity}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")
         print("| " + " | ".join(row) + " |", flush=True)

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `design-experiments`."""
-    from ..meshing.settings import DIAGNOSED
-
     command = commands.add_parser(
         "design-experiments",
         help="Design experiments before measuring: compute which effects planned experiments can detect, "
@@ -29,7 +27,7 @@ def add(commands: Commands[Any]) -> None:
         "numbers.",
     )
     add_unit(command, required=False)
-    add_fidelity(command, default=DIAGNOSED.default)
+    add_fidelity(command)
     add_report(command)
     command.add_argument(
         "--noise",

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `diagnose`."""
-    from ..meshing.settings import DIAGNOSED
-
     command = commands.add_parser(
         "diagnose",
         help="Diagnose model error from measured data: name the physical effects missing from the model, "
@@ -25,7 +23,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_unit(command, required=False)
-    add_fidelity(command, default=DIAGNOSED.default)
+    add_fidelity(command)
     command.add_argument(
         "--model",
         metavar="FILE",

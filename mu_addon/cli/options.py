@@ -197,21 +197,14 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_fidelity(
-    command: argparse.ArgumentParser, homogenised_with: str = "", default: str | None = None
-) -> None:
-    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice.
-
-    default: of a command that has one of its own.
-    """
+def add_fidelity(command: argparse.ArgumentParser, homogenised_with: str = "") -> None:
+    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice."""
     from ..meshing.settings import FIDELITY, SELF_CONTACT
 
-    words = default or str(FIDELITY.default)
+    words = str(FIDELITY.default)
     if homogenised_with:
         words += f"; homogenised with {homogenised_with}, which need it"
-    command.add_argument(
-        "--fidelity", choices=FIDELITY.choices, default=default, help=help_of(FIDELITY, words)
-    )
+    command.add_argument("--fidelity", choices=FIDELITY.choices, help=help_of(FIDELITY, words))
     command.add_argument("--self-contact", action=argparse.BooleanOptionalAction, help=help_of(SELF_CONTACT))
 
 

@@ -23,8 +23,6 @@ FIDELITY = described(
     "these), or a continuum",
     choices=FIDELITIES,
 )
-# Of a diagnosis, whose verdicts are tested on homogenised units; see docs/engineering/decisions.md.
-DIAGNOSED = FIDELITY._replace(default=HOMOGENISED)
 SELF_CONTACT = described(
     "self_contact",
     True,

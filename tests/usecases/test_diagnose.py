@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
@@ -23,10 +24,13 @@ from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose import run as diagnosing
+from mu_addon.usecases.diagnose.design_experiments import USE_CASE as PLANNING
+from mu_addon.usecases.diagnose.design_experiments import Job as Plan
 from mu_addon.usecases.diagnose.job import Job, read_job
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
 from mu_addon.usecases.diagnose.words import alternatives, bare
+from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
 
@@ -35,6 +39,8 @@ from .diagnosis_data import DRAWN_kPa, bent_unit, weighed_blocks
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "assets" / "examples" / "paper-moduli"
 OFFSET_mm = 0.09
+# Of data in closed form: a printed unit's effects are simulated at few sizes first.
+ALL_SIZES = {"fidelity": "homogenised"}
 
 
 def run(folder, out, *arguments, **options):
@@ -193,7 +199,7 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
 
     monkeypatch.setattr(unit_fem, "unit_responses", responses)
     out = tmp_path / "out"
-    context, messages = run(folder, out)
+    context, messages = run(folder, out, **ALL_SIZES)
     assert context.status == 0, messages[-1]
     assert context.summary["verdict"] == "named"
     assert [c["effect"] for c in context.summary["causes"]] == ["clogged_chamber"]
@@ -268,26 +274,58 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
     assert Job(measured, fidelity="resolved").self_contact
     assert [job.unit_settings.self_contact for job in jobs] == [False, True]
     assert jobs[0].texts()["diagnose.toml"] != jobs[1].texts()["diagnose.toml"]
-    for name, text in jobs[1].texts().items():
-        (tmp_path / name).write_text(text)
+    for job in (*jobs, Job(measured, fidelity="homogenised")):
+        for name, text in job.texts().items():
+            (tmp_path / name).write_text(text)
+        again = read_job(tmp_path)
+        assert (again.fidelity, again.self_contact) == (job.fidelity, job.self_contact)
+        assert again.texts() == job.texts()
+
+
+def test_every_face_simulates_the_printed_unit_unless_told_otherwise(tmp_path, monkeypatch):
+    folder = ROOT / "assets" / "examples" / "paper-bending"
+    measured, printed = read_folder(folder), ("resolved", True)
+    assert [(j.fidelity, j.self_contact) for j in (Job(measured), Plan(measured))] == [printed] * 2
+    started = []
+    for use_case in (USE_CASE, PLANNING):
+        monkeypatch.setattr(type(use_case), "start", lambda _, job, *__: started.append(job))
+    for command in ("diagnose", "design-experiments"):
+        main([command, str(folder), "--out", str(tmp_path / "out")])
+        main([command, str(folder), "--fidelity", "homogenised", "--out", str(tmp_path / "out")])
+    assert [(j.fidelity, j.self_contact) for j in started] == [printed, ("homogenised", False)] * 2
+    node = definitions()["diagnose"]
+    assert {s.name: s.description.default for s in node.settings} == {
+        "fidelity": "resolved",
+        "self_contact": True,
+    }
+    # A run from before every one named it stays what it was.
+    text = Job(measured).texts()["diagnose.toml"]
+    named = ('fidelity = "resolved"\n', "self_contact = true\n")
+    assert all(words in text for words in named)
+    for words in named:
+        text = text.replace(words, "")
+    (tmp_path / "diagnose.toml").write_text(text)
     again = read_job(tmp_path)
-    assert (again.fidelity, again.self_contact) == ("resolved", True)
-    assert again.texts() == jobs[1].texts()
+    assert (again.fidelity, again.self_contact) == ("homogenised", False)
+    # Of blocks nothing is said: their cells are computed either way.
+    assert "fidelity" not in Job(read_folder(PAPER)).texts()["diagnose.toml"]
 
 
 def test_a_unit_of_softer_resin_is_trusted_with_its_own_moduli(tmp_path, analytic_unit):
-    context, _ = run(bent_unit(tmp_path / "data", {"modulus_factor": 0.8}), tmp_path / "out")
+    context, _ = run(bent_unit(tmp_path / "data", {"modulus_factor": 0.8}), tmp_path / "out", **ALL_SIZES)
     assert context.summary["verdict"] == "none"
     assert "with --model model.toml, whose moduli are 0.8 times the unit's" in context.summary["to_do"]
 
 
 @pytest.mark.nightly("test_a_diagnosis_goes_on_with_what_it_knew")
 def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic_unit):
-    first, _ = run(bent_unit(tmp_path / "first", RELAXES), tmp_path / "one", load_preset("mu-1.0x"))
+    first, _ = run(
+        bent_unit(tmp_path / "first", RELAXES), tmp_path / "one", load_preset("mu-1.0x"), **ALL_SIZES
+    )
     assert [c["effect"] for c in first.summary["causes"]] == ["viscoelasticity"]
     before = load_model(tmp_path / "one/model.toml")
     both = bent_unit(tmp_path / "both", RELAXES | {"pressure_offset.offset_kPa": 2.0}, seed=4)
-    second, _ = run(both, tmp_path / "two", load_preset("mu-1.0x"), known=before)
+    second, _ = run(both, tmp_path / "two", load_preset("mu-1.0x"), known=before, **ALL_SIZES)
     (cause,) = second.summary["causes"]
     assert cause["effect"] == "pressure_offset"
     assert cause["parameters"]["offset_kPa"]["value"] == pytest.approx(2.0, abs=0.2)
@@ -297,7 +335,7 @@ def test_what_was_found_before_stays_and_a_new_cause_is_added(tmp_path, analytic
     assert any("known before" in words for words in second.summary["remarks"])
     # Data of the first kind hold nothing new.
     again = bent_unit(tmp_path / "again", RELAXES, seed=5)
-    third, _ = run(again, tmp_path / "three", load_preset("mu-1.0x"), known=before)
+    third, _ = run(again, tmp_path / "three", load_preset("mu-1.0x"), known=before, **ALL_SIZES)
     assert third.summary["verdict"] == "none"
     assert list(load_model(tmp_path / "three/model.toml").effects) == ["viscoelasticity"]
 

@@ -24,7 +24,7 @@ from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.files import write_text
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import AXES, LATTICE, Mesh
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.settings import HOMOGENISED, MeshSettings
 
 from .recording import Trial, instrument, read, write
 from .units import _softened
@@ -250,7 +250,7 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(folder, trials(name, rng, angles))
         began = time.time()
-        found = verdict_on(folder, described, given.out / "diagnosis")
+        found = verdict_on(folder, described, given.out / "diagnosis", "--fidelity", HOMOGENISED)
         causes = ", ".join(c["effect"] for c in found["causes"])
         hidden = ", ".join(SETS[name]) or ("a mount that sticks" if name == "sticks" else "nothing")
         row = (name, hidden, str(found["verdict"]), causes, f"{time.time() - began:.0f}")

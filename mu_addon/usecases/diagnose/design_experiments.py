@@ -22,7 +22,7 @@ from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import described, experiments_digest, require_same_data
 from ...meshing.settings import (
-    DIAGNOSED,
+    FIDELITY,
     HOMOGENISED,
     MeshSettings,
     require_self_contact_resolvable,
@@ -34,7 +34,7 @@ from ...run.inputs import FORMAT, named_path, read_inputs
 from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ...toml_writer import toml_text
-from .job import UNIT, fidelity_in, unit_behind
+from .job import UNIT, fidelity_in, fidelity_of, unit_behind
 from .simulators import simulations_plan, simulators_of
 from .words import bare, listed, readable
 
@@ -101,7 +101,7 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
-    fidelity: str = DIAGNOSED.field()
+    fidelity: str = FIDELITY.field()
     self_contact: bool = attrs.field(
         default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
     )
@@ -120,8 +120,7 @@ class Job:
             "format": FORMAT,
             "experiments_sha256": experiments_digest(self.measured),
             **self.noise,
-            "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
-            "self_contact": self.self_contact or None,
+            **fidelity_of(self),
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -141,8 +140,7 @@ def read_job(folder: Path) -> Job:
         measured,
         read_unit(unit) if unit.is_file() else None,
         noise,
-        fidelity_in(values, path),
-        values.get("self_contact") is True,
+        **fidelity_in(values, path),
     )
 
 

@@ -17,8 +17,8 @@ from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE, described, experiments_digest, require_same_data
 from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import (
-    DIAGNOSED,
     FIDELITIES,
+    FIDELITY,
     HOMOGENISED,
     MeshSettings,
     require_self_contact_resolvable,
@@ -54,7 +54,7 @@ class Job:
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
-    fidelity: str = DIAGNOSED.field()
+    fidelity: str = FIDELITY.field()
     known: ExtendedModel | None = None
     self_contact: bool = attrs.field(
         default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
@@ -88,8 +88,7 @@ class Job:
             "experiments_sha256": experiments_digest(self.measured),
             "program_sha256": _program(),
             "settings": None if self.settings is None else repr(self.settings),
-            "fidelity": None if self.fidelity == HOMOGENISED else self.fidelity,
-            "self_contact": self.self_contact or None,
+            **fidelity_of(self),
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -111,20 +110,31 @@ def read_job(folder: Path) -> Job:
     return Job(
         measured,
         read_unit(unit) if unit.is_file() else None,
-        fidelity=fidelity_in(values, path),
-        self_contact=values.get("self_contact") is True,
+        **fidelity_in(values, path),
         known=load_model(known) if known.is_file() else None,
     )
 
 
-def fidelity_in(values: Mapping[str, Any], path: Path) -> str:
-    """The fidelity that a file of inputs names, homogenised where it names none; raises InputError."""
+def fidelity_of(job: Any) -> dict[str, Any]:
+    """Fidelity and self-contact as entries of a job's file of inputs; none where no unit is simulated."""
+    if not any(e.kind in OF_A_UNIT for e in job.measured.experiments):
+        return {}
+    apart = None if job.fidelity == HOMOGENISED else job.self_contact
+    return {"fidelity": job.fidelity, "self_contact": apart}
+
+
+def fidelity_in(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Fidelity and self-contact of a file of inputs; raises InputError.
+
+    Homogenised where it names none, as runs were before every one of a unit named it.
+    """
     found = values.get("fidelity", HOMOGENISED)
     if found not in FIDELITIES:
         raise InputError(
             f"fidelity = {found!r} is unknown", str(path), f"write one of {', '.join(FIDELITIES)}"
         )
-    return str(found)
+    apart = values.get("self_contact", found != HOMOGENISED)
+    return {"fidelity": found, "self_contact": apart is True}
 
 
 def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:

@@ -22,8 +22,8 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 450.0
-"""Approximate seconds of the simulation of a block, and of a homogenised and a printed unit with effects."""
+LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 35.0
+"""Approximate seconds of the simulation of a block, of a homogenised unit and of a printed chamber."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
@@ -42,7 +42,8 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, fid
         lowest = min(
             (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
         )
-        unit = PRINTED_S * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
+        chambers = behind.chambers.count if behind else 1
+        unit = PRINTED_S * chambers * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
     lattice = []
     if any(e.cells for e in experiments) and behind is not None:
         from ...evidence.lattice_fem import to_compute

@@ -20,6 +20,7 @@ from ...headless.processes import run
 from ...made_once import made_once
 from ...usecases.bent_motion import write_bent_run
 from ...usecases.diagnosis_data import bent_unit, weighed_blocks
+from ...usecases.test_diagnose import ALL_SIZES
 from ...usecases.test_diagnose import run as diagnosed
 from ..filming import ANGLES, film, pressures
 from ..session import Blender, needs_bpy
@@ -154,7 +155,7 @@ def clogged(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(unit_fem, "unit_responses", responses)
-        ending, messages = diagnosed(folder, root / "study" / "evidence", load_preset("mu-1.0x"))
+        ending, messages = diagnosed(folder, root / "study" / "evidence", load_preset("mu-1.0x"), **ALL_SIZES)
     assert ending.status == 0, messages[-1]
     assert ending.summary["verdict"] == "named"
     return root
