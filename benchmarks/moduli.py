@@ -25,9 +25,9 @@ from mu_addon.files import write_json, write_text
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.compression import compress
 from mu_addon.homogenize.elasticity import effective_tensor
-from mu_addon.homogenize.modulus import modulus
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.homogenize.specimen import block_specimen
+from mu_addon.homogenize.stress_strain_curve import modulus
 from mu_addon.materials.library import load_material
 from mu_addon.report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 

@@ -21,8 +21,8 @@ from mu_addon.design.strut_cell import strut_cell
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from mu_addon.homogenize.compression import STRAINS, compress
 from mu_addon.homogenize.elasticity import effective_tensor
-from mu_addon.homogenize.modulus import PROCEDURES, moduli, modulus
 from mu_addon.homogenize.specimen import block_specimen
+from mu_addon.homogenize.stress_strain_curve import PROCEDURES, moduli, modulus
 
 FRICTIONS = ("slide", "stick")
 MODULUS_MPa = 2.5

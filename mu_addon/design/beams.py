@@ -17,22 +17,22 @@ PIECES = 8
 """Number of frusta in a strut: between them its sin^2 swell is straight, which loses 0.6 % of its volume."""
 
 
-def lattice_beams(d: Dimensions, bar: Bar | None = None, pieces: int = PIECES) -> Beams:
-    """The lattice as beams: each strut is a chain of `pieces` frusta whose radii in mm follow its law.
+def lattice_beams(d: Dimensions, bar: Bar | None = None) -> Beams:
+    """The lattice as beams: each strut is a chain of `PIECES` frusta whose radii in mm follow its law.
 
     bar: a waveguide; struts that it replaces are left out, and those that meet it are thickened as in the
     printable solid (`waveguide.strut_radii`). Frusta with both ends inside the actuator's outer surface are
     left out.
     """
     lattice = lattice_of(d)
-    t = np.linspace(0.0, 1.0, pieces + 1)
+    t = np.linspace(0.0, 1.0, PIECES + 1)
     standing = np.ones(len(lattice.struts), bool) if bar is None else ~bar.replaced
     radii = _radii(lattice, bar, t)[standing]
     struts = lattice.struts[standing]
     first, last = lattice.nodes[struts[:, 0]], lattice.nodes[struts[:, 1]]
     inner = first[:, None] + t[1:-1, None] * (last - first)[:, None]
     nodes = np.concatenate([lattice.nodes, inner.reshape(-1, 3)])
-    along = len(lattice.nodes) + np.arange(inner.shape[0] * (pieces - 1)).reshape(-1, pieces - 1)
+    along = len(lattice.nodes) + np.arange(inner.shape[0] * (PIECES - 1)).reshape(-1, PIECES - 1)
     chain = np.concatenate([struts[:, :1], along, struts[:, 1:]], axis=1)
     pairs = np.stack([chain[:, :-1], chain[:, 1:]], axis=2).reshape(-1, 2)
     ends = np.stack([radii[:, :-1], radii[:, 1:]], axis=2).reshape(-1, 2)

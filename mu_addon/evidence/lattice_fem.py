@@ -15,9 +15,9 @@ from ..errors import InputError
 from ..files import write_text
 from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
 from ..homogenize.compression import Friction, compress
-from ..homogenize.modulus import modulus
 from ..homogenize.offset_response import OffsetResponse
 from ..homogenize.specimen import block_specimen
+from ..homogenize.stress_strain_curve import modulus
 from ..measured import Experiment
 from ..reading import file_text, parse_toml
 from ..run.cache import Cache

@@ -35,15 +35,12 @@ class Proposal:
     expected: float
 
 
-def propose_experiment(
-    fitter: Fitter, found: Selection, seen: Sequence[Sensitivity], feasible: Sequence[Experiment] = ()
-) -> Proposal | None:
+def propose_experiment(fitter: Fitter, found: Selection, seen: Sequence[Sensitivity]) -> Proposal | None:
     """The experiment that best separates the effects still in doubt; None where no cause has a rival.
 
-    feasible: experiments that the bench can make, with the columns that drive them; measured columns may hold
-    anything but nan. Without any, variations of those already made are tried. Best is the largest expected
-    chi squared between the two rival fits that are nearest to each other, nuisances held. Below 1 the
-    proposal is what the rival effects' library entries recommend.
+    Variations of those already made are tried. Best is the largest expected chi squared between the two rival
+    fits that are nearest to each other, nuisances held. Below 1 the proposal is what the rival effects'
+    library entries recommend.
     """
     rivals = [c for c in found.causes if c.rivals]
     if not rivals:
@@ -56,9 +53,8 @@ def propose_experiment(
             if f.names == (name,) or (f is found.chosen and name == cause.effect.name):
                 fits.setdefault(name, f)
     made = [e for i, e in enumerate(fitter.record.experiments) if fitter.record.driven(i, "pressure_kPa")]
-    options = list(feasible) or _variations(made)
     best: Proposal | None = None
-    for e in options:
+    for e in _variations(made):
         try:
             expected = _divergence(fitter, e, [fits[n].values for n in names if n in fits])
         except MuError:

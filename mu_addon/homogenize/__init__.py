@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from .foam_fit import FoamFit as FoamFit
     from .foam_fit import fit_foam as fit_foam
     from .foam_fit import lattice_law as lattice_law
-    from .modulus import Curve as Curve
-    from .modulus import moduli as moduli
     from .specimen import Specimen as Specimen
     from .specimen import block_specimen as block_specimen
+    from .stress_strain_curve import Curve as Curve
+    from .stress_strain_curve import moduli as moduli
     from .stretch import StretchSettings as StretchSettings
     from .stretch import stretch_lattice as stretch_lattice
 else:

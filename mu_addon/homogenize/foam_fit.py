@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..fem.lattice_law import LatticeLaw
 from ..fem.laws import CubicShear, DiagonalStretch, Foam
 from .foam_response import ellipticity, small_strain, uniaxial
-from .modulus import Curve
+from .stress_strain_curve import Curve
 
 Array = np.ndarray[Any, Any]
 

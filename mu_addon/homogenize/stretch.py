@@ -13,8 +13,8 @@ from ..fem.factor import IndefiniteError
 from ..fem.materials import Materials
 from ..fem.self_intersection import crossings
 from ..meshing.mesh import AXES, Array, Mesh
-from .modulus import Curve
 from .octant import Octant, require_factor
+from .stress_strain_curve import Curve
 
 # How far a node may lie beyond the mirror plane it should stay behind, as a share of the cell.
 _TOUCH = 1e-6

@@ -130,18 +130,17 @@ def fit_coupons(
     coupons: Sequence[Coupon],
     held_out: Sequence[Coupon] = (),
     weights: str = WEIGHTS.default,
-    poisson: float = POISSON,
     profile: bool = False,
 ) -> Fit:
     """Fit a law to coupons by least squares, all modes at once, at constant volume.
 
     weights: "absolute", residuals over the largest stress of their coupon, as a load cell's errors scale with
     its range; "relative", residuals over the stress itself, or FLOOR of the largest where that is more.
-    poisson: Poisson's ratio that sets the bulk modulus. Factors follow from exponents by linear least squares
-    within their bounds, exponents by nonlinear least squares from the best combinations on a grid. Intervals
-    of 95 %: linearised, or by `profile` for Ogden laws, with Student's t, widened where successive residuals
-    are correlated. They hold for noise only, not where the law itself is wrong, which a large `memory`
-    indicates. Raises InputError for unknown weights, too few values, or a coupon without stress.
+    `POISSON` sets the bulk modulus. Factors follow from exponents by linear least squares within their
+    bounds, exponents by nonlinear least squares from the best combinations on a grid. Intervals of 95 %:
+    linearised, or by `profile` for Ogden laws, with Student's t, widened where successive residuals are
+    correlated. They hold for noise only, not where the law itself is wrong, which a large `memory` indicates.
+    Raises InputError for unknown weights, too few values, or a coupon without stress.
     """
     WEIGHTS.checked(weights)
     n = sum(len(c.stretch) for c in coupons)
@@ -155,7 +154,7 @@ def fit_coupons(
     fewer = _fewer(form, coupons, weights)
     exponents = best_exponents(fewer) if form.exponents else np.zeros(0)
     factors, residual = problem.solve(exponents)
-    row = form.parameters(factors, exponents, poisson)
+    row = form.parameters(factors, exponents, POISSON)
     memory = _memory(residual, coupons)
     return Fit(
         form=form,

@@ -15,8 +15,8 @@ from mu_addon.fem.materials import Materials
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from mu_addon.homogenize.compression import STRAINS, compress
 from mu_addon.homogenize.elasticity import effective_tensor
-from mu_addon.homogenize.modulus import PROCEDURES, Curve, moduli, modulus
 from mu_addon.homogenize.specimen import Specimen, block_specimen
+from mu_addon.homogenize.stress_strain_curve import PROCEDURES, Curve, moduli, modulus
 from mu_addon.meshing.mesh import AXES
 from mu_addon.meshing.quality import element_volumes
 from tests.fem import bodies

@@ -16,7 +16,7 @@ from mu_addon.homogenize.foam_fit import (
     stable_shear,
 )
 from mu_addon.homogenize.foam_response import directions, ellipticity, small_strain, uniaxial
-from mu_addon.homogenize.modulus import Curve
+from mu_addon.homogenize.stress_strain_curve import Curve
 from tests.fem.cubic import Cubic
 
 STRETCH = np.linspace(0.6, 1.4, 17)

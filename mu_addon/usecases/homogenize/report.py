@@ -9,7 +9,7 @@ import numpy as np
 
 from ...files import write_bytes, write_text
 from ...homogenize.elasticity import Elasticity
-from ...homogenize.modulus import DEFAULT, moduli
+from ...homogenize.stress_strain_curve import DEFAULT, moduli
 from ...meshing.mesh import Mesh
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from ...report.results import Picture

@@ -18,8 +18,8 @@ from ...homogenize.compression import Compressed, Compression, Friction, compres
 from ...homogenize.effective_file import Effective, effective, write_effective
 from ...homogenize.elasticity import Elasticity, effective_tensor
 from ...homogenize.foam_fit import FoamFit, fit_foam
-from ...homogenize.modulus import Curve, moduli
 from ...homogenize.specimen import Specimen, block_specimen
+from ...homogenize.stress_strain_curve import Curve, moduli
 from ...homogenize.stretch import Stretched, StretchSettings, stretch_lattice
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_mesh

@@ -37,14 +37,14 @@ def serial_source(port: str | None, baud: int) -> Source:
     raise InputError(what, "--port", "plug the sensor in, or name its port (`ports` lists them)")
 
 
-def simulated_source(rate_hz: float = 100.0) -> Source:
+def simulated_source() -> Source:
     """A simulated sensor that bends by up to 45 degrees in 8 s and loses 0.6 % of its light a degree."""
 
     def volts(t: float) -> tuple[float, ...]:
         angle_deg = 22.5 * (1 - math.cos(2 * math.pi * t / 8.0))
         return (2.4 * math.exp(-0.006 * angle_deg), 0.02)
 
-    return Simulated(volts, ("light", "dark"), rate_hz, noise_V=0.004)
+    return Simulated(volts, ("light", "dark"), 100.0, noise_V=0.004)
 
 
 def stream(
