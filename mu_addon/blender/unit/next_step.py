@@ -14,7 +14,7 @@ LETTERS = 14
 """Letters of a running stage's name; a longer one is numbered."""
 
 
-def next_step(row, root) -> None:
+def draw_next_step(row, root) -> None:
     """Draw the button of the next action on a unit, or the running job's progress, of the same height."""
     for kind in (SIMULATION, evidence.DIAGNOSIS):
         if kind.is_running(root):

@@ -23,7 +23,7 @@ from ..shared.panels import (
 from . import drawing, figures
 from . import object as unit_object
 from .broken import broken
-from .next_step import next_step
+from .next_step import draw_next_step
 
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
 
@@ -112,7 +112,7 @@ def _head(layout, root) -> None:
     row = box.row(align=True)
     row.alert = False
     if not mending:
-        next_step(row, root)
+        draw_next_step(row, root)
         return
     if len(mending) > 1:
         row = row.split(factor=0.8, align=True)
