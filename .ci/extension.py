@@ -11,7 +11,7 @@ Beside them it puts sample.blend and sample-NAME.blend, the sample scenes.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
 is an ordinary package. What ships is copied together first. Wheels come from pip, each with the SHA-256 that
-wheels.csv pins, and are kept in FOLDER/wheels; five are slimmed (slim.py). numpy is never among them, since
+wheels.csv pins, and are kept in FOLDER/wheels; six are slimmed (slim.py). numpy is never among them, since
 Blender has its own and a second one would replace it. For Linux, Warp's library is compiled without its CUDA
 part, 114 MB of the archive (warp_cpu.py). sbom.cdx.json in the archive lists what it holds.
 """

@@ -78,7 +78,7 @@ def prepare():
 
 
 def _two_runs():
-    """A unit that was ranked with two walls."""
+    """A unit that was simulated with two walls, and ranked with one."""
     import mu_addon
     from mu_addon.blender.simulate.job import SIMULATION
 
@@ -88,8 +88,8 @@ def _two_runs():
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "runs.blend"))
     assert bpy.ops.mu.add(preset="mu-1.0x") == {"FINISHED"}
     unit = bpy.context.view_layer.objects.active
-    for wall in (1.0, 0.9):
-        unit.mu_unit.chambers.wall_mm = wall
+    for wall, command in ((1.0, "simulate"), (0.9, "place")):
+        unit.mu_unit.chambers.wall_mm, unit.mu_unit.study.command = wall, command
         assert bpy.ops.mu.simulate() == {"FINISHED"}
         _wait(SIMULATION.child(unit))
     bpy.ops.wm.save_mainfile()

@@ -122,6 +122,7 @@ def archive_of(folder, held):
 
 SCIPY = {
     "scipy/linalg/__init__.py": "x = 1\n",
+    "scipy/linalg/_large.py": "y = 2\n" * 999,
     "scipy/linalg/tests/test_lapack.py": "assert True\n",
     "scipy/linalg/tests/data/LICENSE.txt": "free\n",
     "scipy-9.dist-info/METADATA": "Name: scipy\nVersion: 9\nLicense-Expression: BSD-3-Clause\n",
@@ -156,6 +157,7 @@ def test_a_slimmed_wheel_lacks_its_tests_and_nothing_else(tmp_path, ci, publishe
     assert change.sha256 == hashlib.sha256(published.read_bytes()).hexdigest()
     with zipfile.ZipFile(made) as package:
         held = {name: package.read(name) for name in package.namelist()}
+        assert package.getinfo("scipy/linalg/_large.py").compress_type == zipfile.ZIP_LZMA
     rows = [line.split(",") for line in held.pop("scipy-9.dist-info/RECORD").decode().splitlines()]
     assert rows.pop() == ["scipy-9.dist-info/RECORD", "", ""]
     assert {name for name, *_ in rows} == held.keys() == SCIPY.keys() - {"scipy/linalg/tests/test_lapack.py"}
