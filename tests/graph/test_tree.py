@@ -42,13 +42,13 @@ def trees(draw):
 
 
 @given(trees())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_tree_goes_through_its_file_unchanged(found):
     assert parse_tree(tree_text(found)) == found
 
 
 @given(trees())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_the_order_has_every_node_behind_its_sources_and_circles_apart(found):
     order, circle = found.ordered()
     assert {*order, *circle} == set(found.nodes)

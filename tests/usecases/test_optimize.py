@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.errors import InputError
 from mu_addon.optimization.evaluation import Evaluated, Evaluator, evaluate
 from mu_addon.optimization.robustness import Verified
@@ -47,8 +48,10 @@ high = 1.3
 
 @pytest.fixture
 def job(tmp_path):
+    """Of three chambers, which bend half as far as six."""
+    (tmp_path / "unit.toml").write_text(to_toml(load_preset("mu-1.0x").evolve(count=3)))
     file = tmp_path / "design.toml"
-    file.write_text(TEXT)
+    file.write_text(TEXT.replace('preset = "mu-1.0x"', 'unit = "unit.toml"').replace("low = 5", "low = 2.5"))
     return job_from(file)
 
 
@@ -106,8 +109,6 @@ def test_it_is_resumed_with_the_same_digits_and_nothing_computed_twice(job, tmp_
 @pytest.mark.slow
 def test_a_worker_finds_what_the_run_does(job):
     files = tuple(sorted(job.texts().items()))
-    from mu_addon.design.parameters import to_toml
-
     row = run_task(Task(to_toml(job.design.unit), files))
     evaluator = Evaluator(job.design.targets, job.design.freedoms, mechanics_of(job.design, None)[0])
     [own] = evaluator.of([job.design.unit])
