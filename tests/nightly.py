@@ -15,7 +15,8 @@ HEAD = """# Tests that run at night
 
 `.venv/bin/python -m pytest` leaves these out: convergence studies, second codes, slicers and long batteries.
 Run them with `.venv/bin/python -m pytest -m nightly`; it writes the date of each that passed into this table.
-The test named beside each runs by default and guards against the same fault.
+The test beside each runs by default and guards against the same fault. Where none stands, other parameters
+of the same test do.
 
 test | guarded by default by | last passed
 --- | --- | ---
@@ -81,7 +82,7 @@ def dates():
     if not PAGE.exists():
         return {}
     rows = [line.split("|") for line in PAGE.read_text(encoding="utf-8").splitlines()]
-    return {row[0].strip("` "): "".join(row[2:]).strip() for row in rows if len(row) > 1 and "::" in row[0]}
+    return {row[0].strip("` "): "".join(row[2:]).strip() for row in rows if "::" in row[0]}
 
 
 def write(passed=()):
@@ -90,9 +91,10 @@ def write(passed=()):
     rows = []
     for (file, name), (where, quick) in every().items():
         test = f"{file}::{name}"
-        guard = quick if where == file else f"{where}::{quick}"
+        guard = f"`{quick}`" if where == file else f"`{where}::{quick}`"
         date = today if test in passed else known.get(test, "")
-        rows.append(f"`{test}` | `{guard}`" + (f" | {date}" if date else "") + "\n")
+        cells = [f"`{test}`", "" if (where, quick) == (file, name) else guard, date]
+        rows.append(" | ".join(cells).rstrip("| ") + "\n")
     PAGE.write_text(HEAD + "".join(rows), encoding="utf-8")
 
 

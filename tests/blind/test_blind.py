@@ -74,6 +74,9 @@ def test_what_is_outside_the_library_gets_no_name(effect, times):
     assert (row["verdict"], row["names"]) == ("unexplained", [])
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_verdict.py::test_a_gain_of_the_gauge_is_refused_until_a_dead_load_is_added"
+)
 def test_what_cannot_be_told_is_refused_until_the_experiment_that_tells_is_made():
     order = SMALL | {"seed": 7, "effect": "pressure_gain", "values": {"pressure_gain.gain": 0.08}}
     row = judged(order)

@@ -206,7 +206,7 @@ def test_a_graded_solid_passes_its_gates_and_has_its_struts_volume():
     assert whole["graded"] - whole["plain"] == pytest.approx(changes["graded"] - changes["plain"], rel=0.06)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_graded_solid_passes_its_gates_and_has_its_struts_volume")
 def test_wells_and_seats_keep_clear_of_thicker_struts():
     plain = waveguide(UNIT, window(UNIT, "alpha10"))
     thick = waveguide(with_grading(plus_y=1.9), window(UNIT, "alpha10"))

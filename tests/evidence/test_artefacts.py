@@ -42,17 +42,18 @@ def mistracked(e, rng):
     return with_columns(e, **{c: e[c] + v for c, v in off.items()})
 
 
+FAULT = pytest.mark.nightly("test_an_instrument_s_fault_gets_no_name")
+
+
 @pytest.mark.parametrize(
     ("spoilt", "kind"),
     [
         (coarse_gauge, "none"),
         (coarse_camera, "none"),
         (lost_markers, "none"),
-        pytest.param(
-            jitter, "unexplained", marks=pytest.mark.nightly("test_an_instrument_s_fault_gets_no_name")
-        ),
+        pytest.param(jitter, "unexplained", marks=FAULT),
         # What stands out alone does not count.
-        (mistracked, "none"),
+        pytest.param(mistracked, "none", marks=FAULT),
     ],
 )
 def test_an_instrument_s_fault_gets_no_name(spoilt, kind):

@@ -166,7 +166,7 @@ NIGHTLY = pytest.mark.nightly("test_creep_by_the_root_of_time_is_at_least_a_riva
 @pytest.mark.parametrize(
     "course",
     [
-        lambda since: (1.0 + since / 2.0) ** -0.05,
+        pytest.param(lambda since: (1.0 + since / 2.0) ** -0.05, marks=NIGHTLY),
         pytest.param(lambda since: 1.0 - 0.04 * np.log(1.0 + since / 2.0), marks=NIGHTLY),
         pytest.param(
             lambda since: 1.0 - 0.06 * (1 - np.exp(-since / 5.0)) - 0.08 * (1 - np.exp(-since / 80.0)),

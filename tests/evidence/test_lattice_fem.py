@@ -38,6 +38,7 @@ def test_the_presets_blocks_are_shipped(preset, cells):
     assert (np.diff(found.density) > 0).all()
 
 
+@pytest.mark.nightly("test_struts_of_its_own_soften_a_block")
 def test_what_is_shipped_is_what_would_be_computed(tmp_path):
     """pytetwild has no seed: meshes of one size differ by up to 1 % (docs/engineering/method.md)."""
     two = block_of(block(cells=(2, 2, 2)), UNIT)

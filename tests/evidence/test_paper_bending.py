@@ -37,6 +37,9 @@ def test_the_folder_holds_the_printed_ends(ends):
     assert {s: tuple(v) for s, v in found.items()} == PRINTED
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_unit_verdicts.py::test_a_wall_in_the_data_is_named_and_where_it_stands"
+)
 def test_the_model_bends_too_little_and_most_so_under_vacuum_and_alike_at_every_scale(responses):
     angles = np.array([r.at(np.array([-20.0, 50.0]), {})[0] for r in responses])
     np.testing.assert_allclose(angles, angles[0] * np.ones((3, 1)), rtol=1e-12)
@@ -49,6 +52,9 @@ def test_the_model_bends_too_little_and_most_so_under_vacuum_and_alike_at_every_
         assert 1.5 < high / pressure < 2.5
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_unit_verdicts.py::test_a_wall_in_the_data_is_named_and_where_it_stands"
+)
 def test_six_numbers_refuse_the_model_without_naming_what_is_wrong(ends, responses):
     """A softer unit is believed as far as it was computed; what would fit, a quarter of it, is not."""
     simulator = UnitPressure(responses, ends)

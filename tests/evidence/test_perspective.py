@@ -116,15 +116,8 @@ def test_a_camera_that_looks_at_an_angle_is_named(about):
     assert told == pytest.approx(math.sin(math.radians(5.0)) / 6.0, rel=0.15)
 
 
-@pytest.mark.parametrize(
-    "about",
-    [
-        "y",
-        pytest.param(
-            "z", marks=pytest.mark.nightly("test_at_a_large_angle_the_whole_law_is_found_with_the_angle")
-        ),
-    ],
-)
+@pytest.mark.nightly("test_a_camera_that_looks_at_an_angle_is_named")
+@pytest.mark.parametrize("about", ["y", "z"])
 def test_at_a_large_angle_the_whole_law_is_found_with_the_angle(about):
     found = filmed(4, 15.0, about)
     assert (found.kind, found.names) == ("named", ("camera_perspective",))

@@ -100,7 +100,11 @@ def test_coupons(truth, names):
     ("truth", "names"),
     [
         ({}, ()),
-        ({"temperature_drift.cooling_K": 5.0, "temperature_drift.cooling_s": 20.0}, ("temperature_drift",)),
+        pytest.param(
+            {"temperature_drift.cooling_K": 5.0, "temperature_drift.cooling_s": 20.0},
+            ("temperature_drift",),
+            marks=pytest.mark.nightly("test_holds"),
+        ),
     ],
 )
 def test_holds(truth, names):

@@ -128,6 +128,9 @@ def test_an_angle_that_is_read_too_far_where_it_is_large_depends_on_the_angle():
     assert found.p_value < 1e-6
 
 
+@pytest.mark.nightly(
+    "tests/evidence/test_marker_slip.py::test_a_slip_of_a_third_of_a_millimetre_is_named_with_size_way_and_moment"
+)
 def test_a_marker_glued_anew_between_two_experiments_is_a_jump():
     """Within each experiment it keeps still; all share one zero."""
     clean = fitter_of({})

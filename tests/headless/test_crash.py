@@ -46,19 +46,9 @@ def whole(tmp_path_factory):
     return folder
 
 
-NIGHTLY = pytest.mark.nightly("test_it_says_where_it_stood_and_resumes_to_the_same_digits")
-
-
-@pytest.mark.parametrize(
-    "number",
-    [
-        signal.SIGSEGV,
-        pytest.param(signal.SIGABRT, marks=NIGHTLY),
-        pytest.param(signal.SIGKILL, marks=NIGHTLY),
-    ],
-)
-def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, number):
-    done = hit(tmp_path, number, "--json")
+def require_told(folder, number):
+    """A run that a signal ended says so, in its last message, summary and log."""
+    done = hit(folder, number, "--json")
     # Its last message is for programs, too.
     last = json.loads(done.stdout.splitlines()[-1])
     assert (last["type"], last["status"]) == ("error", CRASHED)
@@ -67,10 +57,21 @@ def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, 
     # The stack is written from the signal's handler, while other threads run on, and may fault itself.
     ended = signal.SIGSEGV if number == signal.SIGABRT and "SIGSEGV" in done.stderr else number
     assert_clear_failure(done, CRASHED, ended.name, "in stage Model A", "nodes and", "MB of memory", "resume")
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == "partial"
     assert ended.name in summary["reason"]["what"]
-    assert json.loads((tmp_path / "log.ndjson").read_text().splitlines()[-1])["status"] == CRASHED
+    assert json.loads((folder / "log.ndjson").read_text().splitlines()[-1])["status"] == CRASHED
+
+
+@pytest.mark.slow
+def test_it_says_where_it_stood(tmp_path):
+    require_told(tmp_path, signal.SIGSEGV)
+
+
+@pytest.mark.nightly("tests/headless/test_resume.py::test_killed_at_any_stage_it_goes_on_to_the_same_digits")
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
+def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, number):
+    require_told(tmp_path, number)
     again = run("resume", tmp_path, "--no-report")
     assert again.returncode == 0, again.stderr
     assert "interrupted" not in again.stderr

@@ -99,6 +99,7 @@ def test_the_curve_of_diagonal_stretch_gives_its_parameters_back():
     assert (fit.E_MPa, fit.poisson) == pytest.approx((fit.cell_E_MPa, fit.cell_poisson))
 
 
+@pytest.mark.nightly("test_the_curve_of_diagonal_stretch_gives_its_parameters_back")
 def test_slender_struts_are_followed_and_a_foam_alone_cannot_follow_their_sides():
     """The squares of the stretches of an inextensible lattice add up to 3, so that tension shrinks it too."""
     curve, (C11, C12, C44) = struts()

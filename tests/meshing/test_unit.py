@@ -72,7 +72,12 @@ def test_default_mesh_is_small_and_sound(unit: Unit, half: Mesh) -> None:
     check_positive(half)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+VOLUMES = pytest.mark.nightly("test_volumes_match_the_design")
+
+
+@pytest.mark.parametrize(
+    "preset", [name if name == "mu-1.0x" else pytest.param(name, marks=VOLUMES) for name in PRESETS]
+)
 def test_volumes_match_the_design(preset: str) -> None:
     unit = load_preset(preset)
     report = mesh_quality(mesh_unit(unit), unit)
@@ -150,7 +155,13 @@ def test_wall_keeps_its_normal_thickness(unit: Unit, half: Mesh) -> None:
     assert gap == pytest.approx(d.wall, rel=1e-9)
 
 
-@pytest.mark.parametrize("offsets", [(0.2, 0.2), (-0.15, -0.15), (0.05, 0.3)])
+PRINTED = pytest.mark.nightly("test_the_printed_unit_is_meshed")
+
+
+@pytest.mark.parametrize(
+    "offsets",
+    [pytest.param((0.2, 0.2), marks=PRINTED), pytest.param((-0.15, -0.15), marks=PRINTED), (0.05, 0.3)],
+)
 def test_the_printed_unit_is_meshed(offsets: tuple[float, float]) -> None:
     """Walls of the smallest unit as they are printed, and no others."""
     unit = attrs.evolve(load_preset("mu-0.75x"), print=Printing(*offsets))

@@ -53,11 +53,10 @@ def largest_error(body, states, free, asked, share=2e-4):
     return worst
 
 
-NIGHTLY = pytest.mark.nightly("test_they_are_those_of_full_solutions_strut_by_strut")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("free", [FREE[::2], pytest.param(FREE[1::2], marks=NIGHTLY)], ids=["size", "shape"])
+@pytest.mark.nightly(
+    "tests/fem/test_sensitivity.py::test_it_is_the_derivative_by_places_shares_ties_and_stiffness"
+)
+@pytest.mark.parametrize("free", [FREE[::2], FREE[1::2]], ids=["size", "shape"])
 def test_they_are_those_of_full_solutions_strut_by_strut(free):
     body = UnitBody(UNIT, Mechanics(SETTINGS))
     asked = [
@@ -68,7 +67,9 @@ def test_they_are_those_of_full_solutions_strut_by_strut(free):
     assert largest_error(body, states, free, asked, share=2e-5) < 1e-4
 
 
-@pytest.mark.nightly("test_they_are_those_of_full_solutions_strut_by_strut")
+@pytest.mark.nightly(
+    "tests/fem/test_sensitivity.py::test_it_is_the_derivative_by_places_shares_ties_and_stiffness"
+)
 def test_they_are_those_of_full_solutions_where_walls_touch():
     body = UnitBody(UNIT, Mechanics(SETTINGS, self_contact=True))
     asked = [Angle("angle", -25.0), AirVolume("air", -25.0)]

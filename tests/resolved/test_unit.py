@@ -141,9 +141,7 @@ def test_weight_is_that_of_the_resin_and_lost_to_no_tie(mesh):
     assert not reactions[mesh.tied].any()
 
 
-@pytest.mark.nightly(
-    "tests/placement/test_resolved_influence.py::test_a_whole_unit_gives_the_map_of_its_half"
-)
+@pytest.mark.nightly("tests/placement/test_search.py::test_the_half_mesh_predicts_what_the_whole_one_does")
 def test_a_half_bends_as_the_whole_does(mesh):
     half = Equilibrium(Model(mesh), materials_of(SMALL, mesh), explains=False)
     state = half.reach(0.002, [half.at_zero_pressure()])

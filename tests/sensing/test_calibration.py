@@ -75,7 +75,7 @@ BY_NIGHT = pytest.mark.nightly("test_the_band_holds_what_it_promises")
 @pytest.mark.parametrize(
     "wrong",
     [
-        {},
+        pytest.param({}, marks=BY_NIGHT),
         pytest.param({"whole": 0.01}, marks=BY_NIGHT),
         pytest.param({"hysteresis": 0.02}, marks=BY_NIGHT),
         {"whole": 0.01, "hysteresis": 0.015},

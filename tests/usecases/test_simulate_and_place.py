@@ -83,15 +83,18 @@ def with_lattice(job, modulus_kPa):
     return attrs.evolve(job, unit=attrs.evolve(job.unit, material=material))
 
 
+COSTS = pytest.mark.nightly("test_a_change_costs_only_what_depends_on_it")
+
+
 @pytest.mark.parametrize(
     ("change", "mesh", "states"),
     [
         (lambda job: job, 1, 2),
-        (lambda job: attrs.evolve(job, stations=12), 1, 2),
-        (lambda job: with_sensor(job, 900.0), 1, 2),
+        pytest.param(lambda job: attrs.evolve(job, stations=12), 1, 2, marks=COSTS),
+        pytest.param(lambda job: with_sensor(job, 900.0), 1, 2, marks=COSTS),
         # Other pressures: a state's last digits depend on those before it.
         (lambda job: attrs.evolve(job, protocol=Protocol(np.arange(2.0), np.array([0.0, 15.0]))), 1, 4),
-        (lambda job: with_lattice(job, 30.0), 1, 4),
+        pytest.param(lambda job: with_lattice(job, 30.0), 1, 4, marks=COSTS),
         (lambda job: with_wall(job, 1.0), 2, 4),
         (lambda job: attrs.evolve(job, mesh=MeshSettings(refine=0.5, order=1)), 2, 4),
     ],

@@ -295,7 +295,9 @@ def test_an_export_as_chosen(tmp_path):
     assert np.ptp(vertices[:, 2]) == pytest.approx(81.0, abs=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly(
+    "tests/usecases/test_export.py::test_vents_for_a_build_direction_are_cut_and_their_plugs_written"
+)
 def test_vents_for_the_direction_of_the_build(tmp_path):
     """As `export --vent-along`: upside down the chamber is a cup, which gets a hole and a plug."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))

@@ -52,7 +52,9 @@ def test_a_sound_unit_has_none_of_them():
     assert np.abs(by_name["islands"].places[:, 2]).max() < 0.1
 
 
-@pytest.mark.parametrize("diameter", [pytest.param(0.8, marks=pytest.mark.slow), 0.1])
+@pytest.mark.parametrize(
+    "diameter", [pytest.param(0.8, marks=pytest.mark.nightly("test_a_hole_in_the_wall")), 0.1]
+)
 def test_a_hole_in_the_wall(diameter):
     """A cell of the grid shows the large one; the small one is found as the shortest curve to cut."""
     found = faults(parts.drilled(diameter), "chambers", unit=parts.small_unit())
@@ -97,6 +99,7 @@ def test_a_thin_wall():
     assert off(found["chamber wall"], APEX) < 1.0
 
 
+@pytest.mark.nightly("test_a_narrow_drain")
 def test_a_closed_drain():
     found = faults(parts.plugged(), "chambers", unit=parts.small_unit())
     assert {"sealed voids", "leak test", "drain"} == set(found)
