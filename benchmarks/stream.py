@@ -23,7 +23,7 @@ import numpy as np
 
 from mu_addon.errors import InputError
 from mu_addon.sensing.recording import read_recording
-from mu_addon.sensing.ring import Ring
+from mu_addon.sensing.ring_buffer import Ring
 
 ROOT = Path(__file__).parents[1]
 SENDER = ROOT / "tests/sensing/sender.py"

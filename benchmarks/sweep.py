@@ -30,8 +30,8 @@ from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import influence_map, representative_pressures
 from mu_addon.placement.sampling import solution_order
+from mu_addon.placement.sensitivity_map import influence_map, representative_pressures
 from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
 RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .inverse import Reach as Reach
     from .inverse import reach_point as reach_point
     from .joint import Joint as Joint
-    from .learning import Learned as Learned
-    from .learning import Sampling as Sampling
-    from .learning import learn as learn
+    from .joint_learning import Learned as Learned
+    from .joint_learning import Sampling as Sampling
+    from .joint_learning import learn as learn
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

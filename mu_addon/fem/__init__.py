@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .arc import ContinuationSettings as ContinuationSettings
+    from .arc_length import ContinuationSettings as ContinuationSettings
     from .batched_newton import BatchedNewton as BatchedNewton
     from .batched_newton import Variant as Variant
     from .bending_angle import TipSection as TipSection

@@ -20,7 +20,7 @@ from .materials import Layer, Materials
 from .model import Model
 from .newton_settings import NewtonSettings
 from .state import State, rest
-from .variants import make_variants
+from .tangent_variants import make_variants
 
 Array = np.ndarray[Any, Any]
 

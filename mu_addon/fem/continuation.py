@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from ..errors import ConvergenceError
-from .arc import Arc, Body, ContinuationSettings, Node, Point
+from .arc_length import Arc, Body, ContinuationSettings, Node, Point
 from .state import State
 
 Array = np.ndarray[Any, Any]

@@ -12,7 +12,7 @@ import numpy as np
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
 from .continuation import limit_pressure
-from .damped import EXACT_BELOW, damped_minimum
+from .damped_descent import EXACT_BELOW, damped_minimum
 from .factor import IndefiniteError
 from .line_search import Descent
 from .materials import Materials

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reading import require_rows
-from ..table_cells.own import own_lines, own_rows, own_text
+from ..table_cells.own_tables import own_lines, own_rows, own_text
 
 Array = np.ndarray[Any, Any]
 

@@ -12,8 +12,8 @@ from ..errors import ConvergenceError, InputError
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
+from .buckling import Loss, SymmetryBreakingModes, first_loss, interpolated
 from .specimen import Specimen
-from .stability import Loss, SymmetryBreakingModes, first_loss, interpolated
 from .stress_strain_curve import Curve
 from .strut_contact import StrutContact, first_strut_contact
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .choice import choose as choose
     from .coupon import MODES as MODES
     from .coupon import Coupon as Coupon
     from .coupon import Response as Response
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from .coupon import response as response
     from .fit import Fit as Fit
     from .fit import fit_coupons as fit_coupons
+    from .law_choice import choose as choose
     from .library import Material as Material
     from .library import load_material as load_material
     from .library import material_names as material_names

@@ -11,8 +11,8 @@ import numpy as np
 from ..design.parameters import HIGHEST_POISSON
 from ..errors import InputError
 from .coupon import Array, Coupon, binned, incompressible
-from .forms import Form
 from .intervals import Parameter, intervals
+from .law_forms import Form
 from .regression import Problem, best_exponents
 from .settings import WEIGHTS
 from .stability import Stability, check_stability, whole_ranges

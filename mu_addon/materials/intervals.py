@@ -10,7 +10,7 @@ from scipy import optimize
 from scipy.special import stdtrit
 
 from .coupon import Array
-from .forms import EXPONENTS, Form
+from .law_forms import EXPONENTS, Form
 from .regression import Problem, linear, nonzero_exponents
 
 # The profile is followed until it is this close to its limit.

@@ -22,7 +22,7 @@ from ..files import write_text
 from ..reading import file_text
 from ..toml_writer import toml_value
 from .coupon import MODES, Array
-from .forms import with_bulk
+from .law_forms import with_bulk
 from .stability import Stability, check_stability, whole_ranges
 
 if TYPE_CHECKING:

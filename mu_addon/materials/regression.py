@@ -10,7 +10,7 @@ import numpy as np
 from scipy import optimize
 
 from .coupon import Array, Coupon, isochoric_stress, isochoric_stretches
-from .forms import EXPONENTS, Form
+from .law_forms import EXPONENTS, Form
 
 # Exponents of which every combination is tried, and how many of the best are refined.
 GRID = np.array(

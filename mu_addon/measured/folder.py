@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError, did_you_mean
 from ..reading import file_bytes, file_text, parse_toml
 from ..run.inputs import digest
-from ..table_cells.own import own_text
+from ..table_cells.own_tables import own_text
 from .experiment import Array, Experiment
 from .kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, ROLES, VALVES, Kind
 from .table import Remark, read_table

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..reading import require_rows
-from ..table_cells.own import own_lines, own_rows
+from ..table_cells.own_tables import own_lines, own_rows
 from .kinds import STEADY, Kind, markers, may_be_missing, named, quantity_of, units_of
 
 Array = np.ndarray[Any, Any]

@@ -12,7 +12,7 @@ from ..fem.bending_angle import TipSection, tip_faces
 from ..fem.held_tip import HeldTip
 from ..fem.lattice_law import deformation_gradients
 from ..fem.model import Model
-from ..fem.relocated import relocated
+from ..fem.moved_nodes import relocated
 from ..fem.self_intersection import crossings
 from ..fem.sensitivity import Sensitivity
 from ..meshing.mesh import AXES, LATTICE, MEMBRANE, Mesh

@@ -17,8 +17,8 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.materials import Materials
 from ..fem.model import Model
+from ..fem.moved_nodes import relocated
 from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
-from ..fem.relocated import relocated
 from ..fem.unit_materials import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
 from ..meshing.morph import Morph

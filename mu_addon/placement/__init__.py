@@ -31,15 +31,15 @@ if TYPE_CHECKING:
     from .inclusion import Inclusion as Inclusion
     from .inclusion import sensor_share as sensor_share
     from .inclusion import straight_inclusion as straight_inclusion
-    from .influence import Influence as Influence
-    from .influence import deviation_map as deviation_map
-    from .influence import influence_map as influence_map
     from .polyline import polyline_inclusion as polyline_inclusion
     from .response import Response as Response
     from .response import reduced_response as reduced_response
     from .search import Search as Search
     from .search import SearchSettings as SearchSettings
     from .search import search_paths as search_paths
+    from .sensitivity_map import Influence as Influence
+    from .sensitivity_map import deviation_map as deviation_map
+    from .sensitivity_map import influence_map as influence_map
     from .settings import RULES as RULES
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

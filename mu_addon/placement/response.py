@@ -28,8 +28,8 @@ from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
 from .inclusion import Inclusion, sensor_share, straight_inclusion
-from .influence import loaded, parities, probe_loads, representative_pressures
 from .sampling import polynomials
+from .sensitivity_map import loaded, parities, probe_loads, representative_pressures
 
 Array = np.ndarray[Any, Any]
 

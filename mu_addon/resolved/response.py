@@ -22,8 +22,8 @@ from ..fem.model import Model
 from ..fem.trajectory import Trajectory
 from ..meshing.mesh import LATTICE, Array, Mesh
 from ..placement.graph import Graph
-from ..placement.influence import loaded, probe_loads, representative_pressures
 from ..placement.response import BLOCK, Response, solver_of
+from ..placement.sensitivity_map import loaded, probe_loads, representative_pressures
 from .strut import radius_of
 
 # Of a square section, as a share of its side's fourth power (Timoshenko and Goodier).

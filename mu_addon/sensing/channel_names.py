@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import attrs
 
 from .formats import ENOUGH, SURE
-from .lines import CLOCKS, NUMBERS, Pairs
 from .samples import Layout
+from .text_lines import CLOCKS, NUMBERS, Pairs
 
 # A name that is new must come this often within so many lines; more, if its line lacks nothing else.
 _NEW_WITHIN, _MORE_WITHIN = 12, 64

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from .formats import ENOUGH, SURE
-from .lines import Pairs, header_of, pairs_of_row, row_of
+from .text_lines import Pairs, header_of, pairs_of_row, row_of
 
 
 class CsvColumns:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .accounts import Accounts, Counters, Reject
+from .byte_accounts import Accounts, Counters, Reject
 from .channel_names import ChannelNames, channels_of
 from .csv_columns import CsvColumns
 from .formats import ENOUGH, TEXT_READERS, format_of, text_of, whole_lines
 from .framing import END, LONGEST, info_of, payload_of, sample_of
-from .lines import CLOCKS, NUMBERS, Pairs, json_of, pairs_of
 from .numbering import Row
 from .samples import Layout, Samples
+from .text_lines import CLOCKS, NUMBERS, Pairs, json_of, pairs_of
 from .timeline import Timeline
 
 # Without a format found: enough for a few of the longest lines, little enough for any memory.

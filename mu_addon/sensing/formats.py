@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 from .framing import END, payload_of
-from .lines import Pairs, json_of, pairs_of, row_of
+from .text_lines import Pairs, json_of, pairs_of, row_of
 
 ENOUGH = 3
 """Number of pieces or names from which a format, a header or a channel is trusted."""

@@ -31,7 +31,7 @@ import numpy as np
 from ..errors import InputError
 from ..files import append_lines, make_folder, output_error, plain
 from ..reading import file_bytes
-from .accounts import Reject
+from .byte_accounts import Reject
 from .samples import Samples
 
 Array = np.ndarray[Any, Any]

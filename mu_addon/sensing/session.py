@@ -22,7 +22,7 @@ from ..errors import OutputError
 from ..files import plain
 from .decoder import Decoder
 from .recording import Recorder, columns_of
-from .ring import Ring
+from .ring_buffer import Ring
 from .samples import Samples
 from .sources import ConnectionLost, EndOfStream, Source
 

@@ -7,7 +7,7 @@ from collections import deque
 
 import numpy as np
 
-from .accounts import Accounts, Reject
+from .byte_accounts import Accounts, Reject
 from .clock import HostTime
 from .numbering import Numbered, Numbering, Row
 from .samples import Layout, Samples

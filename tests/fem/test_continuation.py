@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import time_stepping
-from mu_addon.fem.arc import ContinuationSettings
+from mu_addon.fem.arc_length import ContinuationSettings
 from mu_addon.fem.continuation import limit_pressure, trace_branch
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import LDL, IndefiniteError

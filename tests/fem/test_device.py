@@ -23,7 +23,7 @@ from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest
-from mu_addon.fem.variants import IterativeVariants
+from mu_addon.fem.tangent_variants import IterativeVariants
 
 from .bodies import hollow_box
 

@@ -21,7 +21,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi, with_sensor
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import influence_map, loaded
+from mu_addon.placement.sensitivity_map import influence_map, loaded
 
 from .cubic import Cubic
 

@@ -27,7 +27,7 @@ UNLIMITED = {
     "mu_addon/run/child.py": "messages of a process of its own",
     "mu_addon/run/lock.py": "1000 bytes",
     "mu_addon/sensing/framing.py": "a frame, see its limit",
-    "mu_addon/sensing/lines.py": "a line, see its limit",
+    "mu_addon/sensing/text_lines.py": "a line, see its limit",
     "mu_addon/sensing/recording.py": "a line of a file read within its limit",
     "mu_addon/usecases/diagnose/job.py": "the program itself",
     "mu_addon/usecases/export/run.py": "written the moment before",

@@ -38,7 +38,7 @@ OTHERWISE = {
     "blender/optimize/properties.py": {"points"},  # of a curve that is wanted
     "blender/printing/solid_operators.py": {"quality"},  # of a part to print
     "chain/chain.py": {"tip_mass_g"},  # no load
-    "chain/learning.py": {"bend_deg"},  # of a joint
+    "chain/joint_learning.py": {"bend_deg"},  # of a joint
     "evidence/prediction/specimen.py": {"strain"},
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
     "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU

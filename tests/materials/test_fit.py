@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import Ogden
-from mu_addon.materials.choice import choose, disagreement
 from mu_addon.materials.coupon import MODES, Coupon, incompressible, response
 from mu_addon.materials.fit import POISSON, TOLERANCE, fit_coupons, leave_one_mode_out, mode_error
-from mu_addon.materials.forms import FORMS, form
+from mu_addon.materials.law_choice import choose, disagreement
+from mu_addon.materials.law_forms import FORMS, form
 from mu_addon.measured import read_folder
 
 # Ogden (1972), table 1, in MPa: fitted by hand to the same rubber.

@@ -5,7 +5,7 @@ import numpy as np
 
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.fem.relocated import relocated
+from mu_addon.fem.moved_nodes import relocated
 from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import RestStiffness
 from mu_addon.optimization.search import Observed

@@ -6,7 +6,7 @@ import pytest
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.fem.relocated import relocated
+from mu_addon.fem.moved_nodes import relocated
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.optimization.freedoms import Freedom, changed_unit
 from mu_addon.optimization.gradient import gradients

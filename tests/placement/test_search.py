@@ -20,10 +20,10 @@ from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.graph import Limits, lattice_graph
 from mu_addon.placement.inclusion import sensor_share
-from mu_addon.placement.influence import gradients_of, loaded, mean_deviation, shares_of_time
 from mu_addon.placement.polyline import polyline_inclusion
 from mu_addon.placement.response import reduced_response
 from mu_addon.placement.search import SearchSettings, front, probability_of_better, search_paths
+from mu_addon.placement.sensitivity_map import gradients_of, loaded, mean_deviation, shares_of_time
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions

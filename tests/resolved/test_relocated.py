@@ -6,7 +6,7 @@ import pytest
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.fem.model import Model
-from mu_addon.fem.relocated import relocated
+from mu_addon.fem.moved_nodes import relocated
 from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, MeshSettings

@@ -15,7 +15,7 @@ from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import lattice_graph
-from mu_addon.placement.influence import loaded
+from mu_addon.placement.sensitivity_map import loaded
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.response import _frame, _natural, _stiffness, bar_response
 from mu_addon.resolved.unit import mesh_printed

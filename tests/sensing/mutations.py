@@ -15,7 +15,7 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from mu_addon.sensing.accounts import Counters
+from mu_addon.sensing.byte_accounts import Counters
 from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import END, info_frame, sample_frame
 from mu_addon.sensing.samples import Samples

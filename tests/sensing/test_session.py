@@ -20,7 +20,7 @@ import pytest
 from mu_addon.errors import InputError
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.recording import read_recording
-from mu_addon.sensing.ring import Ring
+from mu_addon.sensing.ring_buffer import Ring
 from mu_addon.sensing.session import Control, run_session
 from mu_addon.sensing.sources import ConnectionLost, EndOfStream, Port, Replay, SerialLine, find
 

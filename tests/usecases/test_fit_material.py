@@ -10,7 +10,7 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.materials.coupon import incompressible
-from mu_addon.materials.forms import FORMS
+from mu_addon.materials.law_forms import FORMS
 from mu_addon.materials.library import read_material
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.run.folder import keep_inputs, same_inputs
+from mu_addon.usecases.parameter_study.main_effects import main_effect, pareto_front
 from mu_addon.usecases.parameter_study.plan import parse_plan, sample
-from mu_addon.usecases.parameter_study.sensitivity import main_effect, pareto_front
 from mu_addon.usecases.parameter_study.variable import Variable, variable_names
 
 GOOD = """

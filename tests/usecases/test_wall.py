@@ -25,7 +25,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.materials.coupon import Coupon
 from mu_addon.materials.fit import POISSON, fit_coupons
-from mu_addon.materials.forms import FORMS
+from mu_addon.materials.law_forms import FORMS
 from mu_addon.materials.library import load_material, material_text, parse_material
 from mu_addon.measured import read_folder
 from mu_addon.meshing.homogenised_unit import mesh_unit

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mu_addon.run.child import Child
-from mu_addon.sensing.ring import Ring
+from mu_addon.sensing.ring_buffer import Ring
 from mu_addon.sensing.session import STATUS
 from mu_addon.usecases.sensor.watch import Watched
 from tests.headless.processes import ROOT

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import bpy
 
-from ...design.nearest import tied
+from ...design.nearest_valid import tied
 from ...design.parameters import SECTIONS, Unit, read_unit
 from ...design.quantity import describe
 from ...errors import InputError, MuError

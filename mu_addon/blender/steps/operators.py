@@ -6,7 +6,7 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ...design.nearest import tied
+from ...design.nearest_valid import tied
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
 from ...design.steps import STEPS, Step, downstream

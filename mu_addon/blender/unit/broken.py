@@ -8,7 +8,7 @@ from typing import Any
 
 import attrs
 
-from ...design.nearest import Repair, nearest_fit, repairs
+from ...design.nearest_valid import Repair, nearest_fit, repairs
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...errors import InputError, MuError

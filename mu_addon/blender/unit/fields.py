@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...design.nearest import tied
+from ...design.nearest_valid import tied
 from ...design.quantity import Description, describe
 from ..shared import updates
 

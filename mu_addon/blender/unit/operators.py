@@ -6,7 +6,7 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ...design.nearest import tied
+from ...design.nearest_valid import tied
 from ...design.parameters import Unit
 from ...design.quantity import describe
 from ...errors import InputError

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...chain.learning import Sampling
+from ...chain.joint_learning import Sampling
 from ...chain.settings import GRAVITY, REFINE, TIMES, TIP_MASS
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.settings import USUAL_RESIN

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...chain.chain import Chain, ChainState, Link, Loads
 from ...chain.inverse import Reach, reach_point
-from ...chain.learning import Learned, learn
+from ...chain.joint_learning import Learned, learn
 from ...chain.settings import REFINE
 from ...chain.unit_between_plates import frame, spread
 from ...design.parameters import Unit

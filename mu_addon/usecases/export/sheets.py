@@ -17,7 +17,7 @@ from ...design.printing.limit_parts import LimitPart
 from ...design.printing.printer import MEANING, Limit
 from ...errors import InputError
 from ...reading import unreadable
-from ...table_cells.own import own_lines, own_rows, own_text
+from ...table_cells.own_tables import own_lines, own_rows, own_text
 
 GAUGE_COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
 LIMIT_COLUMNS = ("limit", "meaning", "best", "sizes", "measured")

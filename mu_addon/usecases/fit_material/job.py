@@ -9,7 +9,7 @@ import attrs
 
 from ...errors import InputError
 from ...materials.coupon import Coupon
-from ...materials.forms import FORMS, Form, form
+from ...materials.law_forms import FORMS, Form, form
 from ...materials.settings import WEIGHTS
 from ...measured import Measured, read_folder
 from ...measured.folder import require_same_data

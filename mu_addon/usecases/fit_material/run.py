@@ -11,9 +11,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import write_csv, write_text
-from ...materials.choice import Choice, choose, disagreement
 from ...materials.coupon import Array, Coupon, response
 from ...materials.fit import POISSON, TOLERANCE, Fit, fit_coupons, leave_one_mode_out, ranges
+from ...materials.law_choice import Choice, choose, disagreement
 from ...materials.library import Material, write_material
 from ...measured import Measured
 from ...run.context import RunContext

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...chain import settings as chain
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .common import ORDER
+from .shared_settings import ORDER
 
 if TYPE_CHECKING:
     from ...graph.evaluation import Finished, Order
@@ -22,7 +22,7 @@ def _remark(outputs: Outputs) -> str:
 
 
 def _chain(call: Call) -> Order:
-    from ...chain.learning import Sampling
+    from ...chain.joint_learning import Sampling
     from ...graph.evaluation import Order
     from ...meshing.settings import MeshSettings
     from ..chain.job import MOST_UNITS, ChainUnit, Job, Target, read_pressures

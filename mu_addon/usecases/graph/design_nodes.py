@@ -15,7 +15,6 @@ from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .common import of_orders
 from .parts import (
     SCALE,
     Design,
@@ -28,6 +27,7 @@ from .parts import (
     rest,
     whole_unit,
 )
+from .shared_settings import of_orders
 
 STACK = Stack()
 """Values of the steps of every tree in this process."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
-from .common import FIDELITY, SELF_CONTACT, of_orders
+from .shared_settings import FIDELITY, SELF_CONTACT, of_orders
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")

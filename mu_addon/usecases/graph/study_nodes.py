@@ -15,7 +15,8 @@ from ..grip.settings import COARSE, CUBES, DENSITY
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
 from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
-from .common import (
+from .parts import refuse_body
+from .shared_settings import (
     FIDELITY,
     ORDER,
     ORIENTATION,
@@ -26,7 +27,6 @@ from .common import (
     TIMES,
     of_orders,
 )
-from .parts import refuse_body
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
 

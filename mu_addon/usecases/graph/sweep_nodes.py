@@ -5,7 +5,8 @@ from __future__ import annotations
 from ...errors import InputError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
 from ..parameter_study import settings as study
-from .common import (
+from .parts import described
+from .shared_settings import (
     FIDELITY,
     ORDER,
     PROTOCOL,
@@ -15,7 +16,6 @@ from .common import (
     SELF_FRICTION,
     of_orders,
 )
-from .parts import described
 
 STUDY = "Parameter Study"
 FACTOR = "protocol.factor"

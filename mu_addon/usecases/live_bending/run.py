@@ -23,8 +23,8 @@ from ...errors import ConvergenceError, InputError, MeshingError, MuError
 from ...fem.bending_angle import TipSection
 from ...fem.equilibrium import Equilibrium
 from ...fem.model import Model
+from ...fem.moved_nodes import relocated
 from ...fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
-from ...fem.relocated import relocated
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory
 from ...files import write_json

@@ -14,8 +14,8 @@ from ...report.charts import CHOSEN, INK, QUIET, canvas
 from ...report.html import cards, facts_table, figure, note, number, page, table
 from ...run.progress import Progress
 from ...run.versions import package_versions
+from .main_effects import Effect, main_effect, pareto_front
 from .results import Found
-from .sensitivity import Effect, main_effect, pareto_front
 
 Array = np.ndarray[Any, Any]
 

@@ -26,7 +26,7 @@ from ...run.usecase import UseCase
 from ...sensing.calibration import Calibration, CalibrationSweep, calibrate, sweeps_of, write_calibration
 from ...sensing.recording import INDEX, Recording, read_recording
 from ...sensing.session import SWEEP
-from ...table_cells.own import own_lines, own_rows, own_text
+from ...table_cells.own_tables import own_lines, own_rows, own_text
 from ...toml_writer import toml_text
 
 Array = np.ndarray[Any, Any]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...reading import file_bytes
-from ...sensing.ring import Ring
+from ...sensing.ring_buffer import Ring
 from ...sensing.session import STATUS
 
 Array = np.ndarray[Any, Any]

@@ -16,7 +16,9 @@ from ...fem.trajectory import Trajectory, whole_body
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
-from ...placement.influence import (
+from ...placement.response import Response, reduced_response
+from ...placement.search import SearchSettings, front, search_paths
+from ...placement.sensitivity_map import (
     Parity,
     deviation_map,
     gradients_of,
@@ -28,8 +30,6 @@ from ...placement.influence import (
     shares_of_time,
     stable_part,
 )
-from ...placement.response import Response, reduced_response
-from ...placement.search import SearchSettings, front, search_paths
 from ...placement.settings import PRINTED
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields

@@ -24,7 +24,7 @@ from ...measured.video import Motion, Pair, Tracks, View, motion, resting
 from ...measured.writing import add_experiment, csv_text, file_stem, tried
 from ...reading import file_text, is_finite, unreadable
 from ...run.context import RunContext
-from ...table_cells.own import own_text
+from ...table_cells.own_tables import own_text
 from ...toml_writer import toml_text
 from .tracked_table import PROJECTS, SUFFIXES, read_pixels
 

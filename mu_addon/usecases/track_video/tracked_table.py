@@ -22,7 +22,7 @@ from ...measured.table import Remark
 from ...measured.video import Tracks
 from ...reading import require_rows, unreadable
 from ...table_cells.notation import is_like_number
-from ...table_cells.own import own_lines, own_rows, own_text
+from ...table_cells.own_tables import own_lines, own_rows, own_text
 
 Array = np.ndarray[Any, Any]
 Line = tuple[int, str]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import attrs
 
 from .formats import text_of, without_colour
-from .lines import why_unread
+from .text_lines import why_unread
 
 # So many bytes without a format are enough to say what is wrong with them; the latest are looked at.
 _COMPLAINT_BYTES, _LATEST_BYTES = 400, 4096

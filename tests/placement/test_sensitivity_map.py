@@ -20,7 +20,7 @@ from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.deviation import centreline, centreline_deviation
-from mu_addon.placement.influence import (
+from mu_addon.placement.sensitivity_map import (
     centreline_gradient,
     deviation_map,
     gradients_of,
