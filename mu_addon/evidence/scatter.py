@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -42,6 +43,8 @@ NEAR = 2.0
 WINDOW, LOUD = 15, 2.5
 # Deviations from those around it beyond which a block is a separate burst; largest share of such blocks.
 ALONE, MOST = 4.0, 0.2
+# Blocks over which separate loud ones are one burst, in which a reading may be near the others by chance.
+TOGETHER = 7
 # A louder block does not count any more.
 LOUDEST = 1e3
 
@@ -209,7 +212,7 @@ def _loudness(time_s: Array, left: Array) -> Array | None:
     """Noise (b,) of each block of a misfit (b,) over the usual, where it is `LOUD` or more; None if even.
 
     By the scatter of windows, and of single blocks by their distance from those around them: at most a share
-    `MOST` of all.
+    `MOST` of all. What lies between loud blocks of one burst is as loud as the quieter of them.
     """
     from scipy.ndimage import maximum_filter1d, median_filter
 
@@ -227,9 +230,22 @@ def _loudness(time_s: Array, left: Array) -> Array | None:
     apart /= max(1.4826 * float(np.median(apart)), 1e-300)
     alone = apart > np.maximum(ALONE, 2.0 * share)
     if np.count_nonzero(alone) <= MOST * len(left):
-        share = np.where(alone, apart, share)
+        share = _joined(np.where(alone, apart, share), np.flatnonzero(alone))
     share = np.minimum(share, LOUDEST)
     return np.where(share > LOUD, share, 1.0) if (share > LOUD).any() else None
+
+
+def _joined(share: Array, alone: Array) -> Array:
+    """The noise (b,) of blocks over the usual, with that of blocks between separate loud ones of one burst.
+
+    alone: numbers of the separate loud ones.
+    """
+    found = share.copy()
+    for first, last in pairwise(alone.tolist()):
+        if last - first <= TOGETHER:
+            between = slice(first + 1, last)
+            found[between] = np.maximum(share[between], min(share[first], share[last]))
+    return found
 
 
 def within_scatter(record: Record, left: Array) -> bool:

@@ -252,6 +252,17 @@ def test_bursts_and_single_readings_are_noise_of_their_own_blocks():
     assert even is made
 
 
+def test_readings_between_loud_ones_belong_to_their_burst():
+    """A burst of six blocks, of which chance leaves two near the others."""
+    made, _ = records(blocks([40.0], 240))
+    left = SD * np.random.default_rng(4).normal(size=len(made))
+    left[100:106] += SD * np.array([15.0, 3.0, -2.5, 3.0, -3.0, -12.0])
+    left[140] += 15.0 * SD
+    (series,) = with_bursts(made, left)[0].series
+    assert (series.louder[100:106] > 5.0).all()
+    assert (series.louder[[98, 99, 106, 107, 139, 141]] < 4.0).all()
+
+
 def test_a_smooth_error_is_no_burst():
     made, _ = records(blocks([40.0], 240))
     left = SD * np.random.default_rng(2).normal(size=len(made))
