@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import MuError
 from ..measured import Experiment
-from .effect import BATCH, GEOMETRY, LIBRARY, OF
+from .effect import BATCH, GEOMETRY, LIBRARY, OF, THICKNESS
 from .fit import Fit, Fitter
 from .noise import Whitening
 from .record import record
@@ -64,8 +64,11 @@ def propose_experiment(fitter: Fitter, found: Selection, seen: Sequence[Sensitiv
     if best is None or best.expected < 1.0:
         own = {s.effect.name: s.effect.reveals for s in seen}
         plain = dict.fromkeys(n.partition(OF)[0].partition(" among ")[0] for n in names)
-        tied = [n for n in (BATCH, GEOMETRY) if n in plain]
-        # Another specimen separates a scale of one specimen from any other cause.
+        # Another specimen separates a scale of one specimen from any other cause; of struts drawn unlike, it
+        # would be as far off.
+        drawn = {e.strut_mm for e in fitter.record.experiments}
+        specimens = BATCH, GEOMETRY
+        tied = [n for n in ((THICKNESS, *specimens) if len(drawn) > 1 else specimens) if n in plain]
         asked = tied[:1] or list(plain)
         words = "; or ".join(dict.fromkeys(own.get(n, LIBRARY.get(n, ("", n))[1]) for n in asked))
         return Proposal(words, names, best.expected if best else 0.0)

@@ -1,5 +1,6 @@
 """Lattices between plates: dimensional analysis across scales, directions, seating, and weighing."""
 
+import re
 from pathlib import Path
 
 import attrs
@@ -16,6 +17,7 @@ from mu_addon.evidence.prediction.lattice_compression import ComputedCell, Latti
 from mu_addon.evidence.simulator import Composite
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import read_folder
+from mu_addon.usecases.diagnose.words import advice, sentence
 
 from .bench import experiment, measured, recovered
 
@@ -329,6 +331,32 @@ def test_struts_of_each_specimen_stand_beside_its_modulus_until_it_is_weighed(we
     if weighed:
         values = [found.selection.chosen.values[k] for k in cause.effect.keys]
         assert values[0] - values[2] == pytest.approx(0.30, abs=0.04)
+
+
+def test_struts_drawn_unlike_are_told_by_the_thickness_that_they_act_with():
+    drawn, acting = (1.2, 1.2, 0.9, 0.9), (1.25, 1.27, 0.79, 0.81)
+    made = [
+        attrs.evolve(e, strut_mm=mm)
+        for e, mm in zip(
+            specimens([1.5 * (a / mm - 1.0) for a, mm in zip(acting, drawn, strict=True)], False),
+            drawn,
+            strict=True,
+        )
+    ]
+    struts = {e.name: Struts(mm) for e, mm in zip(made, drawn, strict=True)}
+    found = diagnose(made, Composite(bench_simulators(made, struts)))
+    _, words = sentence(found)
+    told = re.search(
+        r"those of 1\.2 mm act like (\S+) to (\S+) mm and those of 0\.9 mm like (\S+) to (\S+) mm: beside "
+        r"the thickest, the thinnest come out (\S+) mm thinner than drawn",
+        words,
+    )
+    least, most, thin, thicker, less = map(float, told.groups())
+    # One modulus is fitted to all: the differences alone are in the data.
+    assert (most - least, thicker - thin, less) == pytest.approx((0.02, 0.02, 0.16), abs=0.015)
+    assert "microscope" in advice(found)
+    alike = [attrs.evolve(e, strut_mm=1.2) for e in made]
+    assert "act like" not in sentence(diagnose(alike, Composite(bench_simulators(alike, struts))))[1]
 
 
 def test_the_papers_moduli_by_the_computed_cell():

@@ -219,6 +219,9 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
     assert 'name = "mu-1.0x"' in (out / "unit.toml").read_text()
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "fast cycles" in html
+    # What it was simulated as stands under the title, and a warning beside a homogenised one.
+    assert "held out; the unit with a homogenised lattice" in html
+    assert "own error may be named" in html
     # Of each experiment the angle and the two markers that move most; the rest is in the table.
     assert f"{3 * (len(analytic.CHANNELS) - 3)} more channels are in residuals.csv." in html
     channels = {r["channel"] for r in csv.DictReader((out / "residuals.csv").open())}
@@ -298,6 +301,10 @@ def test_every_face_simulates_the_printed_unit_unless_told_otherwise(tmp_path, m
         "fidelity": "resolved",
         "self_contact": True,
     }
+    assert [j.body for j in started[:2]] == [
+        "the unit as printed, walls kept apart",
+        "the unit with a homogenised lattice",
+    ]
     # A run from before every one named it stays what it was.
     text = Job(measured).texts()["diagnose.toml"]
     named = ('fidelity = "resolved"\n', "self_contact = true\n")
@@ -308,7 +315,9 @@ def test_every_face_simulates_the_printed_unit_unless_told_otherwise(tmp_path, m
     again = read_job(tmp_path)
     assert (again.fidelity, again.self_contact) == ("homogenised", False)
     # Of blocks nothing is said: their cells are computed either way.
-    assert "fidelity" not in Job(read_folder(PAPER)).texts()["diagnose.toml"]
+    blocks = Job(read_folder(PAPER))
+    assert "fidelity" not in blocks.texts()["diagnose.toml"]
+    assert not blocks.body
 
 
 def test_a_unit_of_softer_resin_is_trusted_with_its_own_moduli(tmp_path, analytic_unit):

@@ -75,6 +75,15 @@ class Job:
         return unit_behind(self.measured.experiments, self.unit)
 
     @property
+    def body(self) -> str:
+        """What a unit is simulated as, in words; empty where none is."""
+        if not bends(self.measured.experiments):
+            return ""
+        if self.fidelity == HOMOGENISED:
+            return "the unit with a homogenised lattice"
+        return f"the unit as printed, {'walls kept apart' if self.self_contact else 'walls may cross'}"
+
+    @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation."""
         from ...evidence.unit_fem import UnitSettings
@@ -117,7 +126,7 @@ def read_job(folder: Path) -> Job:
 
 def fidelity_of(job: Any) -> dict[str, Any]:
     """Fidelity and self-contact as entries of a job's file of inputs; none where no unit is simulated."""
-    if not any(e.kind in OF_A_UNIT for e in job.measured.experiments):
+    if not bends(job.measured.experiments):
         return {}
     apart = None if job.fidelity == HOMOGENISED else job.self_contact
     return {"fidelity": job.fidelity, "self_contact": apart}
@@ -137,12 +146,17 @@ def fidelity_in(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
     return {"fidelity": found, "self_contact": apart is True}
 
 
+def bends(experiments: Sequence[Experiment]) -> bool:
+    """Return True if a unit is simulated for some experiment."""
+    return any(e.kind in OF_A_UNIT for e in experiments)
+
+
 def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
     """Unit of the experiments, the preset where none is given; None where no experiment needs one.
 
     A block of lattice is a unit's where its cells are counted.
     """
-    if any(e.kind in OF_A_UNIT or e.cells for e in experiments):
+    if bends(experiments) or any(e.cells for e in experiments):
         return unit or load_preset(PRESET)
     return None
 

@@ -19,7 +19,10 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class JudgedData:
-    """A verdict with its simulator and data; remarks: of the reader, in words."""
+    """A verdict with its simulator and data.
+
+    remarks: of the reader, in words. body: what a unit was simulated as, in words; empty without one.
+    """
 
     measured: Measured
     simulator: Composite
@@ -27,6 +30,7 @@ class JudgedData:
     model: ExtendedModel
     unit: Unit | None
     remarks: tuple[str, ...]
+    body: str = ""
 
     @property
     def before(self) -> Mapping[str, float]:

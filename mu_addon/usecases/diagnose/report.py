@@ -68,6 +68,7 @@ def report(found: JudgedData, out: Path, versions: dict[str, str], stopped: str 
     kinds = listed([readable(k) for k in dict.fromkeys(e.kind for e in experiments)])
     count = len(experiments)
     subtitle = f"{count} experiment{'s' if count > 1 else ''} ({kinds}), {held or 'none'} of them held out"
+    subtitle += f"; {found.body}" if found.body else ""
     name = found.measured.folder.resolve().name
     return page(
         f"Diagnosis of {name}",

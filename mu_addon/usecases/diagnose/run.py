@@ -24,13 +24,14 @@ from ...evidence.verdict import Verdict
 from ...files import write_csv, write_json
 from ...measured import Measured
 from ...measured.kinds import OF_A_UNIT
+from ...meshing.settings import HOMOGENISED
 from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .job import LAYOUT, Job, read_job
+from .job import LAYOUT, Job, bends, read_job
 from .judged_data import JudgedData, curves
 from .report import write_report
 from .simulators import simulations_plan, simulators_of
@@ -45,6 +46,10 @@ SET = 3
 """Records among the data for which the plan's seconds of a verdict hold."""
 RECORD = 10
 """Rows from which an experiment is a record, not a few readings."""
+NOT_AS_PRINTED = (
+    "the unit is simulated with a homogenised lattice: of a printed unit, its own error may be named, or "
+    "hide a cause"
+)
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -78,6 +83,9 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     Raises InputError, OutputError.
     """
     measured, unit, progress = job.measured, job.subject, context.progress
+    homogenised = bool(job.body) and job.fidelity == HOMOGENISED
+    if homogenised:
+        progress.warning(NOT_AS_PRINTED, "fidelity", "choose resolved for a printed unit")
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     if "verdict" in context.summary:
@@ -94,7 +102,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         with _stages(progress) as on_model:
             verdict = diagnose(measured.experiments, simulator, on_model)
         # A first look at each effect tells which ones need all their sizes.
-        of_a_unit = any(e.kind in OF_A_UNIT for e in measured.experiments)
+        of_a_unit = bends(measured.experiments)
         settings = settings.further(verdict.in_question) if of_a_unit else None
     notes += _known_before(job, simulator)
     model = extended_model(verdict, simulator.nuisances)
@@ -115,7 +123,8 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
-    found = JudgedData(measured, simulator, verdict, model, unit, tuple(remarks))
+    remarks = [NOT_AS_PRINTED] * homogenised + remarks
+    found = JudgedData(measured, simulator, verdict, model, unit, tuple(remarks), job.body)
     write_json(folder / "verdict.json", verdict.as_json())
     found.model.save(folder / "model.toml")
     _write_residuals(found, folder / "residuals.csv")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...evidence.effect import FORCE_SCALE, OF, SLIP, Effect, Parameter
+from ...evidence.effect import FORCE_SCALE, OF, SLIP, THICKNESS, Effect, Parameter
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.prediction.unit_pressure import MODULUS
@@ -35,6 +35,9 @@ LEAST_SHARE = 0.1
 TABLE = 6
 # Of a factor of moduli: less is not worth a word.
 NEAR_ONE = 0.02
+ASK_STRUTS = "If specimens were drawn with struts other than the unit's, give the strut_mm of each."
+# Most detection limits in the sentence of a verdict `none`.
+MOST_LIMITS = 5
 # Most proposed measurements for effects that the data cannot show.
 MOST_SHOWN = 3
 
@@ -129,7 +132,7 @@ def _slipped(verdict: Verdict, cause: Cause) -> str:
     """Size, direction in the picture, and time of a marker's slip, by its record's clock."""
     values = verdict.selection.chosen.values
     *sizes, moment = zip(cause.effect.keys, cause.effect.parameters, strict=True)
-    words = []
+    words: list[str] = []
     for key, p in sizes:
         low, high = verdict.intervals.get(key, (math.nan, math.nan))
         way = f"along {axis}" if (axis := p.name.split("_")[1]) in ("y", "z") else "by"
@@ -162,6 +165,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             for c in found.causes
         ]
         names = listed([called(c.effect) for c in found.causes])
+        sizes += [struts] if (struts := _struts(verdict)) else []
         if not found.left:
             return names, " ".join(sizes)
         return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
@@ -171,6 +175,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         message = "Each of these effects explains the data, and these data do not distinguish them." + (
             "" if tabled else f" Fitted values: {'; '.join(sizes)}."
         )
+        message = f"{struts} {message}" if (struts := _struts(verdict)) else message
         if not found.left:
             return " and ".join(choices), message
         message = message.replace("explains the data", "explains nearly all of the data")
@@ -180,7 +185,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             "no model error detected",
             f"The error, {_error(verdict)}, is no larger than the noise that {_shown(verdict)}. "
             f"{_zeros(verdict)}"
-            "An effect larger than its limit (“Identifiability of each effect”) would have been detected.",
+            f"{_limits(verdict)}",
         )
     if verdict.kind == "unidentifiable":
         return (
@@ -199,6 +204,58 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         "unexplained by any known effect",
         f"The model misses these data by {_error(verdict)}, and no effect of the library explains that. "
         f"{tried}{_near(verdict)}".strip(),
+    )
+
+
+def _limits(verdict: Verdict) -> str:
+    """Smallest sizes that would have been detected, of the effects that the data show least, in words."""
+    visible = []
+    for s in best_seen(verdict.seen).values():
+        p = s.effect.parameters[0]
+        if s.identifiable and s.linear:
+            size = f"{readable(s.effect.name)} ({bare(p)} {s.limit:.2g} {p.unit}".rstrip() + ")"
+            visible.append((s.limit / max(abs(p.high - p.null), abs(p.low - p.null)), size))
+    if not visible:
+        return "No effect would have been detected."
+    least = [size for _, size in sorted(visible, reverse=True)[:MOST_LIMITS]]
+    more = len(visible) - len(least)
+    others = f"; the limits of {more} more are in “Identifiability of each effect”" if more else ""
+    return f"What would have been detected, the least visible first: {'; '.join(least)}{others}."
+
+
+def _struts(verdict: Verdict) -> str:
+    """Thickness that the struts of specimens drawn unlike act with, if it is a cause or a rival; else empty.
+
+    One modulus is fitted to all, so that the differences alone are in the data.
+    """
+    drawn = {e.specimen: e.strut_mm for e in verdict.experiments if e.specimen and e.strut_mm}
+    found = verdict.selection
+    titles = {t for c in found.causes for t in (c.effect.title, *c.rivals)}
+    for fit in (found.chosen, *found.wider):
+        for effect in fit.effects:
+            if effect.name == THICKNESS and effect.among and effect.title in titles:
+                acting: dict[float, list[float]] = {}
+                for key, p in sizes_of(effect):
+                    if mm := drawn.get(p.name.partition(OF)[2].removeprefix(f"{effect.among} ")):
+                        acting.setdefault(mm, []).append(mm + fit.values[key])
+                unsaid = not drawn and any(e.cells for e in verdict.experiments)
+                return ASK_STRUTS if unsaid else _acting(acting)
+    return ""
+
+
+def _acting(acting: Mapping[float, Sequence[float]]) -> str:
+    """Diameters in mm that struts act with, by the drawn ones; empty where all were drawn alike."""
+    if len(acting) < 2:
+        return ""
+    thick, *others = sorted(acting, reverse=True)
+    words: list[str] = []
+    for mm in (thick, *others):
+        ends = between(min(acting[mm]), max(acting[mm])) if len(acting[mm]) > 1 else f"{acting[mm][0]:.3g}"
+        words.append(f"those of {mm:g} mm {'like' if words else 'act like'} {ends} mm")
+    less = float(np.mean(acting[thick])) - thick - (float(np.mean(acting[others[-1]])) - others[-1])
+    return (
+        f"If struts are not printed as drawn, {listed(words)}: beside the thickest, the thinnest come out "
+        f"{abs(less):.2g} mm {'thinner' if less > 0 else 'thicker'} than drawn."
     )
 
 
@@ -287,7 +344,7 @@ def _asked(verdict: Verdict) -> str:
     for s in hidden:
         shows.setdefault(s.effect.reveals, []).append(s.effect.name)
     some = list(shows.items())[:MOST_SHOWN]
-    words = []
+    words: list[str] = []
     for what, names in some:
         what = what.replace("; or ", " or ").replace("; ", ", ")
         words.append(f"{what} ({listed([readable(n) for n in dict.fromkeys(names)])})")
