@@ -64,7 +64,7 @@ def test_every_run_is_kept_and_a_small_one_replaces_no_large_one(tmp_path):
     coarse = ran(tmp_path, COARSE, RANKED | {"seconds": {"Model A": 20.0}}, 200)
     assert large.folder != coarse.folder
     found = history.runs(tmp_path)
-    assert [run.title for run in found] == ["Ranking, mesh 0.5", "Ranking"]
+    assert [run.title for run in found] == ["Ranking", "Ranking"]
     assert [run.seconds for run in found] == [20.0, 480.0]
     best = history.best_of(found, design_of(FULL))
     assert best.key == large.key

@@ -26,7 +26,7 @@ CONTACT = "contact.csv"
 
 
 # Of mu-1.0x at a refinement of 0.5 (docs/engineering/verification.md).
-COARSE = "coarse mesh: angles up to 12 % too small under vacuum, 2 % under pressure"
+COARSE = "coarse mesh ({:g}): angles up to 12 % too small under vacuum, 2 % under pressure"
 CONTINUUM = "homogenised: under vacuum it bends half as far as printed struts"
 
 
@@ -47,7 +47,7 @@ class Findings:
         """Known error of the run's model, in words; empty for printed struts on the default mesh."""
         if not self.run.printed:
             return CONTINUUM
-        return COARSE if self.run.refine < REFINE.default else ""
+        return COARSE.format(self.run.refine) if self.run.refine < REFINE.default else ""
 
     @property
     def angles(self) -> list[tuple[float, float]]:

@@ -137,8 +137,7 @@ class Run:
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
         # What was found tells a motion from a ranking; both words would not fit into a list.
-        what = what if self.printed else "Homogenised"
-        return self.name or (what if self.refine == REFINE.default else f"{what}, mesh {self.refine:g}")
+        return self.name or (what if self.printed else "Homogenised")
 
     @property
     def seconds(self) -> float:

@@ -185,7 +185,7 @@ def test_a_motion_from_start_to_stale(tmp_path):
     assert found.angles[-1][0] == 5.0
     assert found.angles[-1][1] > 0
     assert "kPa" in drawn()
-    assert "Coarse mesh: angles up to 12 % too small" in drawn()
+    assert "Coarse mesh (0.35): angles up to 12 % too small" in drawn()
     assert "Stale" not in drawn()
     root.mu_unit.chambers.wall_mm = 1.0
     assert studies.findings(root).stale
