@@ -49,7 +49,14 @@ def noisy(made, sd, seed=100):
 
 @pytest.mark.parametrize(
     ("hidden", "names"),
-    [({}, ()), ({"rate_independent_hysteresis.share": 0.05}, ("rate_independent_hysteresis",))],
+    [
+        ({}, ()),
+        pytest.param(
+            {"rate_independent_hysteresis.share": 0.05},
+            ("rate_independent_hysteresis",),
+            marks=pytest.mark.nightly("test_a_gauge_s_noise_has_no_name"),
+        ),
+    ],
     ids=["nothing wrong", "friction"],
 )
 def test_a_gauge_s_noise_has_no_name(hidden, names):

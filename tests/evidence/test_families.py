@@ -318,6 +318,7 @@ def test_a_leak_that_ends_is_not_taken_for_warmth(tmp_path):
     assert {"leak", "temperature_drift"} <= verdict.ambiguity
 
 
+@pytest.mark.nightly("test_a_leak_that_ends_is_not_taken_for_warmth")
 def test_a_valve_that_opens_is_a_leak(tmp_path):
     """Above 102 kPa: a leak and a drift of the gauge were named together."""
     of, verdict = judged(tmp_path, "outside", 9, 26112611)

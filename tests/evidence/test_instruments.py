@@ -98,6 +98,7 @@ def test_gauges_without_drift_have_none(seeds):
         assert judged(holds(lambda t: 0.0 * t, seed=seed)).kind == "none"
 
 
+@pytest.mark.nightly("test_a_gauge_that_drifts_is_told_by_holds_at_two_pressures")
 def test_a_leak_is_no_drift_of_the_gauge():
     """Laminar: dp/dt = -k ((p + P0)^2 - P0^2)/(2 P0), stepped through."""
 

@@ -441,6 +441,7 @@ def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp
     assert np.abs(met - exact).max() < 0.05
 
 
+@pytest.mark.nightly("test_a_run_starts_from_the_states_of_the_body_without_its_effect")
 def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     effects = ("wall_thickness",)
     # Orders differ, so that the meshes' errors do by a factor.

@@ -303,6 +303,7 @@ def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
     assert -GAP / 2 < states[-1].u[middle, 2] < -GAP / 2 + 0.02
 
 
+@pytest.mark.nightly("test_a_vacuum_closes_a_pouch_but_never_crosses_it")
 def test_a_branch_closes_a_pouch_by_arc_length_as_load_steps_do():
     mesh = pouch()
     eq = body(mesh, gap=0.04, material=(1.0, 0.45))

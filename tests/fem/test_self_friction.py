@@ -144,6 +144,7 @@ def dragged(friction, way, steps):
     return contacts, np.array(stored), np.array(lost), model
 
 
+@pytest.mark.nightly("test_what_is_pushed_by_less_than_friction_stays_and_by_more_is_lost")
 def test_a_block_drawn_over_another_costs_what_the_lid_does():
     way = (0.18, -0.24, 0.0)
     contacts, stored, lost, model = dragged(MU, way, 20)

@@ -52,7 +52,7 @@ def require_alike(found, shown):
     assert figures[0] == pytest.approx(figures[1], rel=0.05)
 
 
-@pytest.mark.nightly("test_the_other_examples_print_what_the_page_shows")
+@pytest.mark.nightly("test_every_example_names_what_there_is")
 def test_ten_lines_lead_from_a_preset_to_an_angle(printed):
     require_alike(printed(EXAMPLES[0][0]), EXAMPLES[0][1])
 

@@ -45,6 +45,7 @@ def candidates(mesh, unit=SMALL, beside=False):
     return PrintedWaveguides(unit, mesh, paths, ANCHORS, lambda own: materials_of(unit, own), model, settings)
 
 
+@pytest.mark.nightly("test_a_wall_that_relaxes_lets_a_candidate_go_on")
 def test_what_remembers_nothing_is_where_pressure_alone_takes_it(mesh):
     free = candidates(mesh)
     moved = free.simulated_in_time(0, np.array([0.0, 1.0]), np.array([0.0, -4.0]))

@@ -73,6 +73,7 @@ def test_its_volume_is_that_of_the_drawn_struts(name):
     assert found == pytest.approx(strut_volume_mm3(unit), rel=3e-3)
 
 
+@pytest.mark.nightly("test_octants_share_their_nodes_and_stay_in_their_planes")
 def test_a_printed_waveguide_stands_in_graded_struts():
     """Thickened struts and replaced ones: the same rules as without, on the graded mesh."""
     unit = with_grading(Grading(base=0.8, tip=1.2, plus_y=0.8))

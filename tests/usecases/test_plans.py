@@ -40,7 +40,10 @@ def messages_of(monkeypatch, tmp_path, words):
     "words",
     [
         ["fit-material", "tests/data/treloar", "--laws", "yeoh"],
-        ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
+        pytest.param(
+            ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
+            marks=pytest.mark.nightly("test_a_command_does_what_it_planned"),
+        ),
         ["simulate", "--preset", "mu-0.75x", *STUDY],
         pytest.param(
             ["sweep", "sweep.toml"],

@@ -4,6 +4,7 @@ import time
 
 import bpy
 import numpy as np
+import pytest
 
 from mu_addon.blender.jobs import prepared, start_child
 from mu_addon.blender.results import motion as motion_parts
@@ -70,6 +71,7 @@ def test_what_cannot_be_made_is_said(monkeypatch, tmp_path):
     assert start_child.child_of(key).state == "failed"
 
 
+@pytest.mark.nightly("test_a_solid_is_made_elsewhere_and_is_the_same")
 def test_a_difference_and_a_print_that_moves_are_made_elsewhere(home, monkeypatch):
     root = add(preset="mu-0.75x")
     root.mu_unit.study.folder = str(home)
