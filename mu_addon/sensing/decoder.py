@@ -11,9 +11,8 @@ from .csv_columns import CsvColumns
 from .formats import ENOUGH, TEXT_READERS, format_of, text_of, whole_lines
 from .framing import END, LONGEST, info_of, payload_of, sample_of
 from .numbering import Row
-from .samples import Layout, Samples
+from .samples import Layout, Samples, Timeline
 from .text_lines import CLOCKS, NUMBERS, Pairs, json_of, pairs_of
-from .timeline import Timeline
 
 # Without a format found: enough for a few of the longest lines, little enough for any memory.
 _MOST_UNREAD_BYTES = 16384
