@@ -19,7 +19,7 @@ _PHRASES = {
     r"export --compensate( \S+\.csv)?": "Compensate, in the panel Print",
     r"with --orientation": "with Gravity, in the panel Simulate",
     r"with --obstacle": "with Use as Obstacle",
-    r"with a finer mesh, --refine": "with a larger Mesh Refinement",
+    r"with a finer mesh, --refine": "with a larger Refinement",
 }
 """Actions that differ here from the command line."""
 

@@ -81,7 +81,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
     )
     # The shipped default takes place an hour; at this one it takes a quarter of an hour.
-    refine: blender_property(REFINE._replace(default=0.5), name="Mesh Refinement", precision=2, step=5)
+    refine: blender_property(REFINE._replace(default=0.5), name="Refinement", precision=2, step=5)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
     solver: EnumProperty(
