@@ -4,6 +4,8 @@ import json
 import time
 from pathlib import Path
 
+import pytest
+
 from mu_addon.design.parameters import read_unit
 from mu_addon.run.lock import holder
 
@@ -32,6 +34,9 @@ def wait_for_the_end_of(pid):
         time.sleep(0.05)
 
 
+@pytest.mark.nightly(
+    "tests/blender/inside/test_nodes.py::test_presets_and_groups_become_an_asset_library_of_the_users"
+)
 def test_presets_of_the_users_own(each_bpy, tmp_path):
     kept = session(each_bpy, tmp_path, "save_presets")
     assert tmp_path in kept.parents

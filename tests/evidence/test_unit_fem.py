@@ -216,12 +216,10 @@ STIFFER = [name for name in EFFECTS if name not in ("gravity", "mesh_error")]
 
 
 GROWS = pytest.mark.nightly("test_an_effect_grows_from_nothing_and_the_right_way")
-# Layered, and with a law of its own: the two that stand for the others by day.
-BY_DAY = ("anisotropy", "strain_stiffening")
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in BY_DAY else pytest.param(name, marks=GROWS) for name in STIFFER]
+    "name", [n if n == "strain_stiffening" else pytest.param(n, marks=GROWS) for n in STIFFER]
 )
 def test_an_effect_grows_from_nothing_and_the_right_way(name, angle):
     e = EFFECTS[name]

@@ -77,7 +77,7 @@ def test_a_rigid_plate_presses_a_lattice_as_a_prescribed_displacement_does():
     assert plate.deepest_mm(pressed.u) < 2e-3 * strain * half
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit")
 def test_a_plate_on_the_tip_is_held_by_the_base_and_its_work_is_stored(mesh):
     """Frictionless: the plate's force is the base's, and its work over small steps the energy's change."""
     plate = Obstacle(mesh, Plane((0.0, 0.0, TIP), (0.0, 0.0, -1.0)), 0.1, 0.02)
@@ -110,7 +110,7 @@ def test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit(mesh
     assert force[0] == pytest.approx(force[1], rel=0.1)
 
 
-@pytest.mark.nightly("test_a_plate_on_the_tip_is_held_by_the_base_and_its_work_is_stored")
+@pytest.mark.nightly("test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit")
 def test_a_plate_drawn_along_the_struts_takes_what_it_gives(mesh):
     """Pressed on the lattice's side and drawn along z: Coulomb's force, and what its work went into."""
     side, friction = SMALL.printed.bounds[1][1], 0.3
