@@ -1,12 +1,17 @@
 """A gauge off a straight line is found, or left open with it in the set, and no straight one is called so."""
 
+import re
+
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
+from mu_addon.evidence.sensitivity import best_seen
 from mu_addon.evidence.simulator import Composite
+from mu_addon.usecases.diagnose.words import readable, sentence
 from tests.evidence import analytic
 
 RANGE_kPa = 40.0
@@ -69,3 +74,26 @@ def test_a_curved_gauge_is_told_or_a_rival(law, share):
 )
 def test_a_straight_gauge_is_not_called_curved(seed):
     assert judged(measured(parabola, 0.0, seed)).kind == "none"
+
+
+def test_what_a_none_cannot_show_stands_beside_it():
+    """By the angle alone, a gauge's gain is another modulus: no size of it shows."""
+    tests = [
+        attrs.evolve(e, columns={c: e[c] for c in ("time_s", "pressure_kPa", "angle_deg")})
+        for e in measured(parabola, -0.003)
+    ]
+    response = attrs.evolve(analytic.response(), discrepancy=0.04)
+    found = diagnose(tests, Composite({"unit_pressure": UnitPressure([response], tests)}))
+    _, words = sentence(found)
+    assert found.kind == "none"
+    shown, _, hidden = words.partition("Hidden at any size: ")
+    seen = best_seen(found.seen).values()
+    told = set(re.split(", | and ", hidden.rstrip(".")))
+    assert told == {readable(s.effect.name) for s in seen if not s.identifiable}
+    assert "pressure gain" in told
+    least, *_ = (n for n in shown.partition("least visible first: ")[2].split("; ") if n)
+    sizes = [s.effect.parameters[0] for s in seen]
+    reach = [max(p.high - p.null, p.null - p.low) for p in sizes]
+    worst = max((s.limit / r, s) for s, r in zip(seen, reach, strict=True) if s.identifiable and s.linear)[1]
+    assert least.startswith(f"{readable(worst.effect.name)} (")
+    assert f"{worst.limit:.2g}" in least

@@ -208,19 +208,22 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 
 
 def _limits(verdict: Verdict) -> str:
-    """Smallest sizes that would have been detected, of the effects that the data show least, in words."""
-    visible = []
+    """Sizes that would have been detected, of what the data show least, and what they hide, in words."""
+    visible, hidden = [], []
     for s in best_seen(verdict.seen).values():
         p = s.effect.parameters[0]
         if s.identifiable and s.linear:
             size = f"{readable(s.effect.name)} ({bare(p)} {s.limit:.2g} {p.unit}".rstrip() + ")"
             visible.append((s.limit / max(abs(p.high - p.null), abs(p.low - p.null)), size))
+        elif not s.identifiable:
+            hidden.append(readable(s.effect.name))
+    unseen = f" Hidden at any size: {listed(sorted(hidden))}." if hidden else ""
     if not visible:
-        return "No effect would have been detected."
+        return f"Nothing would have been detected.{unseen}"
     least = [size for _, size in sorted(visible, reverse=True)[:MOST_LIMITS]]
     more = len(visible) - len(least)
     others = f"; the limits of {more} more are in “Identifiability of each effect”" if more else ""
-    return f"What would have been detected, the least visible first: {'; '.join(least)}{others}."
+    return f"What would have been detected, the least visible first: {'; '.join(least)}{others}.{unseen}"
 
 
 def _struts(verdict: Verdict) -> str:
