@@ -46,8 +46,8 @@ def session():
 
     # The slider, with the panel as it first opens; a few rows up and down where fonts differ.
     region = parts()[2]
-    for rows in (0, -1, 1, -2, 2):
-        move(region.x + 175, region.y + region.height - 380 + 20 * rows)
+    for rows in (0, -1, 1, -2, 2, 3):
+        move(region.x + 175, region.y + region.height - 450 + 20 * rows)
         yield 1.5
         built = unit_object.roots()[0].mu_unit.built
         event("LEFTMOUSE", "PRESS")
