@@ -15,7 +15,7 @@ import time
 import attrs
 import numpy as np
 
-from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT
+from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell

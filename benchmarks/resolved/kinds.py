@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.circumstances import circumstances
-from mu_addon.design.lattices import LatticeKind, constant, register, sin_squared
+from mu_addon.design.lattice_kinds import LatticeKind, constant, register, sin_squared
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium

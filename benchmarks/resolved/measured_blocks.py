@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
-from mu_addon.design import lattices
+from mu_addon.design import lattice_kinds
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.homogenize.compression import compress
@@ -90,7 +90,7 @@ def main() -> None:
     options = parser.parse_args()
     d = attrs.evolve(
         load_preset("mu-1.0x").dimensions,
-        kind=lattices.kind("body-centred-straight"),
+        kind=lattice_kinds.kind("body-centred-straight"),
         cell=CELL_MM,
         junction_diameter=STRUT_MM,
         midspan_diameter=STRUT_MM,

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .gripper import build_gripper as build_gripper
     from .gripper import load_gripper as load_gripper
     from .gripper import read_gripper as read_gripper
-    from .lattices import LatticeKind as LatticeKind
+    from .lattice_kinds import LatticeKind as LatticeKind
     from .parameters import Unit as Unit
     from .parameters import assumed as assumed
     from .parameters import from_toml as from_toml

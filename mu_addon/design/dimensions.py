@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import lattices
+from . import lattice_kinds
 from .grading import Field
 from .wall_factors import factor_at
 
@@ -44,7 +44,7 @@ class Dimensions:
     cells_x: int
     cells_y_minus: int
     cells_y_plus: int
-    kind: lattices.LatticeKind
+    kind: lattice_kinds.LatticeKind
     junction_diameter: float
     midspan_diameter: float
     row: int

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .dimensions import Dimensions
-from .lattices import LatticeKind
+from .lattice_kinds import LatticeKind
 
 
 @attrs.frozen(eq=False)

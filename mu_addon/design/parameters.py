@@ -13,7 +13,7 @@ import attrs
 from ..errors import InputError, did_you_mean
 from ..files import write_bytes
 from ..reading import file_text
-from . import lattices, rules, toml_text
+from . import lattice_kinds, rules, toml_text
 from .assets import asset_file, asset_names
 from .dimensions import Dimensions
 from .grading import Field, Grading
@@ -124,7 +124,7 @@ class Envelope:
 
     section: ClassVar[str] = "lattice"
 
-    kind: str = choice("body-centred", lattices.names, "kind of lattice cell", PAPER)
+    kind: str = choice("body-centred", lattice_kinds.names, "kind of lattice cell", PAPER)
     cells_x: int = quantity(
         3,
         "",
@@ -488,7 +488,7 @@ class Unit:
             cells_x=t.cells_x,
             cells_y_minus=t.cells_y_minus,
             cells_y_plus=t.cells_y_plus,
-            kind=lattices.kind(t.kind),
+            kind=lattice_kinds.kind(t.kind),
             junction_diameter=s * t.junction_diameter_mm,
             midspan_diameter=s * t.midspan_diameter_mm,
             row=w.row,

@@ -14,7 +14,7 @@ from ..errors import InputError
 from . import shapes
 from .gates import GateError
 from .lattice import filled
-from .lattices import LatticeKind
+from .lattice_kinds import LatticeKind
 from .surface import Triangles, Vertices, bad_edges, genus, stl_bytes, stl_surface, volume, weld
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..design.lattices import constant, sin_squared
+from ..design.lattice_kinds import constant, sin_squared
 from ..errors import InputError
 from ..meshing.mesh import LATTICE
 from .laws import CubicShear, DiagonalStretch, Foam, NeoHooke

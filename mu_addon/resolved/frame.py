@@ -9,7 +9,7 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.lattice import filled
-from ..design.lattices import LatticeKind
+from ..design.lattice_kinds import LatticeKind
 from ..design.strut_cell import StrutCell
 from ..fem.beams import Beams, frames_along, sections_of
 from ..homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
-from ..design.lattices import LatticeKind
+from ..design.lattice_kinds import LatticeKind
 from ..fem.beams import SHEAR_FACTOR
 from ..fem.elements import reference_gradients
 from ..fem.materials import Materials

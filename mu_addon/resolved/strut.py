@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..design.lattices import LatticeKind
+from ..design.lattice_kinds import LatticeKind
 from ..errors import InputError
 from ..meshing.mesh import LATTICE, Array, Mesh, edges_of, oriented, second_order
 

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from mu_addon.design.lattices import LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant
 
 CORNERS = list(product((0.0, 1.0), repeat=3))
 

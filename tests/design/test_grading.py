@@ -10,7 +10,7 @@ from mu_addon.design.anchors import window
 from mu_addon.design.figures import estimated_volume
 from mu_addon.design.grading import ALONG_Z, LEAST, MOST, CellFactor, Field, Grading, cells_text, parsed
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.lattices import STRAIGHT, sin_squared
+from mu_addon.design.lattice_kinds import STRAIGHT, sin_squared
 from mu_addon.design.parameters import Envelope, from_toml, load_preset, to_toml
 from mu_addon.design.printing.check import _drawing
 from mu_addon.design.printing.printer import load_printer

@@ -93,7 +93,7 @@ def test_every_rule_is_tested():
         and isinstance(call.args[0], ast.Constant)
     }
     assert len(named) > 10
-    elsewhere = {"bending plane is a mirror plane of the lattice"}  # with its kind, in test_lattices
+    elsewhere = {"bending plane is a mirror plane of the lattice"}  # with its kind, in test_lattice_kinds
     assert named | {APEX, "a bore through every neck"} == {rule for rule, _, _ in BROKEN} | elsewhere
 
 

@@ -12,7 +12,7 @@ from scipy.special import ellipe
 
 from mu_addon.design import shapes, surface
 from mu_addon.design.gates import GateError
-from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT, LatticeKind, constant
+from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT, LatticeKind, constant
 from mu_addon.design.parameters import Envelope, Printing, Unit, load_preset
 from mu_addon.design.strut_cell import (
     Facets,

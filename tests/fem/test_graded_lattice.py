@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.design.grading import Grading
-from mu_addon.design.lattices import LatticeKind, constant, sin_squared
+from mu_addon.design.lattice_kinds import LatticeKind, constant, sin_squared
 from mu_addon.design.parameters import Envelope, load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.graded_lattice import element_factors, relative_moduli

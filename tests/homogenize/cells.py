@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from mu_addon.design.lattices import LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant
 from mu_addon.fem.model import Model
 from mu_addon.homogenize.specimen import repeated
 from mu_addon.meshing.mesh import boundary_faces

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mu_addon.design.lattices import kind
+from mu_addon.design.lattice_kinds import kind
 from mu_addon.design.strut_cell import Facets, StrutCell, octant_surface, relative_density
 from mu_addon.design.surface import volume
 from mu_addon.errors import InputError, MeshingError

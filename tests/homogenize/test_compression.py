@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from mu_addon.design.lattices import kind
+from mu_addon.design.lattice_kinds import kind
 from mu_addon.design.strut_cell import StrutCell
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.laws import NeoHooke

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.lattices import kind
+from mu_addon.design.lattice_kinds import kind
 from mu_addon.design.strut_cell import Facets, StrutCell
 from mu_addon.errors import InputError, MeshingError
 from mu_addon.fem.materials import Materials

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mu_addon.design.lattices import kind
+from mu_addon.design.lattice_kinds import kind
 from mu_addon.design.strut_cell import Facets, StrutCell
 from mu_addon.errors import InputError
 from mu_addon.fem.materials import Materials

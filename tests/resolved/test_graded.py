@@ -6,7 +6,7 @@ import pytest
 
 from mu_addon.design.anchors import windows
 from mu_addon.design.grading import Grading
-from mu_addon.design.lattices import LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.mesh import LATTICE, boundary_faces

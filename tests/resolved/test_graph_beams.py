@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mu_addon.design.lattice import filled
-from mu_addon.design.lattices import BODY_CENTRED, LatticeKind, constant, register
+from mu_addon.design.lattice_kinds import BODY_CENTRED, LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.carried_nodes import following

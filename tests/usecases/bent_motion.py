@@ -12,7 +12,7 @@ from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
-from mu_addon.usecases.simulate_and_place import history
+from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 from mu_addon.usecases.simulate_and_place.motion_files import write_model_a
 
@@ -55,7 +55,7 @@ def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     job = Job(attrs.evolve(UNIT, chambers=chambers), grasp(), mesh=mesh)
     if not ranked:
         job = attrs.evolve(job, stages=("design", "simulate"))
-    folder, job = history.place_of(home, job)
+    folder, job = unit_runs.place_of(home, job)
     write_study(job, folder)
     write_bent_motion(folder, more * ANGLES)
     angles = {f"{p:g}": more * a for p, a in zip(PRESSURES, ANGLES, strict=True)}
@@ -66,4 +66,4 @@ def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     path = folder / "summary.json"
     path.write_text(json.dumps(summary))
     os.utime(path, (at_s, at_s))
-    return history.read_run(folder)
+    return unit_runs.read_run(folder)

@@ -27,7 +27,7 @@ from ...run.interpreter import environment, worker_command
 from ...run.progress_estimate import Plan
 from ..shared import viewports
 from ..shared.updates import Signal
-from . import sessions
+from . import lasting_jobs
 
 INTERVAL_S = 0.2
 LOAD_AFTER_S, LOAD_EVERY_S = 1.0, 0.1
@@ -140,7 +140,7 @@ class JobKind:
             _heavy.add(key)
         title = f"{root.name}: {self.title}"
         if self.heavy or self.outlives:
-            last(sessions.Record(key, title, folder, sessions.now_s(), tuple(plan), self.heavy))
+            last(lasting_jobs.Record(key, title, folder, lasting_jobs.now_s(), tuple(plan), self.heavy))
         return watch(key, child, title)
 
     def dismiss(self, root: Any) -> None:
@@ -175,10 +175,10 @@ def ended() -> list[str]:
     return [key for key, child in _children.items() if key in _titles and key not in running()]
 
 
-def last(record: sessions.Record) -> None:
+def last(record: lasting_jobs.Record) -> None:
     """Let a job outlive Blender, unless the user decides otherwise."""
     _lasting.add(record.key)
-    sessions.keep(record)
+    lasting_jobs.keep(record)
 
 
 def goes_on(key: str) -> bool:
@@ -244,7 +244,7 @@ def _poll() -> float | None:
         elif news:
             viewports.redraw_panels()
     for key in set(before) - set(running()):
-        sessions.drop(key)
+        lasting_jobs.drop(key)
         JOB_ENDED.send(key)
     return INTERVAL_S if running() else None
 
@@ -257,13 +257,13 @@ def _end_all() -> None:
             leaves = True
         else:
             child.kill()
-            sessions.drop(key)
-    sessions.close(leaves)
+            lasting_jobs.drop(key)
+    lasting_jobs.close(leaves)
 
 
 def _take_up() -> None:
     """Watch the jobs of former sessions: they still run, or have ended meanwhile."""
-    for record in sessions.take_up():
+    for record in lasting_jobs.take_up():
         if record.key in running():
             continue
         try:

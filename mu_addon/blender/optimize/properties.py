@@ -12,7 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...design import lattices
+from ...design import lattice_kinds
 from ...design.anchors import windows
 from ...design.assets import asset_names
 from ...design.quantity import Description
@@ -181,7 +181,7 @@ def names_of(root, name: str) -> list[str]:
             return [w.name for w in windows(to_unit(root.mu_unit).chambers.count)]
         except InputError:
             return []
-    return asset_names("materials") if name == RESIN else lattices.names()
+    return asset_names("materials") if name == RESIN else lattice_kinds.names()
 
 
 def title(name: str, d: Description) -> str:

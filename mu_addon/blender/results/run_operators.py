@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import InputError
-from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place import unit_runs
 from ..shared import updates
 from ..shared.operators import UnitOperator
 from ..simulate import study_folder as studies
@@ -116,14 +116,14 @@ class MU_OT_run_remove(RunOperator, bpy.types.Operator):
             self,
             event,
             title=f"Delete the run {found.title!r}?",
-            message=f"{history.bytes_of(found) / 1e6:.0f} MB in {found.folder}. This cannot be undone.",
+            message=f"{unit_runs.bytes_of(found) / 1e6:.0f} MB in {found.folder}. This cannot be undone.",
             confirm_text="Delete",
             icon="WARNING",
         )
 
     def act(self, context, root):
         run = self.run_of(root)
-        history.remove(run)
+        unit_runs.remove(run)
         study = root.mu_unit.study
         if study.against == run.key:
             study.against = ""

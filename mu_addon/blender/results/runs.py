@@ -7,7 +7,7 @@ from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, PointerProperty, StringProperty
 
 from ...errors import MuError
-from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place import unit_runs
 from ..jobs.start_child import JOB_ENDED
 from ..shared import viewports
 from ..shared.registration import add_handlers, remove_handlers
@@ -36,7 +36,7 @@ def _labelled(entry, **changes) -> None:
     if run is None:
         return
     try:
-        history.label(run, changes.get("name", run.name), changes.get("starred", run.starred))
+        unit_runs.label(run, changes.get("name", run.name), changes.get("starred", run.starred))
     except MuError:
         # A property cannot refuse a value: the entry keeps showing that of the file.
         return
@@ -44,7 +44,7 @@ def _labelled(entry, **changes) -> None:
 
 
 def _rename(entry, value: str) -> None:
-    name = "".join(c for c in value if c.isprintable())[: history.LONGEST_NAME]
+    name = "".join(c for c in value if c.isprintable())[: unit_runs.LONGEST_NAME]
     if name != _title(entry):
         _labelled(entry, name=name)
 

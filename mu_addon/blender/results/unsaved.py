@@ -13,7 +13,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...errors import MuError
-from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place import unit_runs
 from ..gripper import object as gripper_object
 from ..gripper import state as grasps
 from ..shared import displays
@@ -63,7 +63,7 @@ def _moved(root: Any, old: Path, blend: Path) -> Path:
     """The folder beside the file, if it could be moved there; else its present place."""
     new = studies.beside(blend, old.name)
     try:
-        if not history.move_home(old, new):
+        if not unit_runs.move_home(old, new):
             return old
     except MuError:
         # The file is saved all the same; the runs stay in place and are found there.

@@ -4,7 +4,7 @@
 
 import bpy
 
-from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place import unit_runs
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
@@ -39,7 +39,7 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         # Imported late, with the solver's packages.
         from ...usecases.simulate_and_place.job import write_study
 
-        folder, job = history.place_of(studies.assign_folder(root), job)
+        folder, job = unit_runs.place_of(studies.assign_folder(root), job)
         options = ["--solver", study.solver, "--device", study.device]
         SIMULATION.start(root, folder, lambda folder: write_study(job, folder), options)
         viewports.redraw()

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...errors import MuError
 from ...meshing.settings import REFINE
-from ...usecases.simulate_and_place import history
-from ...usecases.simulate_and_place.history import Run
+from ...usecases.simulate_and_place import unit_runs
+from ...usecases.simulate_and_place.unit_runs import Run
 from ..body import state as bodies
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
@@ -108,10 +108,10 @@ _forces: FileCache[list[ContactForce]] = FileCache()
 def runs_of(root: Any) -> list[Run]:
     """Every run of the unit, the latest first; each is read again only when its files change."""
     found = (
-        _runs.read(history.files_of(folder), lambda folder=folder: history.read_run(folder))
-        for folder in history.folders(folder_of(root))
+        _runs.read(unit_runs.files_of(folder), lambda folder=folder: unit_runs.read_run(folder))
+        for folder in unit_runs.folders(folder_of(root))
     )
-    return history.ordered(run for run in found if run is not None)
+    return unit_runs.ordered(run for run in found if run is not None)
 
 
 def run_by_key(root: Any, key: str) -> Run | None:
@@ -120,12 +120,12 @@ def run_by_key(root: Any, key: str) -> Run | None:
 
 
 def design_of(root: Any) -> str:
-    """Hash of the design that the unit's simulation would have (`history.design_key`); "" if invalid."""
+    """Hash of the design that the unit's simulation would have (`unit_runs.design_key`); "" if invalid."""
     try:
         unit = to_unit(root.mu_unit)
         body = bodies.envelope_in(root, unit)
         own = "" if body is None else body.hash
-        return history.design_key(unit, own, obstacles.inputs(root), effects.inputs(root))
+        return unit_runs.design_key(unit, own, obstacles.inputs(root), effects.inputs(root))
     except MuError:
         return ""
 
@@ -147,7 +147,7 @@ def _shown(root: Any, found: list[Run], design: str) -> Run | None:
     ready = any(run.design == design and run.has_results for run in found)
     if last is not None and last.has_results and not ready:
         return last
-    return history.best_of(found, design)
+    return unit_runs.best_of(found, design)
 
 
 def choose(root: Any, run: Run) -> None:

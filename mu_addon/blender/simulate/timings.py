@@ -10,7 +10,7 @@ from ...errors import MuError
 from ...files import write_text
 from ...reading import file_bytes, parse_json
 from ...run.child import DONE
-from ...usecases.simulate_and_place import history
+from ...usecases.simulate_and_place import unit_runs
 from ..jobs import start_child
 from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
@@ -49,7 +49,7 @@ def _ended(key: str) -> None:
     if child is None or child.state != DONE or not key.endswith(":simulate"):
         return
     try:
-        run = history.read_run(child.folder.parent)
+        run = unit_runs.read_run(child.folder.parent)
         seconds = run.summary.get("seconds")
         if isinstance(seconds, dict):
             note(run.refine, {str(name): float(s) for name, s in seconds.items()})

@@ -9,7 +9,7 @@ import attrs
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
-from .history import Run
+from .unit_runs import Run
 
 _SETTINGS = (
     ("mesh, fidelity", "simulate", "mesh", "fidelity"),

@@ -91,7 +91,9 @@ def leave_a_lasting_run():
     child = Child([sys.executable, LOCKED, str(folder)], own, environment([ROOT]))
     key = SIMULATION.key(root)
     jobs.last(
-        jobs.sessions.Record(key, "arm: simulation", folder, jobs.sessions.now_s(), (("Model A", 9.0),), True)
+        jobs.lasting_jobs.Record(
+            key, "arm: simulation", folder, jobs.lasting_jobs.now_s(), (("Model A", 9.0),), True
+        )
     )
     jobs.watch(key, child, "arm: simulation")
     watch(lambda: child.progress)

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mu_addon.design import lattices, solid
+from mu_addon.design import lattice_kinds, solid
 from mu_addon.design.anchors import window
 from mu_addon.design.export import write_nodes
 from mu_addon.design.lattice import filled, lattice_of
-from mu_addon.design.lattices import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
+from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
 from mu_addon.design.parameters import Envelope, Unit, from_toml, to_toml
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import lattice_graph
@@ -23,8 +23,8 @@ from .kinds import CORNERS, octet, simple_cubic, thirds
 
 @pytest.fixture
 def cubic(monkeypatch):
-    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
-    return lattices.register(simple_cubic())
+    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
+    return lattice_kinds.register(simple_cubic())
 
 
 def from_centre(kind):
@@ -36,8 +36,8 @@ def from_centre(kind):
 
 
 def test_shipped_kinds_differ_in_taper_only():
-    assert lattices.names() == ("body-centred", "body-centred-straight")
-    assert lattices.kind("body-centred") is BODY_CENTRED
+    assert lattice_kinds.names() == ("body-centred", "body-centred-straight")
+    assert lattice_kinds.kind("body-centred") is BODY_CENTRED
     assert np.array_equal(BODY_CENTRED.nodes, STRAIGHT.nodes)
     t = np.array([0.0, 0.25, 0.5, 1.0])
     assert BODY_CENTRED.radius(t, 0.75, 1.0) == pytest.approx([0.75, 0.875, 1.0, 0.75])
@@ -121,11 +121,11 @@ def test_a_bad_kind_is_named(case):
 
 
 def test_registry_refuses_a_second_kind_of_a_name(cubic):
-    lattices.register(simple_cubic())  # the same again
+    lattice_kinds.register(simple_cubic())  # the same again
     with pytest.raises(InputError, match="a lattice 'simple-cubic' already"):
-        lattices.register(octet("simple-cubic"))
+        lattice_kinds.register(octet("simple-cubic"))
     with pytest.raises(InputError, match="no lattice 'octopus'"):
-        lattices.kind("octopus")
+        lattice_kinds.kind("octopus")
 
 
 def test_another_kind_fills_a_unit(cubic, tmp_path):
@@ -164,9 +164,9 @@ def test_shared_nodes_at_thirds_are_found_exactly():
 
 
 def test_a_one_sided_kind_is_no_units_lattice(monkeypatch):
-    monkeypatch.setattr(lattices, "KINDS", dict(lattices.KINDS))
+    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
     slanted = LatticeKind("slanted", [(0.5, 0.5, 0.5), *CORNERS], [(0, 1), (0, 8)])
     assert slanted.mirrors == (False, False, False)
-    lattices.register(slanted)
+    lattice_kinds.register(slanted)
     with pytest.raises(InputError, match="is not its own mirror image across x"):
         Unit(lattice=Envelope(kind="slanted"))

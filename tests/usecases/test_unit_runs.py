@@ -10,7 +10,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.lock import FolderLock, InUseError
-from mu_addon.usecases.simulate_and_place import history
+from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.comparison import compare
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 
@@ -32,16 +32,16 @@ def thicker(job, wall_mm):
 
 def ran(home, job, summary, at_s):
     """A run as a child process would have left it, ended at a time."""
-    folder, job = history.place_of(home, job)
+    folder, job = unit_runs.place_of(home, job)
     write_study(job, folder)
     path = folder / "summary.json"
     path.write_text(json.dumps(summary))
     os.utime(path, (at_s, at_s))
-    return history.read_run(folder)
+    return unit_runs.read_run(folder)
 
 
 def design_of(job):
-    return history.design_key(job.unit, "", [], {})
+    return unit_runs.design_key(job.unit, "", [], {})
 
 
 @pytest.mark.parametrize(
@@ -63,34 +63,34 @@ def test_every_run_is_kept_and_a_small_one_replaces_no_large_one(tmp_path):
     large = ran(tmp_path, FULL, RANKED, 100)
     coarse = ran(tmp_path, COARSE, RANKED | {"seconds": {"Model A": 20.0}}, 200)
     assert large.folder != coarse.folder
-    found = history.runs(tmp_path)
+    found = unit_runs.runs(tmp_path)
     assert [run.title for run in found] == ["Ranking", "Ranking"]
     assert [run.seconds for run in found] == [20.0, 480.0]
-    best = history.best_of(found, design_of(FULL))
+    best = unit_runs.best_of(found, design_of(FULL))
     assert best.key == large.key
     assert best.ranking == [("alpha4", 0.05), ("alpha10", 0.4)]
     # One that was stopped, or has just begun, does not hide it either.
     ran(tmp_path, attrs.evolve(FULL, times=5), RANKED | {"status": "interrupted"}, 300)
-    assert history.best_of(history.runs(tmp_path), design_of(FULL)).key == large.key
+    assert unit_runs.best_of(unit_runs.runs(tmp_path), design_of(FULL)).key == large.key
 
 
 def test_going_back_to_a_parameter_finds_its_run_again(tmp_path):
     first = ran(tmp_path, FULL, RANKED, 100)
     second = ran(tmp_path, thicker(FULL, 1.0), RANKED, 200)
-    found = history.runs(tmp_path)
-    assert history.best_of(found, design_of(FULL)).key == first.key
-    assert history.best_of(found, design_of(thicker(FULL, 1.0))).key == second.key
+    found = unit_runs.runs(tmp_path)
+    assert unit_runs.best_of(found, design_of(FULL)).key == first.key
+    assert unit_runs.best_of(found, design_of(thicker(FULL, 1.0))).key == second.key
     # Of a third design there is none: the latest is shown, and its design says that it is stale.
     third = design_of(thicker(FULL, 1.1))
-    shown = history.best_of(found, third)
+    shown = unit_runs.best_of(found, third)
     assert shown.key == second.key
     assert shown.design != third
-    assert history.place_of(tmp_path, FULL)[0] == first.folder
+    assert unit_runs.place_of(tmp_path, FULL)[0] == first.folder
     # Nor does one that has just begun take its place, until it has something to show.
     begun = ran(tmp_path, thicker(FULL, 1.1), {"status": "running"}, 300)
-    assert history.best_of(history.runs(tmp_path), third).key == second.key
+    assert unit_runs.best_of(unit_runs.runs(tmp_path), third).key == second.key
     ran(tmp_path, thicker(FULL, 1.1), SHORT | {"status": "running"}, 400)
-    assert history.best_of(history.runs(tmp_path), third).key == begun.key
+    assert unit_runs.best_of(unit_runs.runs(tmp_path), third).key == begun.key
 
 
 @pytest.mark.parametrize(
@@ -131,28 +131,28 @@ def test_runs_are_compared_where_both_have_been(tmp_path):
 
 def test_further_stages_and_a_new_name_take_up_the_run_of_the_same_inputs(tmp_path):
     run = ran(tmp_path, MOTION, SHORT, 100)
-    assert history.place_of(tmp_path, FULL)[0] == run.folder
+    assert unit_runs.place_of(tmp_path, FULL)[0] == run.folder
     renamed = attrs.evolve(FULL, unit=attrs.evolve(FULL.unit, name="renamed"))
-    folder, job = history.place_of(tmp_path, renamed)
+    folder, job = unit_runs.place_of(tmp_path, renamed)
     assert folder == run.folder
     (folder / "angle.csv").write_text("found")
     write_study(job, folder)
     assert (folder / "angle.csv").read_text() == "found", "a new name sets nothing aside"
     assert design_of(renamed) == run.design
-    assert history.place_of(tmp_path, attrs.evolve(FULL, times=5))[0] != run.folder
+    assert unit_runs.place_of(tmp_path, attrs.evolve(FULL, times=5))[0] != run.folder
 
 
 def test_names_and_stars(tmp_path):
     run = ran(tmp_path, FULL, RANKED, 100)
     assert (run.title, run.starred) == ("Ranking", False)
-    history.label(run, " thin wall ", True)
-    (run,) = history.runs(tmp_path)
+    unit_runs.label(run, " thin wall ", True)
+    (run,) = unit_runs.runs(tmp_path)
     assert (run.title, run.starred) == ("thin wall", True)
     for name in ("x" * 81, "two\nlines"):
         with pytest.raises(InputError, match="name of a run"):
-            history.label(run, name, False)
-    history.label(run, "", False)
-    (run,) = history.runs(tmp_path)
+            unit_runs.label(run, name, False)
+    unit_runs.label(run, "", False)
+    (run,) = unit_runs.runs(tmp_path)
     assert (run.title, run.starred) == ("Ranking", False)
 
 
@@ -161,15 +161,15 @@ def test_a_removed_run_frees_its_folder_and_nothing_else(tmp_path):
     gone = ran(tmp_path, COARSE, SHORT, 200)
     (gone.folder / "motion").mkdir()
     (gone.folder / "motion" / "mesh.npz").write_bytes(b"x" * 5000)
-    assert history.bytes_of(gone) > 5000
+    assert unit_runs.bytes_of(gone) > 5000
     lock = FolderLock(gone.folder)
     with pytest.raises(InUseError):
-        history.remove(gone)
+        unit_runs.remove(gone)
     lock.release()
     assert (gone.folder / "motion" / "mesh.npz").exists()
-    history.remove(gone)
+    unit_runs.remove(gone)
     assert [path.name for path in (tmp_path / "runs").iterdir()] == [kept.key]
-    assert [run.key for run in history.runs(tmp_path)] == [kept.key]
+    assert [run.key for run in unit_runs.runs(tmp_path)] == [kept.key]
 
 
 def test_what_an_older_version_left_is_listed_and_removed_alone(tmp_path):
@@ -179,14 +179,14 @@ def test_what_an_older_version_left_is_listed_and_removed_alone(tmp_path):
     (tmp_path / "summary.json").write_text(json.dumps(SHORT))
     (tmp_path / "evidence").mkdir()
     (tmp_path / "evidence" / "verdict.json").write_text("{}")
-    found = history.runs(tmp_path)
+    found = unit_runs.runs(tmp_path)
     assert {run.key for run in found} == {"home", "stale"}
-    assert history.best_of(found, design_of(FULL)).key == "stale"
-    assert history.place_of(tmp_path, thicker(FULL, 1.0))[0] == tmp_path
+    assert unit_runs.best_of(found, design_of(FULL)).key == "stale"
+    assert unit_runs.place_of(tmp_path, thicker(FULL, 1.0))[0] == tmp_path
     new = ran(tmp_path, thicker(FULL, 1.1), RANKED, 300)
     assert new.folder.parent == tmp_path / "runs"
-    history.remove(next(run for run in found if run.key == "home"))
-    assert {run.key for run in history.runs(tmp_path)} == {"stale", new.key}
+    unit_runs.remove(next(run for run in found if run.key == "home"))
+    assert {run.key for run in unit_runs.runs(tmp_path)} == {"stale", new.key}
     assert not (tmp_path / "study.toml").exists()
     assert (tmp_path / "evidence" / "verdict.json").exists()
 
@@ -197,28 +197,28 @@ def test_what_is_no_run_is_left_out(tmp_path):
     broken.mkdir()
     (broken / "study.toml").write_text("nonsense [")
     (tmp_path / "runs" / "note.txt").write_text("the user's own")
-    assert [found.key for found in history.runs(tmp_path)] == [run.key]
+    assert [found.key for found in unit_runs.runs(tmp_path)] == [run.key]
     with pytest.raises(InputError):
-        history.read_run(broken)
+        unit_runs.read_run(broken)
     (run.folder / "summary.json").write_text("[1, 2")
-    (damaged,) = history.runs(tmp_path)
+    (damaged,) = unit_runs.runs(tmp_path)
     assert (damaged.complete, damaged.angles) == (False, [])
-    assert history.runs(tmp_path / "nowhere") == []
+    assert unit_runs.runs(tmp_path / "nowhere") == []
 
 
 def test_a_home_moves_whole_or_not_at_all(tmp_path):
     old, new = tmp_path / "unsaved", tmp_path / "seat.mu" / "unit"
     run = ran(old, FULL, RANKED, 100)
     lock = FolderLock(run.folder)
-    assert not history.move_home(old, new)
+    assert not unit_runs.move_home(old, new)
     lock.release()
-    assert history.move_home(old, new)
+    assert unit_runs.move_home(old, new)
     assert not old.exists()
-    assert [found.key for found in history.runs(new)] == [run.key]
+    assert [found.key for found in unit_runs.runs(new)] == [run.key]
     assert [path.name for path in new.parent.iterdir()] == ["unit"]
     ran(old, FULL, SHORT, 200)
-    assert not history.move_home(old, new), "what is there is not replaced"
-    assert history.runs(new)[0].ranking
+    assert not unit_runs.move_home(old, new), "what is there is not replaced"
+    assert unit_runs.runs(new)[0].ranking
 
 
 def test_runs_side_by_side(tmp_path):
