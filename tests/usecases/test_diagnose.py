@@ -29,6 +29,7 @@ from mu_addon.usecases.diagnose.design_experiments import Job as Plan
 from mu_addon.usecases.diagnose.job import Job, read_job
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
+from mu_addon.usecases.diagnose.simulators import simulations_plan
 from mu_addon.usecases.diagnose.words import alternatives, bare
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
@@ -405,3 +406,18 @@ def test_the_page_says_first_what_to_do(overcured):
     assert "export --compensate" in summary["to_do"]
     html = (out / "report.html").read_text(encoding="utf-8")
     assert html.index("What to do.") < html.index("Next measurement")
+
+
+def test_a_printed_diagnosis_takes_longer_with_more_chambers_and_where_walls_touch():
+    measured = read_folder(ROOT / "assets" / "examples" / "paper-bending")
+    small = load_preset("mu-1.0x")
+    small = attrs.evolve(small, chambers=attrs.evolve(small.chambers, count=3))
+    pressed = [e for e in measured.experiments if e["pressure_kPa"].min() > 0.0]
+
+    def seconds(unit, experiments, fidelity="resolved"):
+        return dict(simulations_plan(experiments, unit, fidelity))["unit"]
+
+    every = measured.experiments
+    assert seconds(load_preset("mu-1.0x"), every) == 2.0 * seconds(small, every)
+    assert seconds(small, every) == 2.0 * seconds(small, pressed)
+    assert seconds(small, every, "homogenised") == seconds(load_preset("mu-1.0x"), pressed, "homogenised")

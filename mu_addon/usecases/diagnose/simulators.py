@@ -22,7 +22,7 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 35.0
+LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 40.0
 """Approximate seconds of the simulation of a block, of a homogenised unit and of a printed chamber."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
