@@ -204,10 +204,10 @@ def test_words_say_what_changed_and_what_moved_it(job):
         "mass: chambers.wall_mm by -1 g",
     ]
     missed = Found(
-        (Observed((0.7,), np.array([4.0, 18.0]), np.zeros((2, 1))),), (0,), False, ("angle at 10 kPa",)
+        (Observed((0.7,), np.array([2.0, 18.0]), np.zeros((2, 1))),), (0,), False, ("angle at 10 kPa",)
     )
     words = outcome(missed, d.targets)
-    assert "angle at 10 kPa is 4 instead of at least 5 deg" in words
+    assert "angle at 10 kPa is 2 instead of at least 2.5 deg" in words
     assert "Without angle at 10 kPa the others can be met" in words
     failed = Found((Observed((0.7,), np.full(2, np.nan), np.zeros((2, 1)), False),), (0,), False)
     assert "could be simulated" in outcome(failed, d.targets)
