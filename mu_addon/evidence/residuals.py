@@ -594,7 +594,7 @@ def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
     if not count:
         return []
     z = sums / math.sqrt(count)
-    return [Dependence("next_cycle", z, float(norm.sf(z)), "all cyclic records")]
+    return [Dependence("phase_of_cycle", z, float(norm.sf(z)), "all cyclic records")]
 
 
 def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
