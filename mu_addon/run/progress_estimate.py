@@ -187,7 +187,9 @@ class ProgressEstimate:
         own = self._own_left
         if own is None:
             own = max((1.0 - self._share) * self._expected[self._stage] * self._pace(), 0.0)
-        rest = sum(self._expected[name] for name in names[here + 1 :]) * self._pace()
+        # One that ended before this one came again is not to come.
+        rest = sum(self._expected[name] for name in names[here + 1 :] if name not in self._taken)
+        rest *= self._pace()
         if self._planned:
             self._set_left(own + rest, added)
         elif self._own_left is not None:

@@ -34,7 +34,7 @@ from ...run.usecase import UseCase
 from .job import LAYOUT, Job, bends, read_job
 from .judged_data import JudgedData, curves
 from .report import write_report
-from .simulators import simulations_plan, simulators_of
+from .simulators import BASE, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
 from .words import advice, readable, sentence, to_do
 
 if TYPE_CHECKING:
@@ -96,14 +96,17 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     if first:
         context.summary["first_look"] = first
     settings: UnitSettings | None = job.unit_settings
+    stage = EFFECTS
     while settings is not None:
-        simulators, notes = simulators_of(measured.experiments, unit, folder / "cache", progress, settings)
+        simulators, notes = simulators_of(
+            measured.experiments, unit, folder / "cache", progress, settings, stage
+        )
         simulator = Composite(simulators, known=known)
         with _stages(progress) as on_model:
             verdict = diagnose(measured.experiments, simulator, on_model)
         # A first look at each effect tells which ones need all their sizes.
         of_a_unit = bends(measured.experiments)
-        settings = settings.further(verdict.in_question) if of_a_unit else None
+        settings, stage = settings.further(verdict.in_question) if of_a_unit else None, SIZES
     notes += _known_before(job, simulator)
     model = extended_model(verdict, simulator.nuisances)
     block = simulators.get(lattice_compression.KIND)
@@ -312,14 +315,18 @@ def plan_of(job: Job) -> Plan:
     # A few readings take next to nothing.
     records = sum(len(e.rows) >= RECORD for e in experiments) / SET
     judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 15.0, "gain": 0.5}
+    simulated = dict(simulations_plan(experiments, job.subject, job.fidelity))
+    looks = {name: share * simulated[BASE] for name, share in SHARES.items() if BASE in simulated}
+    last = [(SIZES, looks.pop(SIZES))] if looks else []
     return [
-        *simulations_plan(experiments, job.subject, job.fidelity),
+        *(simulated | looks).items(),
         *((name, 0.2 + s * records) for name, s in judged.items()),
+        *last,
         ("report", 1.5),
     ]
 
 
-KEPT = ("lattice", "unit")
+KEPT = ("lattice", BASE, EFFECTS, SIZES)
 USE_CASE = UseCase(
     "diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis, plan=plan_of, kept=KEPT
 )

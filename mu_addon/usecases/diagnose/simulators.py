@@ -22,8 +22,14 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 40.0
-"""Approximate seconds of the simulation of a block, of a homogenised unit and of a printed chamber."""
+LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 24.0
+"""Seconds of the simulation of a block, of a homogenised unit and of a printed one of one chamber."""
+BY_CHAMBERS = 1.6
+"""Power of their number by which a printed unit's seconds grow: measured with three and six."""
+BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
+"""Stages of a unit's simulation in a diagnosis: by itself, at each effect's first sizes, at the others."""
+SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
+"""Shares of the seconds; the last stage is left out where no effect is in question."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
 """Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
@@ -43,7 +49,7 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, fid
             (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
         )
         chambers = behind.chambers.count if behind else 1
-        unit = PRINTED_S * chambers * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
+        unit = PRINTED_S * chambers**BY_CHAMBERS * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
     lattice = []
     if any(e.cells for e in experiments) and behind is not None:
         from ...evidence.lattice_fem import to_compute
@@ -51,7 +57,7 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, fid
         # What is wrong with a block is told by the stage itself.
         with suppress(InputError):
             lattice = [("lattice", 0.2 + LATTICE_S * to_compute(experiments, behind))]
-    free = [("unit", unit)] if kinds & set(FREE) else []
+    free = [(BASE, unit)] if kinds & set(FREE) else []
     return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
 
 
@@ -61,11 +67,12 @@ def simulators_of(
     cache: Path,
     progress: Progress,
     settings: UnitSettings | None = None,
+    stage: str = BASE,
 ) -> tuple[dict[str, Simulator], list[str]]:
     """Simulators by kind of experiment, and remarks on what was not simulated or was assumed.
 
     The unit and blocks of its lattice are simulated by finite elements; the runs are kept in the folder
-    `cache`.
+    `cache`. stage: name of the unit's simulation among the run's stages.
     """
     remarks: list[str] = []
     scalings: Mapping[str, lattice_compression.Scaling] = {}
@@ -78,7 +85,7 @@ def simulators_of(
     found = bench_simulators(experiments, scalings)
     if any(e.kind in OF_A_UNIT for e in experiments):
         assert unit is not None
-        simulated, left_out = _of_a_unit(experiments, unit, cache, progress, settings)
+        simulated, left_out = _of_a_unit(experiments, unit, cache, progress, settings, stage)
         found |= simulated
         remarks += left_out
     return found, remarks
@@ -90,6 +97,7 @@ def _of_a_unit(
     cache: Path,
     progress: Progress,
     settings: UnitSettings | None,
+    stage: str,
 ) -> tuple[dict[str, Simulator], list[str]]:
     """Simulators of the kinds in `OF_A_UNIT`, and what could not be simulated, in words."""
     from ...evidence.unit_fem import blocked_responses, unit_responses
@@ -99,7 +107,7 @@ def _of_a_unit(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if kinds & set(FREE):
-            with progress.stage("unit"):
+            with progress.stage(stage):
                 free = unit_responses(
                     unit, experiments, settings, cache, lambda _, share: progress.update(share)
                 )
