@@ -75,7 +75,7 @@ def job_of(root: Any) -> Job:
 
     settings, unit = root.mu_unit.study, to_unit(root.mu_unit)
     stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
-    extra: dict[str, Any] = {"self_contact": settings.self_contact}
+    extra: dict[str, Any] = {}
     if settings.command == "place":
         extra["paths"] = settings.paths
     if settings.self_contact:
@@ -91,6 +91,7 @@ def job_of(root: Any) -> Job:
         effects=effects.named_effects(root),
         stages=stages,
         mesh=MeshSettings(refine=exact(settings.refine), fidelity=RESOLVED),
+        self_contact=settings.self_contact,
         solver=SolverChoice(settings.solver, settings.device),
         **extra,
     )

@@ -25,11 +25,15 @@ def _file() -> Path:
     return user_folder() / "timings.json"
 
 
+def _every() -> dict[str, Any]:
+    """What the file holds, by refinement of the mesh."""
+    path = _file()
+    return _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
+
+
 def measured(refine: float) -> dict[str, float]:
     """Seconds of each stage of the last simulation on such a mesh here; empty before the first one."""
-    path = _file()
-    every = _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
-    found: Any = every.get(f"{refine:g}")
+    found: Any = _every().get(f"{refine:g}")
     if not isinstance(found, dict):
         return {}
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
@@ -39,9 +43,7 @@ def note(refine: float, seconds: dict[str, float]) -> None:
     """Store the seconds of a simulation's stages if it ended well. Raises OutputError."""
     before = measured(refine)
     real = {name: s for name, s in seconds.items() if s >= LEAST_SHARE * before.get(name, 0.0)}
-    path = _file()
-    every: dict[str, Any] = dict(_kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {})
-    write_text(path, json.dumps({**every, f"{refine:g}": {**before, **real}}, indent=1) + "\n")
+    write_text(_file(), json.dumps({**_every(), f"{refine:g}": {**before, **real}}, indent=1) + "\n")
 
 
 def _ended(key: str) -> None:

@@ -32,8 +32,8 @@ PRINTED_S = {
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
 """Seconds that a stage takes on any mesh, of those that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-SOLVING = {"Model A": {"full": 0.8, "resolved": 0.88}, "candidates": {"full": 0.45, "resolved": 0.97}}
-"""Share of a stage's time until its last equilibrium."""
+SOLVING = {"Model A": (0.8, 0.88), "candidates": (0.45, 0.97)}
+"""Share of a stage's time until its last equilibrium, of a homogenised unit and of a printed body."""
 TOUCHING = 6.0
 """Factor on the seconds of a state at -20 kPa where the printed body's walls touch; by the square of that."""
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.

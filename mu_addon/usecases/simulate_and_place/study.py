@@ -234,7 +234,8 @@ class Study:
     def _solving(self, stage: str) -> float:
         """Share of a stage's time until its last equilibrium; the rest goes into tables, fields and files."""
         assert self.mesh is not None
-        return SOLVING[stage]["resolved" if self.mesh.resolved else "full"]
+        homogenised, printed = SOLVING[stage]
+        return printed if self.mesh.resolved else homogenised
 
     def _reached(self, state: State) -> None:
         self.states.append(state)
