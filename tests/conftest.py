@@ -7,6 +7,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 from . import costs, nightly
@@ -58,3 +59,14 @@ def pytest_configure(config):
         config.pluginmanager.register(costs.Measure(config))
     if config.option.markexpr == "nightly" and not hasattr(config, "workerinput"):
         config.pluginmanager.register(nightly.Night())
+
+
+@pytest.fixture(autouse=True, scope="module")
+def lattice_kinds_as_shipped():
+    """Kinds of lattice that a file's tests register go with it: the next file may count them."""
+    from mu_addon.design import lattice_kinds  # not before the variables above: it loads numpy
+
+    shipped = dict(lattice_kinds.KINDS)
+    yield
+    lattice_kinds.KINDS.clear()
+    lattice_kinds.KINDS.update(shipped)
