@@ -54,7 +54,7 @@ ROWS = (
     "optimize design.toml",
     "sweep sweep.toml",
     "graph assets/graphs/unit.toml",
-    "grip --preset gripper --fidelity homogenised --coarse --no-paths --cube 25 --refine 0.25",
+    "grip --preset gripper --fidelity homogenised --coarse --cube 25 --refine 0.25",
     "chain chain.toml",
     "ports",
     "stream --simulate --seconds 20",

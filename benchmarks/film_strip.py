@@ -46,7 +46,7 @@ def main() -> None:
 def pictures(run: Path, name: str | None = None) -> tuple[list[np.ndarray], list[float]]:
     """A picture (h, w, 4) and the bending angle in degrees at each of the pressures."""
     unit = read_unit(run / "unit.toml")
-    chosen = name or next(iter(json.loads((run / "summary.json").read_text())["chosen"].values()))
+    chosen = name or json.loads((run / "summary.json").read_text())["chosen"]
     line = anchor_points(unit)[list(window(unit, chosen).indices)]
     # A joint belongs to two of its pieces: it comes once.
     path = np.vstack([line[:1], *(np.linspace(a, b, 12)[1:] for a, b in pairwise(line))])

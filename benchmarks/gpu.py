@@ -30,7 +30,6 @@ from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi
-from mu_addon.placement.inclusion import sensor_share
 
 STEP_KPA = 5.0
 SENSOR_MPA = 2.5
@@ -91,7 +90,7 @@ def run(unit, mesh, device, pressure_kPa, quiet=False):
     factors = sum(s.factorisations for s in states)
     clock.lap(f"Model A, {steps} pressures, {factors} tangents")
     ten = candidate_paths(anchor_points(unit), windows(6))
-    shares = [sensor_share("volume_fraction", roi(mesh, one, 1.0)) for one in ten]
+    shares = [roi(mesh, one, 1.0).share for one in ten]
     points = anchor_points(unit)
     sweep = CandidateBatch(model, materials, (points, probe(mesh, points)), shares, SENSOR_MPA)
     clock.lap(f"{len(ten)} candidates: inclusions")

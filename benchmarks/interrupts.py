@@ -107,7 +107,7 @@ preset = "mu-1.0x"
 pressure_kPa = [0.0, 30.0]
 """
 CHAIN_PROTOCOL = "time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,30,10\n"
-GRIP = ["--coarse", "--no-paths", "--cube", "25", "--refine", "0.25"]
+GRIP = ["--coarse", "--cube", "25", "--refine", "0.25"]
 MOST_S = 5.0
 COMMANDS = {
     "sweep": ["sweep", "sweep.toml"],

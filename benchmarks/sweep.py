@@ -29,12 +29,11 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Candidate, candidate_paths, moved_points, roi, with_sensor
-from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.sampling import solution_order
 from mu_addon.placement.sensitivity_map import influence_map, representative_pressures
 from mu_addon.usecases.simulate_and_place.candidate_pool import CandidatePool, CandidateProblem
 
-RADIUS_MM, SENSOR_MPA, RULE = 1.0, 2.5, "volume_fraction"
+RADIUS_MM, SENSOR_MPA = 1.0, 2.5
 
 
 def hundred(points):
@@ -95,7 +94,7 @@ def main():
     few = [baseline.solved[i] for pair in solution_order(distinct)[:2] for i in pair]
     wanted = {s.pressure_MPa for s in few}
     for name, every in (("ten", candidate_paths(points, windows(6))), ("a hundred", hundred(points))):
-        jobs = tuple((c, RULE) for c in every)
+        jobs = tuple(every)
         setting = CandidateProblem(mesh, materials, points, jobs, RADIUS_MM, SENSOR_MPA)
         with closing(CandidatePool(setting, given.workers)) as sweeper:
             took, _ = seconds(lambda s=sweeper: beside(s, equilibrium(), times, pressure, wanted))
@@ -109,7 +108,7 @@ def main():
     )
     row("map of every element, in three of its states", took)
     for candidate in candidate_paths(points, windows(6))[: given.alone]:
-        share = sensor_share(RULE, roi(mesh, candidate, RADIUS_MM))
+        share = roi(mesh, candidate, RADIUS_MM).share
         stiff = with_sensor(materials, share, SENSOR_MPA)
         took, alone = seconds(lambda b=stiff: simulate(Equilibrium(model, b), times, pressure))
         still = moved_points(monitored, alone)

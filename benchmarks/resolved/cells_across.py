@@ -76,7 +76,7 @@ def main() -> None:
                     print_row([f"{wide}, {across}", name, why])
                     continue
                 angle = angles_deg(summary)
-                J = summary["J_hat_mm"][job.headline_rule]
+                J = summary["J_hat_mm"]
                 ranked = sorted(J, key=J.get)
                 row = [f"{wide}, {across}", name, study.solver["unknowns"]]
                 row += [f"{angle[p]:.2f}" for p in PRESSURES_KPA if p]

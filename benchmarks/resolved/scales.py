@@ -54,7 +54,7 @@ def main() -> None:
                 print_row([name, f"{refine:g}", why])
                 continue
             angle = angles_deg(summary)
-            J = summary["J_hat_mm"][job.headline_rule]
+            J = summary["J_hat_mm"]
             row = [name, f"{refine:g}", study.solver["unknowns"]]
             row += [f"{angle[p]:.3f}" for p in pressures if p]
             row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]

@@ -38,7 +38,7 @@ def add(commands: Commands[Any]) -> None:
     command = commands.add_parser(
         "grip",
         help="Design a gripper of two units and simulate its grasp of cubes with friction: printable part, "
-        "forces, light signal, sensor paths.",
+        "forces, light signal.",
         epilog="example: run.py grip --preset gripper --out out/gripper",
     )
     which = command.add_mutually_exclusive_group(required=True)
@@ -59,7 +59,6 @@ def add(commands: Commands[Any]) -> None:
     command.add_argument("--refine", type=float, metavar="F", help=help_of(REFINE, default))
     add_fidelity(command)
     add_setting(command, COARSE)
-    command.add_argument("--no-paths", action="store_true", help="Do not rank the sensor paths.")
     command.add_argument(
         "--solid-only", action="store_true", help="Write only the printable part; simulate nothing."
     )
@@ -86,7 +85,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
         mesh=detail.mesh,
         self_contact=self_contact,
-        rules=() if options.solid_only or options.no_paths else detail.rules,
         quality=options.quality,
     )
     USE_CASE.start(job, Path(options.out), context)

@@ -214,7 +214,7 @@ def fidelity_of(options: argparse.Namespace) -> tuple[str, bool]:
 
     if options.fidelity is None:
         order, mesher = getattr(options, "order", 2), getattr(options, "mesher", "auto")
-        others = mesher != "auto", *(getattr(options, name, None) for name in ("lattice", "rule"))
+        others = mesher != "auto", getattr(options, "lattice", None)
         fidelity, apart = fidelity_where_none_is_named(order, (), *others)
     else:
         fidelity, apart = options.fidelity, options.fidelity != HOMOGENISED
@@ -229,7 +229,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     add_setting(command, PROTOCOL, "CSV")
     add_setting(command, ORDER, "P")
     add_setting(command, REFINE, "F")
-    add_fidelity(command, "--lattice, --rule, --mesher or --order 1")
+    add_fidelity(command, "--lattice, --mesher or --order 1")
     add_setting(command, SELF_FRICTION, "MU")
     command.add_argument(
         "--lattice",

@@ -15,7 +15,6 @@ from .options import (
     add_simulation,
     add_solid,
     add_unit,
-    help_of,
 )
 from .study_job import run
 
@@ -29,7 +28,7 @@ def add(commands: Commands[Any]) -> None:
     """Add the parser of `place`."""
     import attrs
 
-    from ..placement.settings import BEND, LONGEST, RULE, SHORTEST
+    from ..placement.settings import BEND, LONGEST, SHORTEST
     from ..sensing.guide import Optics
     from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 
@@ -50,8 +49,6 @@ def add(commands: Commands[Any]) -> None:
     add_obstacles(command)
     add_simulation(command)
     add_setting(command, STATIONS, "J")
-    # None without the option: it asks for a homogenised unit.
-    command.add_argument("--rule", choices=RULE.choices, help=help_of(RULE))
     add_setting(command, WORKERS, "N")
     add_setting(command, MESH_CHECK)
     add_setting(command, PATHS)

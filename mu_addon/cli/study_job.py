@@ -25,7 +25,6 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     from ..homogenize.effective_file import read_effective
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
-    from ..placement.settings import rules_of
     from ..usecases.simulate_and_place.extended_unit import require_same_print
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
@@ -49,7 +48,6 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     if "place" in options.stages:
         extra |= {
             "stations": options.stations,
-            "rules": rules_of(options.rule),
             "workers": options.workers,
             "mesh_check": options.mesh_check,
             "paths": options.paths,

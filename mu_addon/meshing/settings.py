@@ -39,7 +39,7 @@ def fidelity_where_none_is_named(
     """Fidelity of a run that names none, and whether its walls and struts are kept apart.
 
     The printed body, unless what is asked for needs a continuum: elements of `order` 1, one of `parameters`
-    in OF_CONTINUUM, or any of `others`: a mesher, a law of the lattice, a rule of inclusion.
+    in OF_CONTINUUM, or any of `others`: a mesher, a law of the lattice.
     """
     if order == 1 or any(others) or not {*OF_CONTINUUM}.isdisjoint(parameters):
         return HOMOGENISED, False

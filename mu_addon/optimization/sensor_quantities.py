@@ -29,7 +29,7 @@ STATIONS = 51
 class Disturbance:
     """Deviation J_hat in mm of the backbone by the sensor along a path, the mean over some pressures in kPa.
 
-    With the rule `volume_fraction`, pressures weighed alike; `place` weighs them by the time that its
+    Pressures weighed alike; `place` weighs them by the time that its
     protocol spends there.
     """
 

@@ -24,7 +24,6 @@ from ..meshing.mesh import Mesh
 from ..meshing.morph import Morph
 from ..meshing.settings import MeshSettings
 from ..placement.candidates import Candidate, roi, with_sensor
-from ..placement.inclusion import sensor_share
 from ..resolved.morph import PrintedMorph
 from ..resolved.unit import mesh_of
 from .freedoms import Freedom, changed_unit
@@ -36,8 +35,6 @@ Array = np.ndarray[Any, Any]
 STEP = 1e-4
 """Half step of a freedom's central differences, relative to its value (or its range, where that is
 smaller)."""
-RULE = "volume_fraction"
-"""Inclusion rule of a sensor in the homogenised lattice: the one that converges with the mesh."""
 
 
 def _same(unit: Unit) -> Unit:
@@ -169,7 +166,7 @@ class UnitBody:
                 )
             points = anchor_points(printed)[list(window.indices)]
             found = roi(mesh, Candidate(name, window.start, points), printed.waveguide.inclusion_radius_mm)
-            share = sensor_share(RULE, found)
+            share = found.share
             materials[name] = with_sensor(own, share, printed.material.sensor_modulus_MPa)
         usual = RESOLVED_CONTACT_NEWTON if self.mechanics.self_contact else RESOLVED_NEWTON
         newton = self.mechanics.newton or (usual if mesh.resolved else NewtonSettings())

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from .graph import Limits as Limits
     from .graph import lattice_graph as lattice_graph
     from .inclusion import Inclusion as Inclusion
-    from .inclusion import sensor_share as sensor_share
     from .inclusion import straight_inclusion as straight_inclusion
     from .polyline import polyline_inclusion as polyline_inclusion
     from .response import Response as Response
@@ -40,6 +39,5 @@ if TYPE_CHECKING:
     from .sensitivity_map import Influence as Influence
     from .sensitivity_map import deviation_map as deviation_map
     from .sensitivity_map import influence_map as influence_map
-    from .settings import RULES as RULES
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

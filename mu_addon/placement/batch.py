@@ -23,7 +23,7 @@ class CandidateBatch:
     """Many candidate sensors in one unit, solved together: displacement of the monitored points by each.
 
     At every state of Model A (the unit without a sensor) all candidates share one factorisation (batched
-    Newton). shares: for each sensor the share (m,) of every element that it fills (`sensor_share`).
+    Newton). shares: for each sensor the share (m,) of every element that it fills.
     monitored: points (p, 3) in mm of the backbone and their probe. sensor_MPa: Young's modulus of the sensor.
     settings: of Newton's method.
     """

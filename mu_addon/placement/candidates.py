@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..fem.elements import reference_gradients
 from ..fem.equilibrium import Equilibrium
 from ..fem.kinematics import Probe
 from ..fem.laws import NeoHooke
@@ -16,9 +15,8 @@ from ..fem.model import Model
 from ..fem.trajectory import Trajectory, simulate
 from ..meshing.mesh import LATTICE, Mesh
 from .deviation import Deviation, centreline, centreline_deviation
-from .inclusion import Inclusion, sensor_share, stiffened_volume_mm3
+from .inclusion import Inclusion
 from .polyline import polyline_inclusion
-from .settings import PRINTED
 
 Array = np.ndarray[Any, Any]
 
@@ -82,48 +80,18 @@ def moved_points(monitored: tuple[Array, Probe], trajectory: Trajectory) -> Arra
 
 @attrs.frozen(eq=False)
 class Evaluation:
-    """One candidate under one inclusion rule: its deviation from Model A, and the volume it stiffened.
-
-    stiffened_mm3: volume of the whole body that got the sensor's material; cylinder_mm3: of the cylinder.
-    """
+    """A candidate's deviation from Model A."""
 
     name: str
-    rule: str
     deviation: Deviation
-    stiffened_mm3: float
-    cylinder_mm3: float
 
 
-def evaluation(
-    mesh: Mesh,
-    candidate: Candidate,
-    rule: str,
-    radius_mm: float,
-    moved: Array,
-    baseline: Array,
-    stations: int,
-) -> Evaluation:
+def evaluation(name: str, moved: Array, baseline: Array, stations: int) -> Evaluation:
     """Deviation of one candidate's monitored points (k, p, 3) in mm from Model A's at the same k instants.
 
-    moved, baseline: the points with and without the sensor; radius_mm: of the inclusion; stations: number of
-    uniform arc lengths compared. A printed waveguide stiffens what it fills itself.
+    moved, baseline: the points with and without the sensor; stations: number of uniform arc lengths compared.
     """
-    deviation = centreline_deviation(centreline(moved, stations), centreline(baseline, stations))
-    if rule == PRINTED:
-        length = float(np.linalg.norm(np.diff(candidate.points, axis=0), axis=1).sum())
-        volume = np.pi * radius_mm**2 * length
-        return Evaluation(candidate.name, rule, deviation, volume, volume)
-    found = roi(mesh, candidate, radius_mm)
-    # A mesh of one half holds half of the cylinder and of what it stiffens.
-    whole = 2 ** len(mesh.symmetry)
-    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes.sum(axis=1)
-    return Evaluation(
-        candidate.name,
-        rule,
-        deviation,
-        whole * stiffened_volume_mm3(rule, found, volumes),
-        found.cylinder_volume_mm3,
-    )
+    return Evaluation(name, centreline_deviation(centreline(moved, stations), centreline(baseline, stations)))
 
 
 def evaluate(
@@ -132,7 +100,6 @@ def evaluate(
     baseline: Trajectory,
     monitored: tuple[Array, Probe],
     candidate: Candidate,
-    rule: str,
     radius_mm: float,
     sensor_MPa: float,
     stations: int,
@@ -141,11 +108,10 @@ def evaluate(
 
     The reference for `CandidateBatch`, at the cost of one simulation a candidate. model and materials: of
     the unit without a sensor, and baseline its trajectory. monitored: points (p, 3) in mm of the backbone
-    and their probe. rule: "intersect" or "volume_fraction". radius_mm: of the inclusion; sensor_MPa: its
-    Young's modulus; stations: uniform arc lengths compared. Raises ConvergenceError.
+    and their probe. radius_mm: of the inclusion; sensor_MPa: its Young's modulus; stations: uniform arc
+    lengths compared. Raises ConvergenceError.
     """
-    found = roi(model.mesh, candidate, radius_mm)
-    stiff = with_sensor(materials, sensor_share(rule, found), sensor_MPa)
+    stiff = with_sensor(materials, roi(model.mesh, candidate, radius_mm).share, sensor_MPa)
     trajectory = simulate(Equilibrium(model, stiff), baseline.time_s, baseline.pressure_kPa)
     moved, still = (moved_points(monitored, t) for t in (trajectory, baseline))
-    return evaluation(model.mesh, candidate, rule, radius_mm, moved, still, stations)
+    return evaluation(candidate.name, moved, still, stations)

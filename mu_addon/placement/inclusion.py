@@ -8,8 +8,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from .settings import RULES
-
 Array = np.ndarray[Any, Any]
 
 # Between two vertex heights the slice area is smooth but where an edge meets the circle: many short
@@ -145,29 +143,3 @@ def straight_inclusion(corners: Array, lattice: Array, start: Array, end: Array,
     share[share < LEAST_SHARE] = 0.0
     length = float(np.linalg.norm(np.asarray(end, float) - np.asarray(start, float)))
     return Inclusion(np.minimum(share, 1.0), radius, length)
-
-
-def sensor_share(rule: str, found: Inclusion) -> Array:
-    """Share (m,) of every element that becomes the sensor's material under an inclusion rule.
-
-    "intersect" (the paper's): the whole of every touched element, so that J depends on the mesh.
-    "volume_fraction": the share inside the cylinder, in parallel with the lattice's own (Voigt's upper
-    bound); it converges. Raises ValueError for another rule.
-
-    >>> found = Inclusion(np.array([0.0, 0.25, 1.0]), radius_mm=1.0, length_mm=25.0)
-    >>> sensor_share("intersect", found).tolist(), sensor_share("volume_fraction", found).tolist()
-    ([0.0, 1.0, 1.0], [0.0, 0.25, 1.0])
-    """
-    if rule == "intersect":
-        return found.touched.astype(float)
-    if rule == "volume_fraction":
-        return found.share
-    raise ValueError(f"unknown inclusion rule {rule!r}; use one of {', '.join(RULES)}")
-
-
-def stiffened_volume_mm3(rule: str, found: Inclusion, volumes: Array) -> float:
-    """Volume in mm3 that gets the sensor's material under a rule, of elements with volumes (m,) in mm3.
-
-    Blended elements count by their share. Raises ValueError as `sensor_share`.
-    """
-    return float((sensor_share(rule, found) * volumes).sum())

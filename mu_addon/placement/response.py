@@ -27,7 +27,7 @@ from ..fem.trajectory import Trajectory
 from ..fem.triangular import Triangular
 from ..meshing.mesh import LATTICE, Mesh
 from .graph import Graph
-from .inclusion import Inclusion, sensor_share, straight_inclusion
+from .inclusion import straight_inclusion
 from .sampling import polynomials
 from .sensitivity_map import loaded, parities, probe_loads, representative_pressures
 
@@ -126,12 +126,11 @@ def reduced_response(
     trajectory: Trajectory,
     monitor: Probe,
     graph: Graph,
-    rule: str,
     radius_mm: float,
 ) -> Response:
     """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
-    model, materials, trajectory: Model A. sensor_MPa, rule, radius_mm: of the sensor, as in `evaluate`.
+    model, materials, trajectory: Model A. sensor_MPa, radius_mm: of the sensor, as in `evaluate`.
     monitor: probe of the backbone's p points. The states are those of `representative_pressures`. Raises
     InputError where a step meets no element, IndefiniteError at an unstable state.
     """
@@ -139,7 +138,7 @@ def reduced_response(
     sides = parities(model)
     states = loaded(trajectory, representative_pressures(trajectory))
     step, side, kept = _represented(graph, mirrored=len(sides) > 1)
-    patterns = _patterns(model, materials, sensor_MPa, graph, kept, rule, radius_mm)
+    patterns = _patterns(model, materials, sensor_MPa, graph, kept, radius_mm)
     k = patterns[0].force.shape[2]
     # A pattern in the mirror plane is whole only with its image, one beside it on its own.
     whole = np.where(side[kept] == 0, len(sides), 1.0)
@@ -204,7 +203,6 @@ def _patterns(
     sensor_MPa: float,
     graph: Graph,
     steps: Array,
-    rule: str,
     radius_mm: float,
 ) -> list[Patterns]:
     """Strain patterns of some steps (r,): six uniform strains, and stretch passed on to neighbours.
@@ -228,7 +226,7 @@ def _patterns(
         beyond = _BEYOND * (end - start)
         own, before, after = share(start, end), share(start - beyond, start), share(end, end + beyond)
         shares = [own, own + before, own + after, own + before + after]
-        bars.append([_filled(rule, np.minimum(s, 1.0), radius_mm) for s in shares])
+        bars.append([_filled(np.minimum(s, 1.0)) for s in shares])
         if not own.any():
             place = tuple(((start + end) / 2).round(2).tolist())
             raise InputError("a step of the graph meets no lattice element", f"near {place} mm")
@@ -253,11 +251,10 @@ def _patterns(
     return found
 
 
-def _filled(rule: str, share: Array, radius_mm: float) -> tuple[Array, Array]:
-    """Elements (e,) that a bar fills under a rule, and the share of each (e,)."""
-    filled = sensor_share(rule, Inclusion(share, radius_mm, 0.0))
-    elements = np.flatnonzero(filled)
-    return elements, filled[elements]
+def _filled(share: Array) -> tuple[Array, Array]:
+    """Elements (e,) that a bar fills, of their shares (m,), and the share of each (e,)."""
+    elements = np.flatnonzero(share)
+    return elements, share[elements]
 
 
 def _independent(displacement: Array, stiffness: Array) -> Array:

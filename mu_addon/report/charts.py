@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .results import Floats, Path, RuleResult, SideView
+from .results import Floats, Path, RankingResult, SideView
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -217,7 +217,7 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
 
 
 def color_bar(top: float) -> str:
-    """SVG of the colour scale from 0 to `top` mm that the heatmaps of a rule share.
+    """SVG of the colour scale from 0 to `top` mm that the heatmaps share.
 
     Colour goes by square root, so that small deviations are visible beside the largest.
     """
@@ -284,7 +284,7 @@ def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> 
     return svg()
 
 
-def ranking(result: RuleResult, paths: Sequence[Path]) -> str:
+def ranking(result: RankingResult, paths: Sequence[Path]) -> str:
     """SVG of J_hat in mm of every path as a bar, best first.
 
     The chosen path is coloured, paths tied with it are hatched; error bars give the mesh uncertainty.

@@ -53,15 +53,13 @@ class Path:
 
 
 @attrs.frozen(eq=False)
-class RuleResult:
-    """Result of a placement with one inclusion rule; paths in the order of `ReportData.paths`."""
+class RankingResult:
+    """Result of a placement; paths in the order of `ReportData.paths`."""
 
     delta: Floats  # (paths, k times, j stations) mm
     j_hat: Floats  # (paths,) mm
     j_cont: Floats  # (paths,) mm
     rank: Sequence[int]  # 1 is best
-    stiffened_mm3: Floats  # volume that got E_sens
-    cylinder_mm3: Floats  # volume of the sensor itself
     chosen: str  # name of the best path
     tied: Sequence[str] = ()  # paths tied with the chosen one within the mesh uncertainty
     uncertainty_mm: float | None = None  # mesh uncertainty of J_hat
@@ -86,7 +84,6 @@ class LatticeSearch:
     risk: upper bound, 0 .. 1, of the probability that an unsolved path is better.
     """
 
-    rule: str
     solved: Sequence[LatticePath]
     paths: int
     risk: float  # probability, at most, that an unsolved path is better
@@ -277,8 +274,7 @@ class ReportData:
     view: SideView | None = None
     pictures: Sequence[Picture] = ()
     paths: Sequence[Path] = ()
-    rules: Mapping[str, RuleResult] = attrs.field(factory=dict)  # "volume_fraction", "intersect"
-    headline_rule: str = "volume_fraction"  # whose chosen path is the answer
+    ranking: RankingResult | None = None
     search: LatticeSearch | None = None
     search_picture: Picture | None = None
     light: Signals | None = None
@@ -306,4 +302,4 @@ class ReportData:
     @property
     def is_partly_compared(self) -> bool:
         """True if paths are not compared at some instants."""
-        return any(bool(np.isnan(rule.delta).any()) for rule in self.rules.values())
+        return self.ranking is not None and bool(np.isnan(self.ranking.delta).any())

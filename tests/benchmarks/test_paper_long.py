@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from benchmarks.paper.inclusion_rules import RULES
 from benchmarks.paper.long import open_study, scatter
 from benchmarks.paper.long.__main__ import main
 from benchmarks.paper.long.open_study import objective
@@ -23,7 +24,6 @@ from mu_addon.errors import InputError
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE, TET_FACES
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.inclusion import RULES
 from tests.benchmarks.test_paper_table import shown
 
 PAPER = published()

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from benchmarks.paper.inclusion_rules import INTERSECT, RULES, VOLUME_FRACTION, sensor_share
 from benchmarks.paper.table.agreement import (
     HELD,
     NOT_HELD,
@@ -14,6 +15,7 @@ from benchmarks.paper.table.agreement import (
     spearman,
     statements,
 )
+from benchmarks.paper.table.gripper import deviations
 from benchmarks.paper.table.published import GRIPPER, name_of, published
 from benchmarks.paper.table.report import report, weightings
 from benchmarks.paper.table.run import Found, OtherTableColumn, summary
@@ -22,6 +24,7 @@ from benchmarks.paper.table.table_column import STATIONS, motion, paths, with_fi
 from benchmarks.paper.table.table_columns import BENDING_KPA, Solved, TableColumn
 from benchmarks.paper.table.values import unit_of_table_column
 from mu_addon.design.anchors import anchor_points, windows
+from mu_addon.design.gripper import load_gripper
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -32,7 +35,7 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import candidate_paths, evaluate
-from mu_addon.placement.inclusion import RULES
+from mu_addon.placement.inclusion import Inclusion
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.pool import each
 from mu_addon.usecases.simulate_and_place.job import grasp
@@ -152,6 +155,22 @@ def test_what_is_held_does_not_move_and_its_paths_disturb_nothing():
     assert J[0] < 0.05 * J[3]
 
 
+def test_the_papers_rule_fills_every_touched_element():
+    found = Inclusion(np.array([0.0, 0.25, 1.0]), radius_mm=1.0, length_mm=25.0)
+    assert sensor_share(INTERSECT, found).tolist() == [0.0, 1.0, 1.0]
+    assert sensor_share(VOLUME_FRACTION, found).tolist() == [0.0, 0.25, 1.0]
+    with pytest.raises(ValueError, match="unknown inclusion rule"):
+        sensor_share("voxel", found)
+
+
+def test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does():
+    gripper = load_gripper("gripper")
+    found = deviations(gripper, mesh_unit(gripper.unit, COARSE), VOLUME_FRACTION, None)
+    J = np.array([found[path.name] for path in PAPER.paths])
+    assert PAPER.paths[int(J.argmin())].name == "alpha4"
+    assert spearman(J, PAPER.J_hat[GRIPPER]) > 0.9
+
+
 def test_paths_side_by_side_are_each_path_alone():
     unit = unit_of_table_column(Unit(), 0.75, 21.70)
     mesh = mesh_unit(unit, COARSE)
@@ -163,7 +182,7 @@ def test_paths_side_by_side_are_each_path_alone():
     model, materials = Model(mesh, threads=1), materials_of(unit, mesh)
     baseline = simulate(Equilibrium(model, materials), np.arange(3.0), np.array(pressures))
     alone = evaluate(
-        model, materials, baseline, (points, probe(mesh, points)), path, "volume_fraction",
+        model, materials, baseline, (points, probe(mesh, points)), path,
         unit.dimensions.inclusion_radius, unit.material.sensor_modulus_kPa / 1e3, STATIONS,
     )  # fmt: skip
     side_by_side = found.deviations("volume_fraction", points, np.array(pressures))[0]

@@ -20,7 +20,6 @@ from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi, with_sensor
-from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.sensitivity_map import influence_map, loaded
 
 from .cubic import Cubic
@@ -83,7 +82,7 @@ def test_foam_and_struts_side_by_side_are_at_small_strain_a_cubic_body(mesh):
 def test_a_sensor_takes_its_share_of_every_layer(mesh):
     materials = materials_of(UNIT, mesh, LAW)
     every = {c.name: c for c in candidate_paths(anchor_points(UNIT), windows(6))}
-    share = sensor_share("volume_fraction", roi(mesh, every["alpha2"], 1.0))
+    share = roi(mesh, every["alpha2"], 1.0).share
     stiff = with_sensor(materials, share, 2.5)
     total = np.zeros(len(mesh.tets))
     by_law = {}
@@ -100,7 +99,7 @@ def test_sensors_in_lockstep_find_what_each_finds_alone(mesh, baseline):
     materials = materials_of(UNIT, mesh, LAW)
     points = anchor_points(UNIT)
     every = {c.name: c for c in candidate_paths(points, windows(6))}
-    shares = [sensor_share("intersect", roi(mesh, every[n], 1.0)) for n in ("alpha2", "alpha10")]
+    shares = [roi(mesh, every[n], 1.0).touched.astype(float) for n in ("alpha2", "alpha10")]
     sweep = CandidateBatch(Model(mesh), materials, (points, probe(mesh, points)), shares, 2.5)
     together = sweep.at(baseline.solved[-1])
     for number, found in enumerate(together):

@@ -197,7 +197,7 @@ def every_kind(wall, bench):
     add("Move", "simulate", {"unit": "U.unit"}, **COARSE)
     add(
         "Rank", "place", {"study": "Move.study"},
-        rule="volume_fraction", stations=11, mesh_check=False, workers=1,
+        stations=11, mesh_check=False, workers=1,
     )  # fmt: skip
     add("Map", "sensitivity", {"study": "Rank.study"})
     add("Light", "light", {"study": "Rank.study"})
@@ -214,7 +214,7 @@ def every_kind(wall, bench):
     add("Compare", "compare", {"items": ["Move.study", "By Law.study", "As Measured.study"]})
     add("Wall", "obstacle", file=str(wall), friction=0.3)
     add("Gripper", "gripper", {"unit": "U.unit"})
-    add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20", rank_paths=False)
+    add("Grasp", "grip", {"gripper": "Gripper.gripper"}, coarse=True, cubes_mm="20")
     add("Thin Or Thick", "range", values="0.8 1.0")
     add("Study", "sweep", {"unit": "U.unit", "ranges": "Thin Or Thick.range"}, stages="design", workers=1)
     add(

@@ -24,7 +24,6 @@ JOB = Job(
     mesh=MeshSettings(refine=0.4, order=1),
     times=7,
     stations=11,
-    rules=("volume_fraction",),
     mesh_check=False,
 )
 

@@ -5,7 +5,6 @@ import pytest
 from mu_addon.cli.main import parser
 from mu_addon.cli.study_job import job_of
 from mu_addon.errors import InputError
-from mu_addon.placement.settings import PRINTED, RULES
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 
@@ -24,7 +23,6 @@ def test_the_printed_body_whose_walls_may_touch_is_the_default(command):
     found = job(command)
     assert found.mesh.fidelity == "resolved"
     assert found.self_contact
-    assert found.rules == (PRINTED,)
     assert not job(command, "--no-self-contact").self_contact
 
 
@@ -32,7 +30,6 @@ def test_a_homogenised_unit_has_no_walls_that_touch():
     found = job("place", "--fidelity", "homogenised")
     assert found.mesh.fidelity == "homogenised"
     assert not found.self_contact
-    assert found.rules == RULES
     with pytest.raises(InputError, match="self-contact"):
         job("place", "--fidelity", "homogenised", "--self-contact")
 
@@ -40,9 +37,6 @@ def test_a_homogenised_unit_has_no_walls_that_touch():
 def test_what_only_a_homogenised_unit_has_chooses_it():
     for words in (("--order", "1"), ("--mesher", "gmsh")):
         assert job("simulate", *words).mesh.fidelity == "homogenised"
-    found = job("place", "--rule", "intersect")
-    assert found.mesh.fidelity == "homogenised"
-    assert found.rules == ("intersect",)
 
 
 def test_what_only_a_homogenised_unit_has_is_refused_beside_the_other():

@@ -164,7 +164,6 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", study.TIMES),
         ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
-        ("place", path.RULE),
         ("sweep", mesh.ORDER),
         ("homogenize", lattice.REFINE),
         ("sweep", sweep.POINTS),

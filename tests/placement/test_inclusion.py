@@ -5,12 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.placement.inclusion import (
-    cylinder_overlap,
-    sensor_share,
-    stiffened_volume_mm3,
-    straight_inclusion,
-)
+from mu_addon.placement.inclusion import cylinder_overlap, straight_inclusion
 
 from ..fem import bodies
 
@@ -68,18 +63,9 @@ def test_an_overlap_is_never_negative_nor_more_than_the_element_and_ignores_numb
     np.testing.assert_allclose(cylinder_overlap(CORNERS, end, start, radius), overlap, atol=2e-4)
 
 
-def test_the_two_rules():
+def test_shares_keep_the_cylinders_volume_in_the_lattice_alone():
     lattice = CORNERS.mean(axis=1)[:, 0] > 1.0
     found = straight_inclusion(CORNERS, lattice, [2.5, 2.5, 1.0], [2.5, 2.5, 5.0], 0.3)
     assert not found.touched[~lattice].any()
-    np.testing.assert_array_equal(sensor_share("intersect", found), found.touched)
-    blended = sensor_share("volume_fraction", found)
-    assert blended.max() < 1
-    # Blending keeps the volume the cylinder has; touching multiplies it.
-    assert (blended * VOLUMES).sum() == pytest.approx(found.cylinder_volume_mm3, rel=1e-4)
-    assert stiffened_volume_mm3("volume_fraction", found, VOLUMES) == pytest.approx(
-        found.cylinder_volume_mm3, rel=1e-3
-    )
-    assert stiffened_volume_mm3("intersect", found, VOLUMES) > 5 * found.cylinder_volume_mm3
-    with pytest.raises(ValueError, match="unknown inclusion rule"):
-        sensor_share("voxel", found)
+    assert found.share.max() < 1
+    assert (found.share * VOLUMES).sum() == pytest.approx(found.cylinder_volume_mm3, rel=1e-4)

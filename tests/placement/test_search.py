@@ -19,7 +19,6 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.graph import Limits, lattice_graph
-from mu_addon.placement.inclusion import sensor_share
 from mu_addon.placement.polyline import polyline_inclusion
 from mu_addon.placement.response import reduced_response
 from mu_addon.placement.search import SearchSettings, front, probability_of_better, search_paths
@@ -52,7 +51,7 @@ def half():
     return mesh, model, simulate(Equilibrium(model, materials(mesh)), np.arange(3.0), PRESSURES)
 
 
-def exact(half_mesh, rule, chains):
+def exact(half_mesh, chains):
     """J_hat (c,) in mm of every chain, solved on the whole mesh: a path need not lie in the mirror plane."""
     mesh = mirror(half_mesh, "x")
     model, made = Model(mesh), materials(mesh)
@@ -60,8 +59,7 @@ def exact(half_mesh, rule, chains):
     monitor = probe(mesh, POINTS)
     lattice, corners = mesh.region == LATTICE, mesh.nodes[mesh.corners]
     shares = [
-        sensor_share(rule, polyline_inclusion(corners, lattice, GRAPH.nodes[list(c)], D.inclusion_radius))
-        for c in chains
+        polyline_inclusion(corners, lattice, GRAPH.nodes[list(c)], D.inclusion_radius).share for c in chains
     ]
     sweep = CandidateBatch(model, made, (POINTS, monitor), shares, SENSOR_MPA)
     moved = np.stack([sweep.at(state) for state in baseline.solved], axis=1)
@@ -70,20 +68,20 @@ def exact(half_mesh, rule, chains):
     return np.array([centreline_deviation(curve, baseline.of_time(still)).J_hat for curve in curves])
 
 
-def predicted(half, rule, chains, model=None, baseline=None):
+def predicted(half, chains, model=None, baseline=None):
     _, half_model, half_baseline = half
     model, baseline = model or half_model, baseline or half_baseline
     monitor = probe(model.mesh, POINTS)
     found = reduced_response(
-        model, materials(model.mesh), SENSOR_MPA, baseline, monitor, GRAPH, rule, D.inclusion_radius
+        model, materials(model.mesh), SENSOR_MPA, baseline, monitor, GRAPH, D.inclusion_radius
     )
     moved = found.displacements(chains, np.array([s.pressure_MPa for s in loaded(baseline)]))
     return mean_deviation(gradients_of(baseline, POINTS, monitor, 21), moved, shares_of_time(baseline))
 
 
-@pytest.fixture(scope="module", params=["volume_fraction", "intersect"])
-def both(request, half):
-    return exact(half[0], request.param, EVERY), predicted(half, request.param, EVERY)
+@pytest.fixture(scope="module")
+def both(half):
+    return exact(half[0], EVERY), predicted(half, EVERY)
 
 
 def test_the_prediction_ranks_paths_as_solving_for_each_does(both):
@@ -115,8 +113,8 @@ def test_the_half_mesh_predicts_what_the_whole_one_does(half):
     whole = mirror(half[0], "x")
     model = Model(whole)
     baseline = simulate(Equilibrium(model, materials(whole)), np.arange(3.0), PRESSURES)
-    one = predicted(half, "volume_fraction", EVERY)
-    other = predicted(half, "volume_fraction", EVERY, model, baseline)
+    one = predicted(half, EVERY)
+    other = predicted(half, EVERY, model, baseline)
     x = np.array([np.abs(GRAPH.nodes[list(c)][:, 0]).min() for c in EVERY])
     far, beside = x > 0.9 * D.cell, x > 0
     assert 0 < far.sum() < beside.sum() < len(EVERY)
@@ -129,7 +127,7 @@ def test_the_half_mesh_predicts_what_the_whole_one_does(half):
 
 def test_a_path_and_its_mirror_image_are_predicted_alike(half):
     images = [tuple(int(i) for i in GRAPH.image[list(c)]) for c in EVERY]
-    one, other = (predicted(half, "volume_fraction", chains) for chains in (EVERY, images))
+    one, other = (predicted(half, chains) for chains in (EVERY, images))
     np.testing.assert_allclose(one, other, rtol=1e-9)
 
 

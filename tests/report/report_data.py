@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mu_addon.report.results import Gate, Parameter, Path, Picture, ReportData, RuleResult, SideView
+from mu_addon.report.results import Gate, Parameter, Path, Picture, RankingResult, ReportData, SideView
 
 WINDOWS = [(start, length) for length in range(3, 7) for start in range(1, 8 - length)]
 PATHS = tuple(Path(f"alpha{i}", start, length) for i, (start, length) in enumerate(WINDOWS, 1))
@@ -34,18 +34,15 @@ def deviation(j_hat, seed):
     return np.array(delta)
 
 
-def rule(j_hat, stiffened, seed, **more):
+def ranking(j_hat, seed, **more):
     delta = deviation(j_hat, seed)
     mean = delta.mean(axis=(1, 2))
     rank = np.argsort(np.argsort(mean)) + 1
-    cylinder = np.array([np.pi * 12.5 * (path.length - 1) for path in PATHS])
-    return RuleResult(
+    return RankingResult(
         delta=delta,
         j_hat=mean,
         j_cont=np.sqrt((delta**2).mean(axis=(1, 2))),
         rank=rank.tolist(),
-        stiffened_mm3=stiffened * cylinder,
-        cylinder_mm3=cylinder,
         chosen=PATHS[int(np.argmin(mean))].name,
         **more,
     )
@@ -77,10 +74,7 @@ def results(**changes):
             Picture(png(), "At 40 kPa: 57°.", "The unit bent towards the sensor side"),
         ),
         "paths": PATHS,
-        "rules": {
-            "volume_fraction": rule(0.31 * J_HAT, 1.0, 1, tied=("alpha1",), uncertainty_mm=0.03),
-            "intersect": rule(J_HAT, 6.8, 2, uncertainty_mm=0.11),
-        },
+        "ranking": ranking(0.31 * J_HAT, 1, tied=("alpha1",), uncertainty_mm=0.03),
         "pressure_kPa": pressure,
         "angle_deg": angle(pressure),
         "protocol_s": time,

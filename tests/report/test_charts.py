@@ -12,15 +12,15 @@ from mu_addon.report.results import Path
 from .report_data import PATHS, results
 
 DATA = results()
-RULE = DATA.rules["volume_fraction"]
+RANKING = DATA.ranking
 CHARTS = {
-    "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", RULE.j_hat),
+    "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", RANKING.j_hat),
     "angle": lambda: plots.angle_against_pressure(DATA.pressure_kPa, DATA.angle_deg),
     "protocol": lambda: plots.protocol(DATA.protocol_s, DATA.protocol_kPa),
-    "heatmap": lambda: plots.heatmap(RULE.delta[0], 1.0, True),
+    "heatmap": lambda: plots.heatmap(RANKING.delta[0], 1.0, True),
     "bar": lambda: plots.color_bar(1.0),
-    "marginal": lambda: plots.marginal(RULE.delta.mean(axis=1), PATHS, "alpha4", "length"),
-    "ranking": lambda: plots.ranking(RULE, PATHS),
+    "marginal": lambda: plots.marginal(RANKING.delta.mean(axis=1), PATHS, "alpha4", "length"),
+    "ranking": lambda: plots.ranking(RANKING, PATHS),
     "seconds": lambda: plots.seconds(DATA.seconds),
 }
 
@@ -44,7 +44,7 @@ def test_ten_windows_look_different():
 
 
 def test_ranking_puts_the_best_on_top_in_colour():
-    svg = plots.ranking(RULE, PATHS)
+    svg = plots.ranking(RANKING, PATHS)
     bars = re.findall(r'd="M ([^"]*?)\sz\s*"[^>]*?style="fill: (#[0-9a-f]{6})', svg)
     colored = [points for points, fill in bars if fill == plots.CHOSEN.lower()]
     assert len(colored) == 1
@@ -53,7 +53,7 @@ def test_ranking_puts_the_best_on_top_in_colour():
 
 
 def test_the_chosen_path_alone_is_thick():
-    svg = plots.marginal(RULE.delta.mean(axis=1), PATHS, "alpha4", "length")
+    svg = plots.marginal(RANKING.delta.mean(axis=1), PATHS, "alpha4", "length")
     assert svg.count(f"stroke: {plots.CHOSEN.lower()}; stroke-width: 3") == 2  # the line, and its key
 
 

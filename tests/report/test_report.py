@@ -19,7 +19,14 @@ VOID = {"meta", "link", "img", "br", "hr"}
 def brief(**changes):
     """A run without charts, for what does not need them."""
     none = np.zeros(0)
-    charts = {"rules": {}, "pictures": (), "view": None, "angle_deg": none, "protocol_s": none, "seconds": {}}
+    charts = {
+        "ranking": None,
+        "pictures": (),
+        "view": None,
+        "angle_deg": none,
+        "protocol_s": none,
+        "seconds": {},
+    }
     return results(**{**charts, **changes})
 
 
@@ -80,20 +87,6 @@ def test_the_answer_comes_first(page):
     assert answer < page.words.index("Ranking of the paths")
     assert "of 10 candidates it has the smallest mean deviation, 0.048" in page.words
     assert "tied with α₁" in page.words
-    assert "for “intersect” the same path is best" in page.words
-
-
-def test_disagreement_of_the_rules_is_told():
-    data = results()
-    other = attrs.evolve(data.rules["intersect"], chosen="alpha2")
-    words = Page(report_html(attrs.evolve(data, rules={**data.rules, "intersect": other}))).words
-    assert "for “intersect” α₂ would be best" in words
-
-
-def test_the_headline_rule_comes_first():
-    data = results()
-    html = report_html(brief(rules=dict(reversed(data.rules.items()))))
-    assert 0 < html.index("Rule “volume fraction”") < html.index("Rule “intersect”")
 
 
 def test_captions_are_set_in_type():
@@ -112,15 +105,14 @@ def test_asks_nothing_of_any_server(html, page):
 
 
 def test_every_picture_is_there(page):
-    view, pictures, rankings, motion, seconds, heatmaps, scales, marginals = 1, 4, 2, 2, 1, 20, 2, 4
+    view, pictures, rankings, motion, seconds, heatmaps, scales, marginals = 1, 4, 1, 2, 1, 10, 1, 2
     expected = view + pictures + rankings + motion + seconds + heatmaps + scales + marginals
     assert len(page.all("img")) == expected
 
 
-def test_every_path_and_rule_is_in_the_table(page):
-    for rule in results().rules.values():
-        for value in rule.j_hat:
-            assert f"{value:.4f}" in page.words
+def test_every_path_is_in_the_table(page):
+    for value in results().ranking.j_hat:
+        assert f"{value:.4f}" in page.words
 
 
 def test_assumptions_are_told_with_their_reason(page):
@@ -138,7 +130,7 @@ def test_partial_says_so_at_the_top(page):
 def test_a_run_that_stopped_early_shows_what_it_has():
     page = Page(report_html(ReportData("t", "u", status="partial", seconds={"solid": 1.0})))
     assert page.headings == ["Computing time of each stage"]
-    page = Page(report_html(results(status="partial", rules={})))
+    page = Page(report_html(results(status="partial", ranking=None)))
     assert len(page.all("img")) == 1 + 4 + 2 + 1
     assert "Put the sensor" not in page.words
     assert "Ranking of the paths" not in page.headings
@@ -177,12 +169,11 @@ def test_equal_results_make_equal_bytes(html):
     assert report_html(results()) == html
 
 
-def test_one_rule_and_no_ties():
-    data = results()
-    alone = attrs.evolve(data.rules["intersect"], uncertainty_mm=None)
-    words = Page(report_html(attrs.evolve(data, rules={"intersect": alone}, headline_rule="intersect"))).words
+def test_no_ties():
+    alone = attrs.evolve(results().ranking, uncertainty_mm=None, tied=())
+    words = Page(report_html(results(ranking=alone))).words
     assert "tied" not in words
-    assert "0.155" in words
+    assert "0.048" in words
 
 
 def test_numbers_of_all_kinds():
@@ -201,9 +192,8 @@ def test_cannot_be_written(tmp_path):
 def test_instants_that_are_not_compared_stay_empty():
     """Where one path has no equilibrium no map has a row, and no figure a NaN."""
     found = results()
-    name, rule = next(iter(found.rules.items()))
-    delta = rule.delta.copy()
+    delta = found.ranking.delta.copy()
     delta[:, 3:9] = np.nan
-    html = report_html(results(rules={name: attrs.evolve(rule, delta=delta)}))
+    html = report_html(results(ranking=attrs.evolve(found.ranking, delta=delta)))
     assert "Empty rows are not compared." in html
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)

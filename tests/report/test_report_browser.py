@@ -30,7 +30,7 @@ def test_whole_and_quiet(browser, report, width, phone):
     images = browser.evaluate(
         "[...document.images].map(i => [i.complete, i.naturalWidth, i.clientWidth, i.alt])"
     )
-    assert len(images) == 36
+    assert len(images) == 22
     assert all(complete and natural > 0 for complete, natural, _, _ in images)
     assert all(100 < shown <= width for _, _, shown, _ in images)
     assert complaints(browser) == []

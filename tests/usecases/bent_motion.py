@@ -62,7 +62,7 @@ def write_bent_run(home, at_s, wall_mm=0.9, more=1.0, full=False, ranked=True):
     summary = {"status": "complete", "angle_deg": angles, "seconds": {"Model A": 480.0 if full else 20.0}}
     if ranked:
         found = {"alpha4": 0.05 * more, "alpha1": 0.1, "alpha10": 0.4}
-        summary |= {"chosen": {"printed": "alpha4"}, "J_hat_mm": {"printed": found}}
+        summary |= {"chosen": "alpha4", "J_hat_mm": found}
     path = folder / "summary.json"
     path.write_text(json.dumps(summary))
     os.utime(path, (at_s, at_s))

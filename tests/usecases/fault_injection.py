@@ -196,7 +196,6 @@ PLACEMENT = attrs.evolve(
     protocol=PressureProtocol(np.arange(2.0), np.array([0.0, 4.0])),
     times=2,
     stations=11,
-    rules=("volume_fraction",),
     stages=("design", "simulate", "place"),
 )
 

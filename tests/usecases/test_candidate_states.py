@@ -35,7 +35,7 @@ JOB = Job(
     stations=21,
     workers=1,
 )
-JOBS = [(c, "volume_fraction") for c in candidate_paths(anchor_points(UNIT), windows(6))[::3]]
+JOBS = candidate_paths(anchor_points(UNIT), windows(6))[::3]
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_a_path_that_ends_on_its_way_from_rest_ends_the_comparison_there(model_a
 
     monkeypatch.setattr(Evaluator, "alone", ended)
     sweep, found = swept(model_a, tmp_path)
-    name = JOBS[2][0].name
+    name = JOBS[2].name
     assert sweep.not_reached == [
         f"at 20 kPa and beyond ({name}: no equilibrium at 20 kPa on its path from rest)"
     ]
@@ -155,29 +155,27 @@ def test_with_history_instants_count_until_the_first_that_a_path_does_not_reach(
 
     monkeypatch.setattr(Evaluator, "simulated_in_time", ended)
     found, not_reached = evaluations(JOB, Cache(tmp_path), mesh, trajectory, JOBS, lambda _: None)
-    assert not_reached == [f"from 4 s on ({JOBS[2][0].name}: no equilibrium at 20 kPa)"]
+    assert not_reached == [f"from 4 s on ({JOBS[2].name}: no equilibrium at 20 kPa)"]
     for one in found:
         assert np.isfinite(one.deviation.over_time).tolist() == [True, True, True, True, False]
 
 
 def test_a_mesh_check_compares_the_pressures_that_both_meshes_reach():
     fine, coarse = (
-        Evaluation("alpha1", "volume_fraction", deviation_of(np.outer(of_time, np.ones(3))), 1.0, 1.0)
+        Evaluation("alpha1", deviation_of(np.outer(of_time, np.ones(3))))
         for of_time in ([0.1, 0.3, 0.4], [np.nan, 0.36])
     )
-    job = attrs.evolve(JOB, rules=("volume_fraction",))
-    by_path = {("alpha1", "volume_fraction"): fine}
-    change = mesh_change_mm(job, by_path, [coarse], [0, 1])
+    change = mesh_change_mm({"alpha1": fine}, [coarse], [0, 1])
     # 0.3 to 0.36 at the one pressure of both, of a mean deviation of 0.8 / 3.
-    assert change["volume_fraction"] == pytest.approx(0.06 * fine.deviation.J_hat / 0.3)
-    nowhere = {("alpha1", "volume_fraction"): attrs.evolve(fine, deviation=coarse.deviation)}
+    assert change == pytest.approx(0.06 * fine.deviation.J_hat / 0.3)
+    nowhere = {"alpha1": attrs.evolve(fine, deviation=coarse.deviation)}
     with pytest.raises(ConvergenceError, match="on both meshes"):
-        mesh_change_mm(job, nowhere, [fine], [0, 0, 0])
+        mesh_change_mm(nowhere, [fine], [0, 0, 0])
 
 
 def test_the_mesh_check_of_printed_paths_takes_those_that_disturb_least():
     deviations = {}
-    for (candidate, rule), offset in zip(JOBS, (0.3, 0.1, 0.2, 0.4), strict=True):
+    for candidate, offset in zip(JOBS, (0.3, 0.1, 0.2, 0.4), strict=True):
         deviation = centreline_deviation(np.full((2, 3, 3), offset), np.zeros((2, 3, 3)))
-        deviations[candidate.name, rule] = Evaluation(candidate.name, rule, deviation, 1.0, 1.0)
+        deviations[candidate.name] = Evaluation(candidate.name, deviation)
     assert Ranking(deviations).best(JOBS, 2) == [JOBS[1], JOBS[2]]

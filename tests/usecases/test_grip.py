@@ -10,7 +10,7 @@ import pytest
 
 from mu_addon.cli.main import main
 from mu_addon.design.assets import asset_root
-from mu_addon.design.gripper import load_gripper, read_gripper
+from mu_addon.design.gripper import load_gripper
 from mu_addon.design.parameters import to_toml
 from mu_addon.design.surface import bad_edges, stl_surface
 from mu_addon.errors import InputError
@@ -20,11 +20,8 @@ from mu_addon.files import read_npz
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.pc2 import read_pc2
-from mu_addon.resolved.unit import mesh_printed
-from mu_addon.usecases.grip import path_deviation
-from mu_addon.usecases.grip.grasp import OF_FIDELITY, Cube, Grip, grasp
+from mu_addon.usecases.grip.grasp import Cube, Grip, grasp
 from mu_addon.usecases.grip.motion_files import even, write_halves
-from mu_addon.usecases.grip.path_deviation import PathDeviations, path_deviations, published_deviations
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
@@ -85,18 +82,6 @@ def test_even_steps_keep_what_was_sampled():
         assert found[np.argmin(abs(at - t))] == pytest.approx(row)
 
 
-def test_the_papers_gripper_column():
-    printed = published_deviations()
-    assert len(printed) == 10
-    assert min(printed, key=printed.get) == "alpha4"
-    assert PathDeviations("intersect", None, printed).rank_correlation(printed) == pytest.approx(1.0)
-    # Without ties Spearman's is 1 - 6 sum d^2 / (n (n^2 - 1)), d the differences of the ranks.
-    other = published_deviations("scale_1.00")
-    d = [sorted(printed.values()).index(printed[n]) - sorted(other.values()).index(other[n]) for n in printed]
-    expected = 1 - 6 * sum(x * x for x in d) / (10 * 99)
-    assert PathDeviations("intersect", None, printed).rank_correlation(other) == pytest.approx(expected)
-
-
 def test_a_cube_wider_than_the_gap_is_refused(finger):
     gripper, mesh, materials = finger
     with pytest.raises(InputError, match="does not fit"):
@@ -140,16 +125,6 @@ def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
     assert small.angle_deg[small.end("i")] == pytest.approx(large.angle_deg[large.end("i")], abs=1e-6)
 
 
-def test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does(finger):
-    gripper, mesh, materials = finger
-    kept = {}
-    found = path_deviations(gripper, mesh, materials, "volume_fraction", None, store=kept.__setitem__)
-    assert found.chosen == "alpha4"
-    assert found.rank_correlation(published_deviations()) > 0.9
-    again = path_deviations(gripper, mesh, materials, "volume_fraction", None, load=kept.get)
-    assert again.J_hat_mm == found.J_hat_mm
-
-
 def test_the_printable_part_from_the_command_line(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["grip", "--preset", "gripper", "--out", str(out), "--solid-only"]) == 0
@@ -181,7 +156,7 @@ def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
 def squeezed(folder, *more):
     """Line and folder of a grasp by fingers of three chambers, which hold a lighter, smoother cube."""
     line = ["grip", "--gripper", str(short_gripper(folder)), "--out", str(folder / "out"), "--cube", "25"]
-    line += ["--density", "0.6", "--friction", "0.3", "--no-paths", "--coarse", "--fidelity", "homogenised"]
+    line += ["--density", "0.6", "--friction", "0.3", "--coarse", "--fidelity", "homogenised"]
     line += ["--refine", "0.3", *more]
     assert main(line) == 0
     return line, folder / "out"
@@ -254,13 +229,11 @@ def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_do
     assert (out / "grasp_25.csv").read_text() == before
 
 
-def test_self_contact_and_rules_must_suit_the_fidelity():
+def test_self_contact_needs_printed_struts():
     gripper = load_gripper("gripper")
     with pytest.raises(InputError, match="walls and struts as they are printed"):
         Job(gripper, self_contact=True)
-    with pytest.raises(InputError, match="rules of a resolved finger are intersect"):
-        Job(gripper, mesh=MeshSettings(fidelity="resolved"))
-    job = Job(gripper, mesh=MeshSettings(fidelity="resolved"), rules=("printed",), self_contact=True)
+    job = Job(gripper, mesh=MeshSettings(fidelity="resolved"), self_contact=True)
     assert "self_contact = true" in job.texts()["grip.toml"]
 
 
@@ -276,24 +249,6 @@ def short_gripper(folder):
     return folder / "g.toml"
 
 
-@pytest.mark.nightly("test_a_finger_that_closes_on_nothing_ranks_paths_as_the_paper_does")
-def test_a_printed_waveguide_disturbs_a_finger_on_a_cube(tmp_path, monkeypatch):
-    """One load of the protocol: what is printed moves the backbone, and a rerun finds it solved."""
-    monkeypatch.setattr(path_deviation, "_samples", lambda: (np.array([0.0, 1.0]), np.array([0.0, 15.0])))
-    gripper = read_gripper(short_gripper(tmp_path))
-    mesh = mesh_printed(gripper.unit, MeshSettings(refine=0.4))
-    kept = {}
-
-    def ranked(**more):
-        materials, grip = materials_of(gripper.unit, mesh), Grip(**OF_FIDELITY["resolved"])
-        return path_deviations(gripper, mesh, materials, "printed", Cube(25.0), grip, **more).J_hat_mm
-
-    found = ranked(store=kept.__setitem__)
-    assert set(kept) == {"model_a", "alpha1"}
-    assert 0.005 < found["alpha1"] < 1.0
-    assert ranked(load=kept.get) == found
-
-
 @pytest.mark.nightly(
     "tests/resolved/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit"
 )
@@ -302,7 +257,7 @@ def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     gripper = short_gripper(tmp_path)
     (tmp_path / "p.csv").write_text(SQUEEZE)
     line = ["grip", "--gripper", gripper, "--protocol", tmp_path / "p.csv", "--cube", "25"]
-    line += ["--refine", "0.4", "--fidelity", "resolved", "--no-paths", "--out", tmp_path / "out"]
+    line += ["--refine", "0.4", "--fidelity", "resolved", "--out", tmp_path / "out"]
     assert main([str(word) for word in line]) == 0
     rows = list(csv.DictReader((tmp_path / "out" / "grasp_25.csv").open()))
     normal, down, lost, gap = (

@@ -53,7 +53,6 @@ JOB = Job(
     workers=1,
 )
 PATHS = candidate_paths(anchor_points(UNIT), windows(6))[::4]
-JOBS = [(path, rule) for rule in ("intersect", "volume_fraction") for path in PATHS]
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +64,13 @@ def study(tmp_path_factory):
     trajectory = simulate(Equilibrium(Model(mesh), materials), TIMES, PRESSURES)
     write_model_a(folder, mesh, materials, trajectory)
     write_sensitivity(folder, mesh, mesh.nodes[mesh.corners].mean(axis=1)[:, 2])
-    sweep, evaluations = swept(folder, mesh, mesh, trajectory, JOBS)
+    sweep, evaluations = swept(folder, mesh, mesh, trajectory, PATHS)
     return folder, mesh, trajectory, sweep, evaluations
 
 
 def swept(folder, mesh, solved_on, trajectory, jobs):
     """The sweep of some jobs on a mesh, the motion of its paths written, and its evaluations."""
-    sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, "volume_fraction")
+    sweep = CandidateSolver(JOB, Cache(folder / "cache"), solved_on, jobs, PRESSURES, whole=True)
     evaluations = sweep.evaluations(trajectory, lambda _: None)
     sweep.close()
     keep_motion(JOB, folder, mesh, solved_on, trajectory, sweep, jobs, lambda share: None)
@@ -134,10 +133,10 @@ def test_a_whole_mesh_cannot_be_cut_open(study, tmp_path):
 
 def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
     _, mesh, trajectory, sweep, _ = study
-    assert motion.paths == tuple(c.name for c, rule in JOBS if rule == "volume_fraction")
+    assert motion.paths == tuple(c.name for c in PATHS)
     monitor = probe(mesh, anchor_points(UNIT))
     name = motion.paths[-1]
-    job = next(i for i, (c, rule) in enumerate(JOBS) if (c.name, rule) == (name, "volume_fraction"))
+    job = next(i for i, c in enumerate(PATHS) if c.name == name)
     moved = motion.displacement(name)
     for number, state in enumerate(trajectory.solved):
         if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
@@ -183,7 +182,7 @@ def test_a_path_off_the_mirror_plane_moves_both_sides_apart(study, tmp_path):
     whole, there = whole_body(mesh, trajectory)
     aside = Candidate("aside", 0, anchor_points(UNIT)[:4] + np.array([0.9 * UNIT.dimensions.cell, 0.0, 0.0]))
     write_model_a(tmp_path, mesh, materials_of(UNIT, mesh), trajectory)
-    sweep, _ = swept(tmp_path, mesh, whole, there, [(aside, "volume_fraction")])
+    sweep, _ = swept(tmp_path, mesh, whole, there, [aside])
     found = read_motion(tmp_path)
     ((_, pressure_kPa, difference_mm),) = sweep.whole(there)
     number = int(np.argmax(np.abs(pressure_kPa)))

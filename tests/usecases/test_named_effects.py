@@ -50,7 +50,6 @@ JOB = Job(
     mesh=ROUGH,
     times=4,
     stations=11,
-    rules=("volume_fraction",),
     mesh_check=False,
     workers=1,
 )
@@ -212,7 +211,7 @@ def placed(tmp_path_factory, with_light):
 def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name):
     """A candidate started from Model A's states is where its own path from no pressure leads it."""
     folder, found, job = placed(name)
-    J = found["J_hat_mm"]["volume_fraction"]
+    J = found["J_hat_mm"]
     points = np.array([[0.0, 0.0, 0.0]])
     with run_to_end(Progress()) as context:
         study = Study.open(job, folder, context)
@@ -224,7 +223,7 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name):
         alone, without = (
             evaluate(
                 of.model(mesh), of.materials(mesh), moved(of, mesh)[0], monitored, candidate,
-                "volume_fraction", d.inclusion_radius, sensor, JOB.stations,
+                d.inclusion_radius, sensor, JOB.stations,
             )
             for of in (job, JOB)
         )  # fmt: skip
@@ -497,7 +496,7 @@ def test_place_goes_on_where_the_unit_relaxes(tmp_path):
     delta = np.load(tmp_path / "delta.npz")
     assert delta["pressure_kPa"].max() == 20.0
     held = (delta["time_s"] >= 1.0) & (delta["time_s"] <= 9.0)
-    worst = delta["delta_volume_fraction_mm"].max(axis=(0, 2))
+    worst = delta["delta_mm"].max(axis=(0, 2))
     assert (np.diff(worst[held]) > 0).all()
 
 

@@ -83,12 +83,12 @@ def test_pictures_show_what_stands_behind_the_cut():
 def test_paths_are_ranked_beside_a_wall(files, capsys):
     """Each along its whole motion: another answer than that of the free unit, which shortcuts find."""
     line = ["place", "--unit", files / "unit.toml", "--protocol", files / "up.csv", "--times", 5]
-    line += ["--order", 1, "--refine", 0.5, "--no-mesh-check", "--rule", "volume_fraction", "--workers", 1]
+    line += ["--order", 1, "--refine", 0.5, "--no-mesh-check", "--workers", 1]
     line += ["--out", files / "out", "--json", "--no-report", "--obstacle", files / "wall.stl"]
     assert main([str(word) for word in line]) == 0, capsys.readouterr().out
     summary = json.loads((files / "out" / "summary.json").read_text())
     assert summary["contact"]["1 wall.stl"]["largest_force_N"] > 0
-    delta = np.load(files / "out" / "delta.npz")["delta_volume_fraction_mm"]
+    delta = np.load(files / "out" / "delta.npz")["delta_mm"]
     # At 20 kPa on the way there and back the unit and its candidate stand elsewhere.
     assert delta.shape[1] == 5
     assert delta[0, 2].mean() > delta[0, 0].mean() == 0.0

@@ -26,7 +26,6 @@ times = 7
 mesh = { order = 1, refine = 0.4 }
 [place]
 mesh_check = false
-rules = ["intersect"]
 [vary]
 "chambers.wall_mm" = { low = 0.8, high = 1.2 }
 material.sensor_modulus_kPa = { low = 100.0, high = 10000.0, log = true }
@@ -83,7 +82,6 @@ def test_every_input_has_its_name():
         "simulate.mesh.refine",
         "simulate.protocol",
         "protocol.factor",
-        "place.rules",
         "place.search.sharpest_bend_deg",
         "design.quality",
     ):
@@ -106,7 +104,6 @@ def test_values_reach_the_study(tmp_path):
         assert (job.mesh.order, job.times, job.mesh_check, job.workers) == (1, 7, False, 1)
         assert job.stations == v["place.stations"] in (11, 12, 13)
         assert job.protocol.pressure_kPa.max() == 40.0 * v["protocol.factor"]
-        assert job.rules == ("intersect",)
     assert len({job.text() for job in (p.job for p in points)}) > 1
 
 
@@ -157,7 +154,7 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
     text = plan.texts()["sweep.toml"]
     document = tomllib.loads(text)
     assert document["vary"]["place.stations"] == {"low": 11, "high": 13, "log": False, "steps": 3}
-    assert document["place"] == {"mesh_check": False, "rules": ["intersect"]}
+    assert document["place"] == {"mesh_check": False}
     # How many points is no input: more may be added to those that are there.
     keep_inputs(tmp_path, attrs.evolve(plan, count=99).texts())
     assert same_inputs(tmp_path, plan.texts())

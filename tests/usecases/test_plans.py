@@ -6,7 +6,6 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import Unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.placement.settings import PRINTED, RULES
 from mu_addon.run import progress
 from mu_addon.usecases.simulate_and_place import job as study
 from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work
@@ -70,7 +69,6 @@ def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
 @pytest.mark.parametrize(("printed", "suction"), [(False, 1.0), (True, TOUCHING)])
 def test_suction_takes_longest_where_walls_touch(printed, suction):
     mesh = MeshSettings(fidelity="resolved" if printed else "homogenised")
-    rules = (PRINTED,) if printed else RULES
-    job = study.Job(Unit(), study.grasp(), mesh, rules=rules, self_contact=printed)
+    job = study.Job(Unit(), study.grasp(), mesh, self_contact=printed)
     assert [work(job, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
     assert work(job, np.unique(job.samples[1])) == suction + max(suction / 4.0, 1.0) + 4

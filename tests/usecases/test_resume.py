@@ -65,7 +65,7 @@ def jobs(folder):
         [simulate.mesh]
         refine = 0.4
         [place]
-        rules = ["intersect"]
+        stations = 11
         [vary]
         chambers.wall_mm = { low = 0.8, high = 1.2, log = true }
         "simulate.protocol" = { values = ["more.csv"] }
@@ -89,7 +89,6 @@ def jobs(folder):
         (Cube(10.0, 1 / 3),),
         Grip(friction=0.3),
         mesh=MeshSettings(refine=0.4),
-        rules=(),
     )
     yield diagnose.Job(paper)
     yield diagnose.Job(paper, load_preset("mu-1.5x"))

@@ -30,7 +30,6 @@ JOB = Job(
     mesh=MeshSettings(refine=0.4, order=1),
     times=3,
     stations=11,
-    rules=("volume_fraction",),
     mesh_check=False,
     workers=1,
 )
@@ -331,7 +330,7 @@ def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its
         mesh_check=False,
         workers=1,
     )
-    by_start = ran(job, tmp_path / "starts")["J_hat_mm"]["printed"]
+    by_start = ran(job, tmp_path / "starts")["J_hat_mm"]
     monkeypatch.setattr("mu_addon.resolved.candidates._near", lambda *_: None)
     asked = []
     states = PrintedWaveguides.states
@@ -341,7 +340,7 @@ def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its
         return states(self, number, way)
 
     monkeypatch.setattr(PrintedWaveguides, "states", spied)
-    from_rest = ran(job, tmp_path / "paths")["J_hat_mm"]["printed"]
+    from_rest = ran(job, tmp_path / "paths")["J_hat_mm"]
     assert asked == [[1.0, 2.0, 3.0]]
     assert len(sorted((tmp_path / "paths" / "cache").glob("sweep-*"))) == 3
     assert from_rest == {name: pytest.approx(value, rel=1e-4) for name, value in by_start.items()}

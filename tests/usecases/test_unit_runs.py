@@ -19,8 +19,8 @@ COARSE = attrs.evolve(FULL, mesh=MeshSettings(refine=0.5, fidelity="resolved"))
 MOTION = attrs.evolve(FULL, stages=("design", "simulate"))
 SHORT = {"status": "complete", "angle_deg": {"-20": -3.0, "40": 6.0}, "seconds": {"Model A": 40.0}}
 RANKED = SHORT | {
-    "chosen": {"printed": "alpha4"},
-    "J_hat_mm": {"printed": {"alpha4": 0.05, "alpha10": 0.4}},
+    "chosen": "alpha4",
+    "J_hat_mm": {"alpha4": 0.05, "alpha10": 0.4},
     "seconds": {"Model A": 100.0, "candidates": 380.0},
 }
 
@@ -101,7 +101,7 @@ def test_going_back_to_a_parameter_finds_its_run_again(tmp_path):
         ({"status": "cancelled", "angle_deg": {"-40": 9.0}, "solver": {}}, "cancelled; motion complete"),
         ({"status": "partial", "reason": {"what": "stopped by Ctrl-C"}}, "cancelled; no motion yet"),
         (
-            {"status": "partial", "reason": {"what": "no equilibrium"}, "solver": {}, "chosen": {}},
+            {"status": "partial", "reason": {"what": "no equilibrium"}, "solver": {}, "chosen": "alpha4"},
             "stopped: no equilibrium; ranking complete",
         ),
         # Nobody works in its folder: it was killed.
@@ -232,4 +232,4 @@ def test_runs_side_by_side(tmp_path):
     assert rows["Its deviation"].values == ("0.0500", "-")
     assert rows["Time taken"].values == ("480", "40")
     # What they share is not listed.
-    assert {"scale", "cell", "mesh, order", "protocol", "paths", "rules"}.isdisjoint(rows)
+    assert {"scale", "cell", "mesh, order", "protocol", "paths"}.isdisjoint(rows)

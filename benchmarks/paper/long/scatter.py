@@ -15,9 +15,9 @@ from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError, MuError
 from mu_addon.meshing.mesh import Mesh
-from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key
 
+from ..inclusion_rules import RULES
 from ..table.agreement import spearman
 from ..table.table_column import ENDS_KPA, motion, paths
 from .unstructured import Recipe, unstructured_mesh

@@ -12,7 +12,6 @@ import numpy as np
 
 from mu_addon.design.parameters import Unit
 from mu_addon.files import write_csv
-from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.run.pool import each
@@ -21,6 +20,7 @@ from mu_addon.run.usecase import UseCase
 from mu_addon.run.versions import package_versions
 from mu_addon.usecases.simulate_and_place.job import grasp
 
+from ..inclusion_rules import RULES
 from . import gripper
 from .found import Found, OtherTableColumn
 from .published import Published, name_of, published

@@ -23,8 +23,9 @@ from mu_addon.meshing.mesh import Mesh
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, roi
 from mu_addon.placement.deviation import Deviation, centreline, centreline_deviation
-from mu_addon.placement.inclusion import RULES, sensor_share
 from mu_addon.placement.sampling import polynomials
+
+from ..inclusion_rules import RULES, sensor_share
 
 Array = np.ndarray[Any, Any]
 

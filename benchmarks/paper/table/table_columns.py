@@ -14,9 +14,9 @@ from mu_addon.errors import ConvergenceError
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.deviation import Deviation, deviation_of
-from mu_addon.placement.inclusion import RULES
 from mu_addon.run.cache import Cache, key
 
+from ..inclusion_rules import RULES
 from .table_column import SOLVED_KPA, STATIONS, motion, paths, with_fixed_base
 
 Array = np.ndarray[Any, Any]

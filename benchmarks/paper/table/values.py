@@ -13,8 +13,10 @@ from mu_addon.design.parameters import Unit
 from mu_addon.fem.protocol import Protocol
 from mu_addon.usecases.parameter_study.variable import Inputs, changed_inputs
 
+from ..inclusion_rules import VOLUME_FRACTION
+
 # The rule that keeps the sensor's volume: what the other gives is its mesh's.
-RULE = "volume_fraction"
+RULE = VOLUME_FRACTION
 _REST = Protocol(np.array([0.0, 1.0]), np.array([0.0, 1.0]))
 
 

@@ -100,11 +100,6 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
             items=[
                 ("quick", "Grasp, Quick Look", "A coarser mesh and longer steps"),
                 ("full", "Grasp", "The grasp on the default mesh"),
-                (
-                    "paths",
-                    "Grasp and Sensor Paths",
-                    "Also rank every sensor path in a finger that grasps",
-                ),
                 ("part", "Part to Print", "Only the printable part as STL and 3MF"),
             ],
         ),

@@ -58,7 +58,6 @@ def job_of(root: Any) -> Job:
         grip=grip if grasps else Grip(),
         mesh=detail.mesh,
         self_contact=props.self_contact,
-        rules=detail.rules if props.detail == "paths" else (),
     )
 
 

@@ -73,7 +73,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         ranking = found.ranking
         if ranking:
             best, j = ranking[0]
-            tied = (found.summary.get("tied_with_chosen") or {}).get(found.run.rule) or []
+            tied = found.summary.get("tied_with_chosen") or []
             icon = "CHECKMARK" if root.mu_unit.path == best else "NONE"
             column.label(text=f"Best path {path_symbol(best)}: deviates {j:.3f} mm", icon=icon)
             if tied:

@@ -19,7 +19,6 @@ from ...graph.evaluation import Finished, Order
 from ...homogenize.effective_file import Effective, read_effective
 from ...measured import Measured
 from ...meshing.settings import HOMOGENISED, MeshSettings
-from ...placement.settings import PRINTED, rules_of
 from ..check_print.job import Job as CheckJob
 from ..check_print.run import USE_CASE as CHECK
 from ..diagnose.job import Job as DiagnoseJob
@@ -95,7 +94,6 @@ def _placed(call: Call) -> Job:
     return attrs.evolve(
         study.job,
         stages=("design", "simulate", "place"),
-        rules=(PRINTED,) if study.job.mesh.resolved else rules_of(s["rule"]),
         stations=s["stations"],
         mesh_check=s["mesh_check"],
         paths=s["paths"],
@@ -133,13 +131,13 @@ def figure_of(call: Call) -> Outputs:
     summary, what = call.inputs["study"].summary, call.settings["figure"]
     angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
     volume = ((summary.get("gates") or {}).get("unit.stl") or {}).get("volume_mm3")
-    least = [min(by_path.values()) for by_path in (summary.get("J_hat_mm") or {}).values()]
+    by_path = summary.get("J_hat_mm")
     found = {
         "angle at the highest pressure": angles[max(angles)] if angles else None,
         "angle at the lowest pressure": angles[min(angles)] if angles else None,
         "range of angles": max(angles.values()) - min(angles.values()) if angles else None,
         "volume of resin": volume,
-        "least deviation": min(least) if least else None,
+        "least deviation": min(by_path.values()) if by_path else None,
     }[what]
     if found is None:
         raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
@@ -213,7 +211,6 @@ def grip_order(call: Call) -> Order:
         grip=detail.grip(friction=s["friction"]),
         mesh=detail.mesh,
         self_contact=detail.mesh.resolved and s["self_contact"],
-        rules=detail.rules if s["rank_paths"] else (),
     )
     return Order(GRIP, job)
 

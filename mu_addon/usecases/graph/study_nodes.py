@@ -9,7 +9,6 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION, PRINTER, QUALITY
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ...placement.settings import RULE
 from ..export import settings as export
 from ..grip.settings import COARSE, CUBES, DENSITY
 from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
@@ -50,8 +49,8 @@ def _study_remark(outputs: Outputs) -> str:
     summary = outputs["study"].summary
     angles = {float(p): a for p, a in (summary.get("angle_deg") or {}).items()}
     words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
-    chosen = summary.get("chosen") or {}
-    return ", ".join([*dict.fromkeys(chosen.values()), *words])
+    chosen = summary.get("chosen")
+    return ", ".join([*([chosen] if chosen else []), *words])
 
 
 def _grasp_remark(outputs: Outputs) -> str:
@@ -122,7 +121,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "sensor paths, ranked by how much each disturbs the motion",
             (_TAKES_STUDY,),
             (Output("study", "study", "motion and ranking"),),
-            (*(Setting(d) for d in (RULE, STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),),
+            (*(Setting(d) for d in (STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),),
             order=of_orders("place_order"),
             read=of_orders("study_of"),
             muting="the study passes on without a ranking",
@@ -232,7 +231,6 @@ def study_nodes() -> tuple[Definition, ...]:
             (Output("grasp", "grasp", "the grasp"),),
             (
                 *(Setting(d) for d in (CUBES, DENSITY, FRICTION, COARSE)),
-                setting("rank_paths", True, "rank the paths of a finger's sensor"),
                 FIDELITY,
                 SELF_CONTACT,
             ),

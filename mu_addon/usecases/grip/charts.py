@@ -14,7 +14,6 @@ from ...report.render import Camera, Cut, Part, fit, png, render
 from ...report.results import Picture
 from ...report.unit_pictures import COLORS, WHITE, skins_of, unit_parts
 from .grasp import Grasp
-from .path_deviation import PathDeviations
 
 Array = np.ndarray[Any, Any]
 
@@ -169,21 +168,4 @@ def shapes(gripper: Gripper, grasps: Mapping[float, Grasp]) -> str:
         axes.invert_yaxis()
         axes.set(xlabel="y [mm]", ylabel="z, down [mm]")
         axes.legend(loc="upper center", fontsize=7)
-    return svg()
-
-
-def against_paper(columns: Sequence[PathDeviations], printed: Mapping[str, float]) -> str:
-    """Ours against the paper's deviation of each path, a mark a path, as SVG text."""
-    with plots.canvas(plots.WIDTH, 3.2) as (figure, svg):
-        axes = figure.add_axes((0.15, 0.15, 0.81, 0.80))
-        for color, mark, one in zip(OF_CUBE, "os^v", columns, strict=False):
-            names = [name for name in one.J_hat_mm if name in printed]
-            x, y = [printed[n] for n in names], [one.J_hat_mm[n] for n in names]
-            on = "nothing" if one.cube is None else f"{one.cube.side_mm:g} mm"
-            axes.plot(x, y, mark, color=color, markersize=5, label=f"on {on}")
-            if one is columns[0]:
-                for name, a, b in zip(names, x, y, strict=True):
-                    axes.annotate(plots.label(name), (a, b), (4, 4), textcoords="offset points", fontsize=7)
-        axes.set(xlabel="the paper's Ĵ, gripper [mm]", ylabel="Ĵ here [mm]", xlim=(0, None), ylim=(0, None))
-        axes.legend(loc="upper left")
     return svg()

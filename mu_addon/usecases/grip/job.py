@@ -12,7 +12,6 @@ from ...design.parameters import to_toml as unit_toml
 from ...design.settings import QUALITY
 from ...errors import InputError
 from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
-from ...placement.settings import PRINTED, RULES
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.progress_estimate import Plan
@@ -25,8 +24,6 @@ from .settings import COARSE_REFINE, REFINE, SIDES
 
 PRINTED_PACE = 3.0
 """Factor on the seconds of a grasp by printed struts."""
-OF_NOTHING, OF_CUBE = 0.5, 1.6
-"""Seconds of a ranking of paths, of a finger that closes on nothing and on a cube, over those of a grasp."""
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
     "grip.toml",
@@ -36,7 +33,6 @@ LAYOUT = FolderLayout(
         "gripper.3mf",
         "grasp_*.csv",
         "pull_*.csv",
-        "deviation.csv",
         "cube-*",
         "gripper.png",
         "frame_*.png",
@@ -47,10 +43,9 @@ LAYOUT = FolderLayout(
 
 @attrs.frozen
 class Detail:
-    """Detail of a grasp: mesh, inclusion rules and the longest time between instants."""
+    """Detail of a grasp: mesh and the longest time between instants."""
 
     mesh: MeshSettings
-    rules: tuple[str, ...]
     step_s: float
 
     def grip(self, **values: Any) -> Grip:
@@ -62,15 +57,14 @@ def detailed(coarse: bool, fidelity: str, refine: float | None = None) -> Detail
     """Detail of a quick look, or of a whole run; refine: replaces its refinement."""
     own = COARSE_REFINE if coarse else REFINE.default
     mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity)
-    rules = (PRINTED,) if mesh.resolved else ("volume_fraction",) if coarse else RULES
-    return Detail(mesh, rules, 1.0 if coarse else 0.5)
+    return Detail(mesh, 1.0 if coarse else 0.5)
 
 
 @attrs.frozen
 class Job:
-    """Inputs of a run. cubes: without any, no grasp; rules: without any, no table of paths.
+    """Inputs of a run. cubes: without any, no grasp; self_contact: of a printed finger's walls and struts.
 
-    self_contact: of a resolved finger's walls and struts. Raises InputError.
+    Raises InputError.
     """
 
     gripper: Gripper
@@ -78,20 +72,12 @@ class Job:
     grip: Grip = attrs.field(factory=Grip)
     phases: Phases = attrs.field(factory=shipped_phases)
     mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE.default))
-    rules: tuple[str, ...] = RULES
     quality: str = QUALITY.field()
     optics: Optics = attrs.field(factory=Optics)
     self_contact: bool = SELF_CONTACT._replace(default=False).field()
 
     def __attrs_post_init__(self) -> None:
         require_self_contact_resolvable(self.mesh, self.self_contact)
-        offered = (PRINTED,) if self.mesh.resolved else RULES
-        if any(rule not in offered for rule in self.rules):
-            raise InputError(
-                f"the rules of a {self.mesh.fidelity} finger are {', '.join(self.rules)}",
-                "rules, fidelity",
-                f"give some of {', '.join(offered)}",
-            )
         self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
@@ -111,7 +97,6 @@ class Job:
             "format": FORMAT,
             "quality": self.quality,
             "cubes": [attrs.asdict(cube) for cube in self.cubes],
-            "rules": self.rules,
             "grip": attrs.asdict(self.grip),
             "mesh": self.mesh.table(),
             "optics": attrs.asdict(self.optics),
@@ -141,10 +126,7 @@ def plan_of(job: Job) -> Plan:
     if job.mesh.resolved:
         seconds *= PRINTED_PACE
     sides = [cube.side_mm for cube in job.cubes]
-    plan = [("solid", 5.0), *([("mesh", 5.0 * finer)] if sides or job.rules else [])]
+    plan = [("solid", 5.0), *([("mesh", 5.0 * finer)] if sides else [])]
     plan += [(f"grasp of {side:g} mm", seconds) for side in sides]
     plan += [("light", 4.0 * len(sides) / job.grip.step_s)] if sides else []
-    for rule in job.rules:
-        plan.append((f"paths, {rule}, on nothing", OF_NOTHING * seconds))
-        plan += [(f"paths, {rule}, on {side:g} mm", OF_CUBE * seconds) for side in sides[-1:]]
     return [*plan, ("report", 6.0 if sides else 3.0)]

@@ -15,7 +15,6 @@ from ...report.html import cards, facts_table, figure, note, page, picture_figur
 from ...report.results import Picture
 from ...run.versions import package_versions
 from . import charts as pictures
-from .path_deviation import published_deviations
 from .phases import MEANING
 from .stages import Gripping
 
@@ -28,7 +27,6 @@ FILES = {
     "grasp_SIDE.csv": "time series of the grasp of a cube",
     "pull_SIDE.csv": "friction capacity against displacement of the cube",
     "cube-SIDE": "its motion: finger.pvd (ParaView), motion/, gripper.npz, left.pc2, right.pc2 (Blender)",
-    "deviation.csv": "deviation of every sensor path",
     "summary.json": "all results of this run as numbers",
     "log.ndjson": "log of this run",
 }
@@ -72,7 +70,6 @@ def report(
         ("force", "Forces", _forces(run)),
         ("lift", "Lifting", _lift(run)),
         ("light", "Waveguide signal", _light(run)),
-        ("paths", "Sensor paths of the closing finger", _paths(run)),
         ("assumed", "Assumptions", _assumed(run)),
         ("files", "Files of this run", facts_table("file", "content", FILES)),
         ("versions", "Versions", facts_table("program", "version", versions)),
@@ -200,46 +197,6 @@ def _light(run: Gripping) -> str:
     )
     return f"<p>{escape(words)}</p><p>{escape(about)}</p>" + figure(
         chart, "", "light over the phases", "chart"
-    )
-
-
-def _paths(run: Gripping) -> str:
-    if not run.columns:
-        return ""
-    printed = published_deviations()
-    names = list(run.columns[0].J_hat_mm)
-    head = [("path", ""), ("paper", "n")]
-    groups = [("", 2)]
-    for rule in dict.fromkeys(c.rule for c in run.columns):
-        own = [c for c in run.columns if c.rule == rule]
-        groups.append((rule, len(own)))
-        head += [("free" if c.cube is None else f"on {c.cube.side_mm:g} mm", "n") for c in own]
-    rows = [
-        (
-            [label(name), f"{printed[name]:.3f}" if name in printed else ""]
-            + [f"{c.J_hat_mm[name]:.3f}" for c in run.columns],
-            False,
-        )
-        for name in names
-    ]
-    best = min(printed, key=lambda name: printed[name])
-    rows.append((["least", label(best), *(label(c.chosen) for c in run.columns)], True))
-    rows.append(
-        (["rank correlation", "", *(f"{c.rank_correlation(printed):.2f}" for c in run.columns)], True)
-    )
-    rules = [c.rule for c in run.columns]
-    headline = "volume_fraction" if "volume_fraction" in rules else rules[0]
-    chart = pictures.against_paper([c for c in run.columns if c.rule == headline], printed)
-    words = (
-        "Mean deviation in mm of the backbone from that of a finger without a sensor, through the grasp "
-        "protocol (13 samples, −20 to 40 kPa); contact without friction; each path is simulated separately."
-    )
-    caption = f"Inclusion rule {headline}."
-    return (
-        f"<p>{escape(words)}</p>{figure(chart, caption, 'deviation here against the paper', 'chart')}"
-        + table(
-            "J in mm, and Spearman's rank correlation with the paper's gripper column", head, rows, groups
-        )
     )
 
 

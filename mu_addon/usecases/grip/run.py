@@ -1,4 +1,4 @@
-"""`grip`: a gripper's printable part, its grasp of cubes, its light and its sensor paths."""
+"""`grip`: a gripper's printable part, its grasp of cubes and its light."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .stages import Gripping
 
 
 def grip(job: Job, folder: Path, context: RunContext) -> Gripping:
-    """Design a gripper, close it on cubes, trace its light, rank its paths, and report finished stages."""
+    """Design a gripper, close it on cubes, trace its light, and report finished stages."""
     run = Gripping(job, folder, context)
     context.report = lambda stopped: write_report(run, stopped)
     run.run()
@@ -30,14 +30,8 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
             f"cube of {side} mm: {g['angle_at_hold_deg']:.1f} deg and {g['normal_at_hold_N']:.3g} N a finger "
             f"at the plateau, {hung}"
         )
-    for rule, found in summary.get("J_hat_mm", {}).items():
-        for on, one in found.items():
-            lines.append(
-                f"paths ({rule}, on {on}): {one['chosen']} has the smallest deviation, rank correlation with "
-                f"the paper's column {one['rank_correlation_with_paper']:.2f}"
-            )
     return lines
 
 
-KEPT = ("grasp of", "paths")
+KEPT = ("grasp of",)
 USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of, kept=KEPT)

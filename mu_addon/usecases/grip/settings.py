@@ -9,7 +9,7 @@ REFINE, COARSE_REFINE = REFINEMENT._replace(default=0.5), 0.4
 CUBES = described(
     "cubes_mm",
     "12.5 25",
-    "side lengths in mm of the cubes to grasp; the sensor paths are ranked with the last one",
+    "side lengths in mm of the cubes to grasp",
 )
 SIDES = tuple(map(float, CUBES.default.split()))
 DENSITY = described(
@@ -23,6 +23,4 @@ BEYOND = described(
     low=-50.0,
     high=50.0,
 )
-COARSE = described(
-    "coarse", False, "quick, less accurate run: coarser mesh, longer time steps, one inclusion rule"
-)
+COARSE = described("coarse", False, "quick, less accurate run: coarser mesh, longer time steps")

@@ -1,4 +1,4 @@
-"""Stages of a gripper: its printable part, its grasp of cubes, its light and its sensor paths."""
+"""Stages of a gripper: its printable part, its grasp of cubes and its light."""
 
 from __future__ import annotations
 
@@ -31,7 +31,6 @@ from ..simulate_and_place.job import in_time_newton
 from .grasp import Cube, Grasp, Lift, grasp
 from .job import Job
 from .motion_files import write_grasp
-from .path_deviation import PathDeviations, path_deviations, published_deviations
 from .phases import MEANING
 
 Array = np.ndarray[Any, Any]
@@ -51,7 +50,6 @@ class Gripping:
     mesh: Mesh | None = None
     grasps: dict[float, Grasp] = attrs.field(factory=dict)
     signals: dict[float, Signal] = attrs.field(factory=dict)
-    columns: list[PathDeviations] = attrs.field(factory=list)
     warnings: list[str] = attrs.field(factory=list)
 
     @property
@@ -76,18 +74,12 @@ class Gripping:
             "grip": attrs.asdict(self.job.grip),
         }
         self.design()
-        if self.job.cubes or self.job.rules:
+        if self.job.cubes:
             self.make_mesh()
         for cube in self.job.cubes:
             self.close_on(cube)
         if self.grasps:
             self.follow_light()
-        for rule in self.job.rules:
-            self.rank(rule, None)
-            for cube in self.job.cubes[-1:]:
-                self.rank(rule, cube)
-        if self.columns:
-            self._write_columns()
 
     def design(self) -> None:
         """Write the printable part as STL and 3MF, the latter read back."""
@@ -210,60 +202,6 @@ class Gripping:
                 "error_at_end_of": {name: float(error[k]) for name, k in ends.items()},
             }
         self.context.summary["light"] = light
-
-    def rank(self, rule: str, cube: Cube | None) -> None:
-        """Compute J_hat of every path's finger, closing on a cube or on nothing."""
-        assert self.mesh is not None
-        on = "nothing" if cube is None else f"{cube.side_mm:g} mm"
-
-        def entry(name: str) -> str:
-            about = None if cube is None else cube.side_mm
-            # Model A is the same under every rule.
-            return self._key("column", about, "" if name == "model_a" else rule, name)
-
-        def load(name: str) -> Array | None:
-            found = self.cache.get("moved", entry(name))
-            return None if found is None else found["points_mm"]
-
-        def store(name: str, moved: Array) -> None:
-            self.cache.put("moved", entry(name), {"points_mm": moved})
-
-        with self.progress.stage(f"paths, {rule}, on {on}"):
-            found = path_deviations(
-                self.job.gripper,
-                self.mesh,
-                self.materials,
-                rule,
-                cube,
-                self.job.grip,
-                self_contact=self.job.self_contact,
-                load=load,
-                store=store,
-                on_path=self.progress.update,
-            )
-        self.columns.append(found)
-        table = self.context.summary.setdefault("J_hat_mm", {})
-        table.setdefault(rule, {})[on] = {
-            "J_hat_mm": found.J_hat_mm,
-            "chosen": found.chosen,
-            "rank_correlation_with_paper": found.rank_correlation(published_deviations()),
-        }
-
-    def _write_columns(self) -> None:
-        printed = published_deviations()
-        rows = [
-            (
-                name,
-                c.rule,
-                "" if c.cube is None else f"{c.cube.side_mm:g}",
-                f"{value:.9g}",
-                printed.get(name, ""),
-            )
-            for c in self.columns
-            for name, value in c.J_hat_mm.items()
-        ]
-        columns = ["path", "rule", "cube_mm", "J_hat_mm", "paper_gripper_mm"]
-        write_csv(self.folder / "deviation.csv", columns, rows)
 
     def warn(self, text: str) -> None:
         """Warn the user, now and in the report."""

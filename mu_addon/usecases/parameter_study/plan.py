@@ -247,7 +247,7 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
 def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     """The document with the fidelity that its studies have where it names none.
 
-    A file that names a mesher, varies the order of its elements or has rules of inclusion needs a continuum.
+    A file that names a mesher or varies the order of its elements needs a continuum.
     """
     simulate, place, vary = (document.get(name, {}) for name in ("simulate", "place", "vary"))
     # What is no table is refused later, by name.
@@ -259,7 +259,7 @@ def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     varied = _flat(vary)
     if "simulate.mesh.fidelity" in varied:
         return document
-    others = "simulate.mesh.order" in varied, "mesher" in simulate, "rules" in place
+    others = "simulate.mesh.order" in varied, "mesher" in simulate
     fidelity, apart = fidelity_where_none_is_named(mesh.get("order"), varied, *others)
     kept_apart = {"self_contact": apart} if apart else {}
     return document | {"simulate": kept_apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}

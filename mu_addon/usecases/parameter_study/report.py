@@ -20,7 +20,7 @@ from .results import Found
 Array = np.ndarray[Any, Any]
 
 # Figures whose effects are shown by default.
-USUAL = ("angle_range_deg", "mass_g", "J_hat_mm volume_fraction", "J_hat_mm intersect", "J_hat_mm lattice")
+USUAL = ("angle_range_deg", "mass_g", "J_hat_mm", "J_hat_mm lattice")
 # Fewer points say nothing about an effect.
 FEWEST = 4
 MOST_ROWS = 200

@@ -30,13 +30,12 @@ def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
         found |= {f"angle_deg at {p:g} kPa": angles[p] for p in sorted(angles) if p}
         crossed = summary.get("walls_cross_at_kPa") or {}
         found["walls_cross_at_kPa"] = " ".join(sorted(crossed, key=float))
-    for rule, name in (summary.get("chosen") or {}).items():
-        found[f"chosen {rule}"] = name
-        found[f"J_hat_mm {rule}"] = summary["J_hat_mm"][rule][name]
-        found[f"tied {rule}"] = " ".join(summary["tied_with_chosen"][rule])
-    best = (summary.get("search") or {}).get("best")
-    if best:
-        found |= {"J_hat_mm lattice": best["J_hat_mm"], "length_mm lattice": best["length_mm"]}
+    if best := summary.get("chosen"):
+        found["chosen"] = best
+        found["J_hat_mm"] = summary["J_hat_mm"][best]
+        found["tied"] = " ".join(summary["tied_with_chosen"])
+    if of_lattice := (summary.get("search") or {}).get("best"):
+        found |= {"J_hat_mm lattice": of_lattice["J_hat_mm"], "length_mm lattice": of_lattice["length_mm"]}
     return found
 
 

@@ -18,7 +18,6 @@ from ...fem.state import State
 from ...meshing.mesh import Mesh
 from ...placement.batch import CandidateBatch
 from ...placement.candidates import Candidate, roi
-from ...placement.inclusion import sensor_share
 from ...resolved.candidates import PrintedWaveguides
 from ...run.pool import Pool
 
@@ -32,18 +31,17 @@ Array = np.ndarray[Any, Any]
 class CandidateProblem:
     """Candidates of a study to be solved; plain data, so that it can be sent to another process.
 
-    jobs: candidates and the inclusion rule of each; anchors (p, 3) in mm are the monitored points. whole:
-    numbers of the jobs whose displacement of the whole mesh is also kept. study: with the unit's effects and
-    obstacles; without it only pressure acts.
+    jobs: the candidates; anchors (p, 3) in mm are the monitored points. whole: the displacement of the whole
+    mesh is also kept. study: with the unit's effects and obstacles; without it only pressure acts.
     """
 
     mesh: Mesh
     materials: Materials
     anchors: Array
-    jobs: tuple[tuple[Candidate, str], ...]
+    jobs: tuple[Candidate, ...]
     radius_mm: float
     sensor_MPa: float
-    whole: tuple[int, ...] = ()
+    whole: bool = False
     study: Job | None = None
 
     @property
@@ -52,15 +50,11 @@ class CandidateProblem:
         every = tuple(range(len(self.jobs)))
         return tuple((job,) for job in every) if self.mesh.resolved else (every,)
 
-    def whole_of(self, part: int) -> tuple[int, ...]:
-        """Numbers of a part's jobs whose displacement of the whole mesh is also kept."""
-        return tuple(job for job in self.whole if job in self.parts[part])
-
 
 class Moved(NamedTuple):
-    """Results of a part's jobs at a state: anchors (jobs, p, 3) in mm, and the `whole` ones' differences.
+    """Results of a part's jobs at a state: anchors (jobs, p, 3) in mm, and differences of the whole mesh.
 
-    whole: displacements (w, n, 3) in mm against Model A's, single precision.
+    whole: displacements (w, n, 3) in mm against Model A's, single precision; w: as many as jobs, or 0.
     """
 
     anchors: Array
@@ -76,7 +70,7 @@ class PrintedEvaluator:
         self._candidates = PrintedWaveguides(
             job.unit,
             setting.mesh,
-            tuple(candidate.points for candidate, _ in setting.jobs),
+            tuple(candidate.points for candidate in setting.jobs),
             setting.anchors,
             job.materials,
             lambda mesh: job.model(mesh, threads),
@@ -95,7 +89,7 @@ class PrintedEvaluator:
         found = []
         states = self._candidates.states(job, way)
         for state, own in zip(way[-len(states) :], states, strict=True):
-            whole = [self._candidates.of_unit(job, own) - state.u] if self._setting.whole_of(part) else []
+            whole = [self._candidates.of_unit(job, own) - state.u] if self._setting.whole else []
             shape = -1, *state.u.shape
             found.append(Moved(self._candidates.points([own]), np.array(whole, np.float32).reshape(shape)))
         return found
@@ -119,8 +113,7 @@ class Evaluator:
 
     def __init__(self, setting: CandidateProblem, threads: int) -> None:
         s = setting
-        found = {c.name: roi(s.mesh, c, s.radius_mm) for c, _ in s.jobs}
-        shares = [sensor_share(rule, found[c.name]) for c, rule in s.jobs]
+        shares = [roi(s.mesh, one, s.radius_mm).share for one in s.jobs]
         monitored = s.anchors, probe(s.mesh, s.anchors)
         model = Model(s.mesh, threads=threads) if s.study is None else s.study.model(s.mesh, threads)
         newton = None if s.study is None else s.study.effects.newton
@@ -131,7 +124,7 @@ class Evaluator:
         """Results of all jobs, in one part, at the last of some states of Model A. ConvergenceError."""
         state = way[-1]
         states = self._sweep.states(state)
-        apart = [(states[job].u - state.u).astype(np.float32) for job in self._whole]
+        apart = [(own.u - state.u).astype(np.float32) for own in states if self._whole]
         whole = np.array(apart, np.float32).reshape(-1, *state.u.shape)
         return [Moved(self._sweep.points(states), whole)]
 

@@ -48,11 +48,11 @@ class _NotReachedError(Exception):
 
 
 class CandidateSolver:
-    """Candidates, each under an inclusion rule, through a protocol's distinct pressures (s,) in kPa.
+    """Candidates through a protocol's distinct pressures (s,) in kPa.
 
-    Solutions are kept in the cache. Close it, also when Model A failed. whole: rule whose candidates'
-    displacements of the whole mesh are also kept, for display. A pressure that one candidate does not reach,
-    and those beyond it, are compared for none: `not_reached` says which, and why.
+    Solutions are kept in the cache. Close it, also when Model A failed. whole: displacements of the whole
+    mesh are also kept, for display. A pressure that one candidate does not reach, and those beyond it, are
+    compared for none: `not_reached` says which, and why.
     """
 
     def __init__(
@@ -60,21 +60,18 @@ class CandidateSolver:
         job: Job,
         cache: Cache,
         mesh: Mesh,
-        jobs: list[tuple[Candidate, str]],
+        jobs: Sequence[Candidate],
         pressure_kPa: Array,
-        whole: str = "",
+        whole: bool = False,
     ) -> None:
         self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
         unit = job.unit
         self._anchors = anchor_points(unit)
-        self._radius = unit.dimensions.inclusion_radius
+        radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_MPa
         materials = job.materials(mesh)
-        kept_whole = tuple(i for i, (_, rule) in enumerate(jobs) if rule == whole)
         self._sweeper = CandidatePool(
-            CandidateProblem(
-                mesh, materials, self._anchors, tuple(jobs), self._radius, sensor, kept_whole, job
-            ),
+            CandidateProblem(mesh, materials, self._anchors, tuple(jobs), radius, sensor, whole, job),
             job.workers,
         )
         self._key = key(
@@ -83,8 +80,8 @@ class CandidateSolver:
             pressure_kPa,
             job.newton,
             self._anchors,
-            *(part for candidate, rule in jobs for part in (candidate.points, rule)),
-            self._radius,
+            *(candidate.points for candidate in jobs),
+            radius,
             sensor,
             *job.effects.parts,
         )
@@ -132,7 +129,7 @@ class CandidateSolver:
 
     def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
         """Keep the results of a part's jobs at the last of some states of Model A, and on the way there."""
-        whole = self._sweeper.setting.whole_of(part)
+        whole = self._sweeper.setting.whole
         with self._keeping:
             for state, moved in zip(way[-len(found) :], found, strict=True):
                 if self._is_kept(state, part):
@@ -148,7 +145,7 @@ class CandidateSolver:
 
     def _is_kept(self, state: State, part: int) -> bool:
         """Return True if the cache holds all results of a part's jobs at a state."""
-        kinds = ("sweep", "whole") if self._sweeper.setting.whole_of(part) else ("sweep",)
+        kinds = ("sweep", "whole") if self._sweeper.setting.whole else ("sweep",)
         return all(self._cache.has(kind, self._name(state, part)) for kind in kinds)
 
     def evaluations(
@@ -175,8 +172,8 @@ class CandidateSolver:
         baseline = trajectory.of_time(still)
         moved = baseline[:, None] + trajectory.of_time(difference)
         return [
-            evaluation(self._mesh, candidate, rule, self._radius, moved[:, i], baseline, self._job.stations)
-            for i, (candidate, rule) in enumerate(self._jobs)
+            evaluation(candidate.name, moved[:, i], baseline, self._job.stations)
+            for i, candidate in enumerate(self._jobs)
         ]
 
     def _leave_out(self, missed: _NotReachedError, distinct: Array, compared: Array) -> None:
@@ -264,7 +261,7 @@ class CandidateSolver:
     def _missed(self, pressure_MPa: float, job: int) -> NoReturn:
         """Say that a job, followed from rest, does not reach a pressure."""
         why = f"no equilibrium at {in_kPa(pressure_MPa):.4g} kPa on its path from rest"
-        raise _NotReachedError(float(pressure_MPa), self._jobs[job][0].name, why)
+        raise _NotReachedError(float(pressure_MPa), self._jobs[job].name, why)
 
     def _along_paths(
         self, distinct: Array, still: Array, compared: Array, before: dict[int, Array]
@@ -317,7 +314,7 @@ class CandidateSolver:
         for task, found in self._sweeper.solve(tasks):
             row, part = missing[task]
             if isinstance(found, ConvergenceError):
-                paths = {self._jobs[job][0].name for job in setting.parts[part]}
+                paths = {self._jobs[job].name for job in setting.parts[part]}
                 path = paths.pop() if len(paths) == 1 else "one of the paths"
                 raise _NotReachedError(trajectory.solved[numbers[row]].pressure_MPa, path, found.what)
             self._keep(ways[row], part, found)
@@ -341,9 +338,9 @@ class CandidateSolver:
         for part in self._parts:
             kept = [self._cache.get("whole", self._name(s, part)) for s in states]
             found = [arrays["difference_mm"] for arrays in kept if arrays is not None]
-            for row, job in enumerate(setting.whole_of(part) if found and len(found) == len(kept) else ()):
+            for row, job in enumerate(setting.parts[part] if found and len(found) == len(kept) else ()):
                 pressures = np.array([s.pressure_kPa for s in states])
-                yield self._jobs[job][0].name, pressures, np.array([d[row] for d in found])
+                yield self._jobs[job].name, pressures, np.array([d[row] for d in found])
 
     def close(self) -> None:
         """End the processes."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any
 
@@ -28,10 +28,10 @@ def evaluations(
     cache: Cache,
     mesh: Mesh,
     trajectory: Trajectory,
-    jobs: list[tuple[Candidate, str]],
+    candidates: Sequence[Candidate],
     on_progress: Callable[[float], None],
 ) -> tuple[list[Evaluation], list[str]]:
-    """Evaluation of every candidate, each under an inclusion rule, against Model A's motion.
+    """Evaluation of every candidate against Model A's motion.
 
     It compares the instants until the first that a candidate does not reach; also says which those are.
 
@@ -42,7 +42,7 @@ def evaluations(
     points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
-    setting = CandidateProblem(mesh, materials, points, tuple(jobs), radius, sensor, study=job)
+    setting = CandidateProblem(mesh, materials, points, tuple(candidates), radius, sensor, study=job)
     friction = [o.friction for o in job.obstacles]
     if job.self_friction:
         friction.append(job.self_friction)
@@ -57,35 +57,33 @@ def evaluations(
             job.obstacles_text() or "",
             points,
             candidate.points,
-            rule,
             radius,
             sensor,
             *job.effects.parts,
         )
-        for candidate, rule in jobs
+        for candidate in candidates
     ]
     kept = {n: cache.get("march", name) for n, name in enumerate(names)}
     moved = {n: arrays["moved_mm"] for n, arrays in kept.items() if arrays is not None}
     with closing(CandidatePool(setting, job.workers)) as sweeper:
-        missing = [n for n in range(len(jobs)) if n not in moved]
+        missing = [n for n in range(len(candidates)) if n not in moved]
         for n, found in sweeper.simulated_in_time(missing, time, pressure):
             cache.put("march", names[n], {"moved_mm": found})
             moved[n] = found
-            on_progress(len(moved) / len(jobs))
+            on_progress(len(moved) / len(candidates))
     count = min(map(len, moved.values()))
     not_reached = []
     if count < len(time):
-        first = next(jobs[n][0].name for n in range(len(jobs)) if len(moved[n]) == count)
+        first = next(one.name for n, one in enumerate(candidates) if len(moved[n]) == count)
         not_reached = [f"from {time[count]:.6g} s on ({first}: no equilibrium at {pressure[count]:.4g} kPa)"]
         if not pressure[:count].any():
             raise ConvergenceError(f"not all paths are compared {not_reached[0]}", first, LOWER)
     monitor = probe(mesh, points)
     still = trajectory.of_time(np.array([points + monitor.displacement(s.u) for s in trajectory.solved]))
-    every = np.full((len(jobs), *still.shape), np.nan)
+    every = np.full((len(candidates), *still.shape), np.nan)
     for n in moved:
         every[n, :count] = moved[n][:count]
     compared = [
-        evaluation(mesh, candidate, rule, radius, every[n], still, job.stations)
-        for n, (candidate, rule) in enumerate(jobs)
+        evaluation(one.name, own, still, job.stations) for one, own in zip(candidates, every, strict=True)
     ]
     return compared, not_reached

@@ -26,7 +26,6 @@ _SETTINGS = (
     ("effects", "simulate", "effects"),
     ("orientation", "simulate", "orientation_deg"),
     ("paths", "place", "paths"),
-    ("rules", "place", "rules"),
     ("stations", "place", "stations"),
     ("mesh check", "place", "mesh_check"),
 )

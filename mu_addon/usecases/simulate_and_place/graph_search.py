@@ -30,7 +30,6 @@ from ...placement.sensitivity_map import (
     shares_of_time,
     stable_part,
 )
-from ...placement.settings import PRINTED
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
 from ...resolved.response import bar_response
@@ -125,18 +124,18 @@ def search_graph(study: Study) -> LatticeSearch:
     """
     assert study.mesh is not None
     assert study.trajectory is not None
-    job, rule = study.job, study.job.headline_rule
+    job = study.job
     graph, chains = chains_within(job)
     lengths = np.array([graph.lengths[graph.steps_of(c)].sum() for c in chains])
     with study.progress.stage("ranking of the lattice's paths"):
-        predicted = _predicted(study, graph, chains, rule)
+        predicted = _predicted(study, graph, chains)
     mesh, trajectory = whole_body(study.mesh, study.trajectory)
 
     def check(numbers: Array) -> Array:
         paths = {n: graph.nodes[list(chains[n])] for n in numbers.tolist()}
-        made = [n for n, points in paths.items() if rule != PRINTED or _is_printable(study, points)]
-        jobs = [(Candidate(f"path{n}", 0, paths[n]), rule) for n in made]
-        solved = study.solve_candidates(mesh, trajectory, jobs) if jobs else []
+        made = [n for n, points in paths.items() if not mesh.resolved or _is_printable(study, points)]
+        candidates = [Candidate(f"path{n}", 0, paths[n]) for n in made]
+        solved = study.solve_candidates(mesh, trajectory, candidates) if candidates else []
         found = dict(zip(made, (e.deviation.J_hat for e in solved), strict=True))
         return np.array([found.get(n, np.nan) for n in paths])
 
@@ -168,15 +167,14 @@ def search_graph(study: Study) -> LatticeSearch:
         for n in order.tolist()
     ]
     _write(study, every)
-    study.search = LatticeSearch(rule, every[: len(outcome.checked)], len(chains), outcome.risk)
+    study.search = LatticeSearch(every[: len(outcome.checked)], len(chains), outcome.risk)
     first = every[0]
     # A motion to look at is of a whole mesh, or of a half and its image.
     if study.mesh.symmetry in ((), ("x",)):
         with study.progress.stage("motion of the best path"):
             alone = Candidate(first.name, 0, first.points)
-            study.solve_candidates(mesh, trajectory, [(alone, rule)], to_look_at=True)
+            study.solve_candidates(mesh, trajectory, [alone], to_look_at=True)
     study.context.summary["search"] = {
-        "rule": rule,
         "paths": len(chains),
         "checked": len(outcome.checked),
         "risk_that_an_unchecked_one_is_better": outcome.risk,
@@ -200,14 +198,14 @@ def _is_printable(study: Study, points: Array) -> bool:
     return True
 
 
-def _response(study: Study, stable: Trajectory, graph: Graph, rule: str, monitor: Probe) -> Response:
+def _response(study: Study, stable: Trajectory, graph: Graph, monitor: Probe) -> Response:
     """The response that ranks paths: of bars between joints as printed, else of stiffened elements.
 
     stable: Model A's motion as far as it is.
     """
     assert study.mesh is not None
     job, unit = study.job, study.job.unit
-    if rule == PRINTED:
+    if study.mesh.resolved:
         mesh, trajectory = whole_body(study.mesh, stable)
         whole = probe(mesh, study.anchors)
         return bar_response(job.model(mesh), job.materials(mesh), unit.printed, trajectory, whole, graph)
@@ -218,12 +216,11 @@ def _response(study: Study, stable: Trajectory, graph: Graph, rule: str, monitor
         stable,
         monitor,
         graph,
-        rule,
         unit.dimensions.inclusion_radius,
     )
 
 
-def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: str) -> Array:
+def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]]) -> Array:
     """Predicted J_hat (n,) in mm of every chain."""
     assert study.mesh is not None
     monitor = probe(study.mesh, study.anchors)
@@ -235,7 +232,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]], rule: 
             "--paths graph",
             "simulate smaller pressures, or leave out --paths graph",
         )
-    found = _response(study, stable, graph, rule, monitor)
+    found = _response(study, stable, graph, monitor)
     pressures = np.array([s.pressure_MPa for s in loaded(stable)])
     gradients = gradients_of(stable, study.anchors, monitor, study.job.stations)
     shares = shares_of_time(stable)

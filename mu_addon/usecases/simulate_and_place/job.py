@@ -29,7 +29,6 @@ from ...fem.newton_settings import (
 from ...fem.protocol import Protocol, read_protocol
 from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
 from ...placement.graph import Limits
-from ...placement.settings import PRINTED, RULES
 from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock
@@ -50,13 +49,6 @@ GRASP = "protocols/grasp.csv"
 LATTICE_LAW = FILES["lattice"]
 
 
-def _rules(_: object, field: attrs.Attribute[Any], value: tuple[str, ...]) -> None:
-    if value == (PRINTED,):
-        return
-    if not value or any(rule not in RULES for rule in value):
-        raise InputError(f"the rules are {value!r}", field.name, f"give some of {', '.join(RULES)}")
-
-
 @attrs.frozen
 class Job:
     """Inputs of a study. times: samples k of the protocol; stations: j along the backbone.
@@ -70,7 +62,6 @@ class Job:
     mesher: str = MESHER.field()
     times: int = TIMES.field()
     stations: int = STATIONS.field()
-    rules: tuple[str, ...] = attrs.field(default=RULES, validator=_rules)
     quality: str = QUALITY.field()
     workers: int = WORKERS.field()
     mesh_check: bool = MESH_CHECK.field()
@@ -101,9 +92,6 @@ class Job:
         if self.path:
             # Only its name is kept: an unknown one must be found before the solid is built.
             window(self.unit, self.path)
-        if self.mesh.resolved:
-            # The waveguide is what is printed: the rules are for a continuum in place of the lattice.
-            object.__setattr__(self, "rules", (PRINTED,))
         require_self_contact_resolvable(self.mesh, self.self_contact)
         for refused, what, where, remedy in self._refusals():
             if refused:
@@ -203,7 +191,6 @@ class Job:
             "simulate": simulate | {"mesh": self.mesh.table()} | self.effects.tables,
             "place": {
                 "stations": self.stations,
-                "rules": list(self.rules),
                 "mesh_check": self.mesh_check,
                 "paths": self.paths,
             },
@@ -227,11 +214,6 @@ class Job:
     def _run(self) -> dict[str, Any]:
         """The table [run] of study.toml, whose keys decide no figure."""
         return {"path": self.path} if self.path else {}
-
-    @property
-    def headline_rule(self) -> str:
-        """Rule whose best path is the answer: the one that converges with the mesh, if asked for."""
-        return "volume_fraction" if "volume_fraction" in self.rules else self.rules[0]
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
@@ -401,8 +383,6 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
             if key not in known:
                 raise InputError(f"unknown key {key!r}", f"{where}, [{stage}]", f"known: {', '.join(known)}")
         job |= values
-    if isinstance(job.get("rules"), list):
-        job["rules"] = tuple(job["rules"])
     return _built(Job, {**job, "stages": tuple(tables)}, where)
 
 
@@ -418,7 +398,7 @@ OF_FILES = ("friction",)
 SETTINGS = {
     "design": ("quality",),
     "simulate": ("times", "mesher", "orientation_deg", "self_contact", "self_friction"),
-    "place": ("stations", "rules", "mesh_check", "paths"),
+    "place": ("stations", "mesh_check", "paths"),
 }
 
 

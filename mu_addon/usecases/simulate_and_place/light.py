@@ -75,9 +75,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
             errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
             slopes.append(_by_cell(law, bar, study.anchors))
         names = tuple(bars)
-        J = np.array(
-            [study.ranking.evaluations[name, study.job.headline_rule].deviation.J_hat for name in names]
-        )
+        J = np.array([study.ranking.evaluations[name].deviation.J_hat for name in names])
         best = names[int(J.argmin())]
         has_gravity = study.job.effects.has_gravity
         checks = _checked(bars[best][1], own[best], angle, optics, has_gravity)

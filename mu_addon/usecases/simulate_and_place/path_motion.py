@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, roi, with_sensor
-from ...placement.inclusion import sensor_share
-from ...placement.settings import PRINTED
 from .motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
@@ -30,7 +28,7 @@ def keep_motion(
     mesh: Mesh,
     trajectory: Trajectory,
     solver: CandidateSolver,
-    jobs: list[tuple[Candidate, str]],
+    every: Sequence[Candidate],
     on_progress: Callable[[float], None],
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
@@ -38,20 +36,20 @@ def keep_motion(
     own: the study's mesh; mesh: the same, or that of the whole body of which it is a half. on_progress:
     called with the finished share.
     """
-    unit, rule = job.unit, job.headline_rule
+    unit = job.unit
     image = images(own, mesh)
     nodes = {region: surface_of(own, number).node for region, number in REGIONS.items()}
     both = {r: n if image is None else np.concatenate([n, image[n]]) for r, n in nodes.items()}
     looked, materials = SurfaceFields(mesh, both), job.materials(mesh)
-    candidates = {candidate.name: candidate for candidate, of in jobs if of == rule}
+    candidates = {candidate.name: candidate for candidate in every}
     by_pressure = {state.pressure_kPa: state.u for state in trajectory.solved}
     without: dict[str, Array] = {}
     for number, (name, pressure_kPa, difference_mm) in enumerate(solver.whole(trajectory)):
         still = [by_pressure[p] for p in pressure_kPa]
         without = without or looked.of_states(still, materials)
         stiff = materials
-        if rule != PRINTED:
-            share = sensor_share(rule, roi(mesh, candidates[name], unit.dimensions.inclusion_radius))
+        if not mesh.resolved:
+            share = roi(mesh, candidates[name], unit.dimensions.inclusion_radius).share
             stiff = with_sensor(materials, share, unit.material.sensor_modulus_MPa)
         moved = [u + apart for u, apart in zip(still, difference_mm, strict=True)]
         fields = {key: values - without[key] for key, values in looked.of_states(moved, stiff).items()}

@@ -27,48 +27,54 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-COLUMNS = ["path", "start", "length", "rule", "J_hat_mm", "J_cont_mm", "rank"]
+COLUMNS = ["path", "start", "length", "J_hat_mm", "J_cont_mm", "rank"]
 
 
 @attrs.define
 class Ranking:
-    """Evaluations of candidates by path and rule, and the mesh uncertainty of each rule's J_hat in mm."""
+    """Evaluations of candidates by path, and the mesh uncertainty of J_hat in mm; None: not known."""
 
-    evaluations: dict[tuple[str, str], Evaluation] = attrs.field(factory=dict)
-    uncertainty_mm: dict[str, float] = attrs.field(factory=dict)
+    evaluations: dict[str, Evaluation] = attrs.field(factory=dict)
+    uncertainty_mm: float | None = None
 
     @property
     def compared(self) -> Array:
         """True for each instant (k,) at which all paths are compared."""
         return np.isfinite([e.deviation.over_time for e in self.evaluations.values()]).all(axis=0)
 
-    def tied(self, rule: str, chosen: str) -> list[str]:
-        """Paths whose J_hat differs from the chosen one's by less than the mesh uncertainty."""
-        J = {name: e.deviation.J_hat for (name, r), e in self.evaluations.items() if r == rule}
-        limit = self.uncertainty_mm.get(rule, 0.0)
-        return [name for name, value in J.items() if name != chosen and value - J[chosen] < limit]
+    @property
+    def J_hat_mm(self) -> dict[str, float]:
+        """J_hat in mm by path."""
+        return {name: e.deviation.J_hat for name, e in self.evaluations.items()}
 
-    def best(self, jobs: Sequence[tuple[Candidate, str]], count: int) -> list[tuple[Candidate, str]]:
-        """The `count` pairs of a path and a rule of least J_hat, the best first."""
-        return sorted(jobs, key=lambda one: self.evaluations[one[0].name, one[1]].deviation.J_hat)[:count]
+    @property
+    def chosen(self) -> str:
+        """The path of least J_hat."""
+        J = self.J_hat_mm
+        return min(J, key=lambda name: J[name])
+
+    @property
+    def tied(self) -> list[str]:
+        """Paths whose J_hat differs from the chosen one's by less than the mesh uncertainty."""
+        J, best, limit = self.J_hat_mm, self.chosen, self.uncertainty_mm or 0.0
+        return [name for name, value in J.items() if name != best and value - J[best] < limit]
+
+    def best(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
+        """The `count` candidates of least J_hat, the best first."""
+        J = self.J_hat_mm
+        return sorted(candidates, key=lambda one: J[one.name])[:count]
 
     def write(self, folder: Path, job: Job, paths: Sequence[Candidate]) -> dict[str, Any]:
         """Write deviation.csv and delta.npz; return the figures of the summary. Raises OutputError."""
-        chosen, rows, arrays = {}, [], {}
-        J_hat: dict[str, dict[str, float]] = {}
-        J_cont: dict[str, dict[str, float]] = {}
-        for rule in job.rules:
-            found = [self.evaluations[c.name, rule] for c in paths]
-            ranks = rank(np.array([e.deviation.J_hat for e in found]))
-            chosen[rule] = found[int(np.argmin(ranks))].name
-            for c, e, r in zip(paths, found, ranks, strict=True):
-                d = e.deviation
-                rows.append((c.name, c.start, c.length, rule, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r)))
-            arrays[f"delta_{rule}_mm"] = np.array([e.deviation.delta for e in found])
-            J_hat[rule] = {e.name: e.deviation.J_hat for e in found}
-            J_cont[rule] = {e.name: e.deviation.J_cont for e in found}
+        found = [self.evaluations[c.name].deviation for c in paths]
+        ranks = rank(np.array([d.J_hat for d in found]))
+        rows = [
+            (c.name, c.start, c.length, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r))
+            for c, d, r in zip(paths, found, ranks, strict=True)
+        ]
         write_csv(folder / "deviation.csv", COLUMNS, rows)
-        arrays |= {
+        arrays = {
+            "delta_mm": np.array([d.delta for d in found]),
             "path": np.array([c.name for c in paths]),
             "time_s": job.samples[0],
             "pressure_kPa": job.supplied_kPa,
@@ -76,11 +82,11 @@ class Ranking:
         }
         write_npz(folder / "delta.npz", arrays)
         return {
-            "J_hat_mm": J_hat,
-            "J_cont_mm": J_cont,
-            "chosen": chosen,
+            "J_hat_mm": {c.name: d.J_hat for c, d in zip(paths, found, strict=True)},
+            "J_cont_mm": {c.name: d.J_cont for c, d in zip(paths, found, strict=True)},
+            "chosen": self.chosen,
             "mesh_uncertainty_mm": self.uncertainty_mm,
-            "tied_with_chosen": {rule: self.tied(rule, chosen[rule]) for rule in job.rules},
+            "tied_with_chosen": self.tied,
         }
 
 
@@ -89,14 +95,14 @@ def solve_candidates(
     cache: Cache,
     mesh: Mesh,
     trajectory: Trajectory,
-    jobs: list[tuple[Candidate, str]],
+    candidates: Sequence[Candidate],
     on_progress: Callable[[float], None],
     solving: float = 1.0,
     under_way: CandidateSolver | None = None,
     verify: bool = False,
     shown: tuple[Path, Mesh] | None = None,
 ) -> tuple[list[Evaluation], dict[str, Any]]:
-    """Evaluation of every (candidate, rule) on a mesh against its Model A, and the summary's figures on it.
+    """Evaluation of every candidate on a mesh against its Model A, and the summary's figures on it.
 
     under_way: a solver that was given Model A's states as they were found; verify: see
     `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
@@ -104,14 +110,14 @@ def solve_candidates(
     ConvergenceError.
     """
     if job.in_time:
-        found, not_reached = evaluations(job, cache, mesh, trajectory, jobs, on_progress)
+        found, not_reached = evaluations(job, cache, mesh, trajectory, candidates, on_progress)
         return found, {"along_paths": True, "not_reached": not_reached}
-    whole = job.headline_rule if shown else ""
-    solver = under_way or CandidateSolver(job, cache, mesh, jobs, trajectory.pressure_kPa, whole)
+    pressures = trajectory.pressure_kPa
+    solver = under_way or CandidateSolver(job, cache, mesh, candidates, pressures, shown is not None)
     with closing(solver):
         found = solver.evaluations(trajectory, within(on_progress, 0.0, solving), verify)
         if shown:
-            keep_motion(job, *shown, mesh, trajectory, solver, jobs, within(on_progress, solving, 1.0))
+            keep_motion(job, *shown, mesh, trajectory, solver, candidates, within(on_progress, solving, 1.0))
     return found, {
         "pressures_solved_kPa": solver.solved_kPa,
         "relative_error_between": solver.error,
@@ -122,16 +128,16 @@ def solve_candidates(
 
 
 def mesh_change_mm(
-    job: Job, fine: dict[tuple[str, str], Evaluation], coarse: Sequence[Evaluation], instants: Sequence[int]
-) -> dict[str, float]:
-    """Largest change of any path's J_hat in mm on a coarser mesh, by rule.
+    fine: dict[str, Evaluation], coarse: Sequence[Evaluation], instants: Sequence[int]
+) -> float:
+    """Largest change of any path's J_hat in mm on a coarser mesh.
 
     instants: those of the fine mesh that the coarse one was solved at; the relative change of the deviation
     there stands for that of J_hat. Raises ConvergenceError if none of them is compared on both.
     """
-    change = dict.fromkeys(job.rules, 0.0)
+    change = 0.0
     for found in coarse:
-        deviation = fine[found.name, found.rule].deviation
+        deviation = fine[found.name].deviation
         both = np.array([deviation.delta[list(instants)], found.deviation.delta])
         there, coarser = both[:, np.isfinite(both).all(axis=(0, 2))].reshape(2, -1)
         if not len(there):
@@ -139,7 +145,7 @@ def mesh_change_mm(
         same = there.mean()
         # A sensor as soft as the lattice disturbs nothing, on any mesh.
         scale = deviation.J_hat / same if same else 0.0
-        change[found.rule] = max(change[found.rule], abs(coarser.mean() - same) * scale)
+        change = max(change, float(abs(coarser.mean() - same)) * scale)
     return change
 
 

@@ -8,34 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path as File
-from typing import Any
 
-import attrs
 import numpy as np
 
 from ...files import write_text
 from ...report import charts as plots
 from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
-from ...report.results import PaintedStates, ReportData, RuleResult, nearest_to_break
+from ...report.results import PaintedStates, RankingResult, ReportData, nearest_to_break
 from ...run.progress import spell
 from .charts import front_chart, response_chart
-
-RULE = {
-    "volume_fraction": "volume fraction",
-    "intersect": "intersect",
-    "printed": "as printed",
-}
-RULE_MEANS = {
-    "volume_fraction": (
-        "E is blended by the volume fraction of each element inside the sensor; converges with mesh "
-        "refinement"
-    ),
-    "intersect": (
-        "The rule of the paper: every element that the sensor intersects gets the sensor's E; mesh-dependent"
-    ),
-    "printed": "No rule: the waveguide itself with wells and seats, in the mesh of the printed unit",
-}
 
 
 def write_html(path: File, results: ReportData) -> None:
@@ -44,9 +26,7 @@ def write_html(path: File, results: ReportData) -> None:
 
 
 def report_html(results: ReportData) -> str:
-    """The whole report as HTML text; the headline's rule comes before any other."""
-    first = sorted(results.rules.items(), key=lambda item: item[0] != results.headline_rule)
-    results = attrs.evolve(results, rules=dict(first))
+    """The whole report as HTML text."""
     return page(results.title, results.unit, _notes(results), _headline(results), _sections(results))
 
 
@@ -80,61 +60,52 @@ def _notes(r: ReportData) -> str:
 
 
 def _headline(r: ReportData) -> str:
-    rule = r.rules.get(r.headline_rule)
+    found = r.ranking
     html = ""
-    if rule is not None:
-        best = _index(r, rule.chosen)
+    if found is not None:
+        best = _index(r, found.chosen)
         path = r.paths[best]
         html += (
             f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
             f"{path.anchors}: of {len(r.paths)} candidates it has the smallest mean deviation, "
-            f"{rule.j_hat[best]:.3f}&nbsp;mm.</p><p>{_caveat(r, rule)}</p>{_key_figures(r, rule)}"
+            f"{found.j_hat[best]:.3f}&nbsp;mm.</p><p>{_caveat(found)}</p>{_key_figures(r, found)}"
         )
     pictures = "".join(picture_figure(picture) for picture in r.pictures[:1])
     if r.view is None:
         return html + pictures
-    chosen = rule.chosen if rule is not None else ""
+    chosen = found.chosen if found is not None else ""
     sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
     section = figure(
-        plots.unit_with_paths(r.view, r.paths, chosen, rule.j_hat if rule is not None else None),
+        plots.unit_with_paths(r.view, r.paths, chosen, found.j_hat if found is not None else None),
         "Left: the unit cut open along the plane in which it bends, inlet below, with anchors P1 to "
         f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
-        + (", with its mean deviation in mm." if rule is not None else "."),
+        + (", with its mean deviation in mm." if found is not None else "."),
         "Section of the unit, and the candidate paths beside it"
         + (f"; the chosen path {chosen} runs through anchors {path.anchors}." if chosen else "."),
     )
     return f'{html}<div class="lead">{section}{pictures}</div>'
 
 
-def _caveat(r: ReportData, rule: RuleResult) -> str:
-    """Qualification of the answer: ties within the mesh's uncertainty, and the other rule's path."""
-    words = []
-    if rule.tied:
-        names = _listed([_name(name) for name in rule.tied])
-        within = f" ({rule.uncertainty_mm:.3f} mm)" if rule.uncertainty_mm is not None else ""
-        words.append(
-            f"Within the mesh uncertainty it is tied with {names}; they differ by less than the "
-            f"uncertainty{within}."
-        )
-    for name, other in r.rules.items():
-        if name == r.headline_rule:
-            continue
-        same = other.chosen == rule.chosen
-        words.append(
-            f"This holds for the inclusion rule “{_rule(r.headline_rule)}”; for “{_rule(name)}” "
-            + ("the same path is best." if same else f"{_name(other.chosen)} would be best.")
-        )
-    return " ".join(words)
+def _caveat(found: RankingResult) -> str:
+    """Qualification of the answer: ties within the mesh's uncertainty."""
+    if not found.tied:
+        return ""
+    names = _listed([_name(name) for name in found.tied])
+    within = f" ({found.uncertainty_mm:.3f} mm)" if found.uncertainty_mm is not None else ""
+    return (
+        f"Within the mesh uncertainty it is tied with {names}; they differ by less than the "
+        f"uncertainty{within}."
+    )
 
 
-def _key_figures(r: ReportData, rule: RuleResult) -> str:
-    order = np.argsort(np.asarray(rule.rank), kind="stable")
-    facts = [("mean deviation Ĵ", f"{rule.j_hat[order[0]]:.3f} mm")]
+def _key_figures(r: ReportData, found: RankingResult) -> str:
+    order = np.argsort(np.asarray(found.rank), kind="stable")
+    facts = [("mean deviation Ĵ", f"{found.j_hat[order[0]]:.3f} mm")]
     if len(order) > 1:
         second = order[1]
-        facts.append(("runner-up", f"{_name(r.paths[second].name)}, {rule.j_hat[second]:.3f} mm"))
+        facts.append(("runner-up", f"{_name(r.paths[second].name)}, {found.j_hat[second]:.3f} mm"))
         worst = order[-1]
-        facts.append(("worst", f"{_name(r.paths[worst].name)}, {rule.j_hat[worst]:.3f} mm"))
+        facts.append(("worst", f"{_name(r.paths[worst].name)}, {found.j_hat[worst]:.3f} mm"))
     if len(r.angle_deg):
         low, high = int(np.argmin(r.pressure_kPa)), int(np.argmax(r.pressure_kPa))
         for i in (low, high):
@@ -143,55 +114,30 @@ def _key_figures(r: ReportData, rule: RuleResult) -> str:
 
 
 def _ranking(r: ReportData) -> str:
-    if not r.rules:
+    found = r.ranking
+    if found is None:
         return ""
     over = "the compared part of the pressure cycle" if r.is_partly_compared else "the whole pressure cycle"
+    tied = f" Hatched: tied with {_name(found.chosen)}." if found.tied else ""
+    whiskers = (
+        f" Whiskers: ± {found.uncertainty_mm:.3f} mm mesh uncertainty."
+        if found.uncertainty_mm is not None
+        else ""
+    )
     html = (
         "<p>Ĵ is the mean distance between the unit with the sensor and the unit without it, over the line "
         f"of anchors and {over}. Smaller is better.</p>"
+    ) + figure(
+        plots.ranking(found, r.paths),
+        f"Mean deviation of every path, best first.{tied}{whiskers}",
+        f"Bar chart of the mean deviation; {found.chosen} is best.",
     )
-    html += '<div class="pair">'
-    for name, rule in r.rules.items():
-        title = _rule(name)
-        tied = f" Hatched: tied with {_name(rule.chosen)}." if rule.tied else ""
-        bars = (
-            f" Whiskers: ± {rule.uncertainty_mm:.3f} mm mesh uncertainty."
-            if rule.uncertainty_mm is not None
-            else ""
-        )
-        html += (
-            f"<div><h3>Rule “{title}”</h3><p>{escape(RULE_MEANS.get(name, ''))}.</p>"
-            + figure(
-                plots.ranking(rule, r.paths),
-                f"Mean deviation of every path, best first.{tied}{bars}",
-                f"Bar chart of the mean deviation by the rule {title}; {rule.chosen} is best.",
-            )
-            + "</div>"
-        )
-    html += "</div>"
-    head = [("path", ""), ("anchors", "line")]
-    groups = [("", 2)]
-    for name in r.rules:
-        groups.append((f"rule “{RULE.get(name, name)}”", 4))
-        head += [("rank", "n first"), ("Ĵ [mm]", "n"), ("J cont [mm]", "n"), ("volume ratio", "n")]
+    head = [("path", ""), ("anchors", "line"), ("rank", "n"), ("Ĵ [mm]", "n"), ("J cont [mm]", "n")]
     rows = []
-    headline = r.rules.get(r.headline_rule)
     for i, path in enumerate(r.paths):
-        cells: list[Any] = [label(path.name), path.anchors]
-        for rule in r.rules.values():
-            cells += [
-                rule.rank[i],
-                f"{rule.j_hat[i]:.4f}",
-                f"{rule.j_cont[i]:.4f}",
-                f"{rule.stiffened_mm3[i] / rule.cylinder_mm3[i]:.2f}",
-            ]
-        rows.append((cells, headline is not None and path.name == headline.chosen))
-    caption = (
-        "Every path for every inclusion rule. J cont: root mean square instead of mean. Volume ratio: "
-        "stiffened volume over the sensor's volume."
-    )
-    html += table(caption, head, rows, groups)
-    return html
+        figures = found.rank[i], f"{found.j_hat[i]:.4f}", f"{found.j_cont[i]:.4f}"
+        rows.append(([label(path.name), path.anchors, *figures], path.name == found.chosen))
+    return html + table("Every path. J cont: root mean square instead of mean.", head, rows)
 
 
 def _search(r: ReportData) -> str:
@@ -202,8 +148,8 @@ def _search(r: ReportData) -> str:
     certain = f"less than {max(s.risk, 1e-3):.1%}" if s.risk < 0.5 else f"up to {s.risk:.0%}"
     html = (
         f"<p>Of {s.paths} paths through nodes of the lattice, bent paths included, "
-        f"<strong>{escape(best.name)}</strong> has the smallest deviation: {best.j_hat:.3f}&nbsp;mm by the "
-        f"rule “{_rule(s.rule)}”. All were ranked by a reduced model; the {len(s.solved)} below were solved "
+        f"<strong>{escape(best.name)}</strong> has the smallest deviation: {best.j_hat:.3f}&nbsp;mm. "
+        f"All were ranked by a reduced model; the {len(s.solved)} below were solved "
         f"by the full model. The probability that another path is better is {certain}, if the reduced model "
         "is as accurate for the others as for these. Paths marked “best for their length” are "
         "Pareto-optimal in deviation and length.</p>"
@@ -235,7 +181,7 @@ def _light(r: ReportData) -> str:
     if r.light is None:
         return ""
     s, o = r.light, r.light.optics
-    chosen = r.rules[r.headline_rule].chosen if r.rules else ""
+    chosen = r.ranking.chosen if r.ranking else ""
     index = s.names.index(chosen) if chosen in s.names else 0
     mine = s.responses[index]
     low, high = mine.monotonic_deg
@@ -419,48 +365,46 @@ def _contact(r: ReportData) -> str:
 
 
 def _heatmaps(r: ReportData) -> str:
-    html = ""
-    for name, rule in r.rules.items():
-        top = float(np.nanmax(rule.delta))
-        maps = "".join(
-            figure(
-                plots.heatmap(rule.delta[i], top, path.name == rule.chosen),
-                f"{_name(path.name)}: {rule.j_hat[i]:.3f} mm",
-                f"Deviation of {path.name} over length and time, at most {np.nanmax(rule.delta[i]):.2f} mm.",
-                "best" if path.name == rule.chosen else "",
-            )
-            for i, path in enumerate(r.paths)
-        )
-        bar = figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
-        html += f"<h3>Rule “{_rule(name)}”</h3>{bar}<div class='many'>{maps}</div>"
-    if not html:
+    found = r.ranking
+    if found is None:
         return ""
+    top = float(np.nanmax(found.delta))
+    maps = "".join(
+        figure(
+            plots.heatmap(found.delta[i], top, path.name == found.chosen),
+            f"{_name(path.name)}: {found.j_hat[i]:.3f} mm",
+            f"Deviation of {path.name} over length and time, at most {np.nanmax(found.delta[i]):.2f} mm.",
+            "best" if path.name == found.chosen else "",
+        )
+        for i, path in enumerate(r.paths)
+    )
+    bar = figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
     return (
         "<p>One map per path. Horizontal: length [%], from inlet to tip. Vertical: time [%] of the pressure "
-        "cycle. All maps of a rule share one colour scale, in the square root of Δ; the chosen path is "
-        f"framed.{' Empty rows are not compared.' if r.is_partly_compared else ''}</p>" + html
+        "cycle. All maps share one colour scale, in the square root of Δ; the chosen path is framed."
+        f"{' Empty rows are not compared.' if r.is_partly_compared else ''}</p>"
+        f"{bar}<div class='many'>{maps}</div>"
     )
 
 
 def _marginals(r: ReportData) -> str:
-    html = ""
-    for name, rule in r.rules.items():
-        html += f"<h3>Rule “{_rule(name)}”</h3><div class='pair'>"
-        for values, along, averaged in (
-            (np.nanmean(rule.delta, axis=1), "length", "time"),
-            (rule.delta.mean(axis=2), "time", "length"),
-        ):
-            html += figure(
-                plots.marginal(values, r.paths, rule.chosen, along),
-                f"Deviation along the {along}, averaged over {averaged}."
-                if along == "length"
-                else f"Deviation over time, averaged over the {averaged}.",
-                f"Mean deviation of every path against {along}.",
-            )
-        html += "</div>"
-    if not html:
+    found = r.ranking
+    if found is None:
         return ""
-    return "<p>Colour: number of anchors; dashes: first anchor; thick orange line: chosen path.</p>" + html
+    along_length, over_time = np.nanmean(found.delta, axis=1), found.delta.mean(axis=2)
+    charts = figure(
+        plots.marginal(along_length, r.paths, found.chosen, "length"),
+        "Deviation along the length, averaged over time.",
+        "Mean deviation of every path against length.",
+    ) + figure(
+        plots.marginal(over_time, r.paths, found.chosen, "time"),
+        "Deviation over time, averaged over the length.",
+        "Mean deviation of every path against time.",
+    )
+    return (
+        "<p>Colour: number of anchors; dashes: first anchor; thick orange line: chosen path.</p>"
+        f"<div class='pair'>{charts}</div>"
+    )
 
 
 def _mesh(r: ReportData) -> str:
@@ -513,10 +457,6 @@ def _time(r: ReportData) -> str:
 
 def _name(path: str) -> str:
     return escape(label(path))
-
-
-def _rule(name: str) -> str:
-    return escape(RULE.get(name, name))
 
 
 def _index(r: ReportData, name: str) -> int:

@@ -16,8 +16,8 @@ from ...report.results import (
     Parameter,
     Path,
     Picture,
+    RankingResult,
     ReportData,
-    RuleResult,
     SideView,
 )
 from ...run.versions import package_versions
@@ -47,8 +47,8 @@ FILES = {
     "stretch.csv": "largest stretch of wall, struts and joints in every state, and how near to break",
     "self_contact.csv": "force, gap and largest pressure of the unit's contact with itself in every state",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
-    "deviation.csv": "deviation and rank of every path and rule",
-    "delta.npz": "deviation over time and length of every path and rule, mm",
+    "deviation.csv": "deviation and rank of every path",
+    "delta.npz": "deviation over time and length of every path, mm",
     "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
     "signals.csv": "light signal of each path beside its deviation",
     "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
@@ -87,8 +87,7 @@ def _panel_pictures(study: Study) -> None:
     if study.trajectory is None or study.mesh is None or study.context.hurried:
         return
     write_angle(study.folder, *study.motion_in_order())
-    rule = study.job.headline_rule
-    found = [e for e in study.ranking.evaluations.values() if e.rule == rule]
+    found = study.ranking.evaluations.values()
     top = max((float(np.nanmax(e.deviation.delta)) for e in found), default=0.0)
     for e in found:
         write_delta(study.folder, e.name, e.deviation.delta, study.trajectory.time_s, top)
@@ -114,11 +113,11 @@ def report_data(
     """Data of the report of a study, complete or stopped early for a reason."""
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
-    complete = all((w.name, rule) in study.ranking.evaluations for w in windows for rule in job.rules)
+    complete = all(w.name in study.ranking.evaluations for w in windows)
     moved_kPa, angle_deg = study.motion_in_order()
-    rules = {rule: _rule_result(study, rule) for rule in job.rules} if complete else {}
+    ranking = _ranking(study) if complete else None
     return ReportData(
-        title=f"Sensor path for {job.unit.name}" if rules else f"Monolithic Unit {job.unit.name}",
+        title=f"Sensor path for {job.unit.name}" if ranking else f"Monolithic Unit {job.unit.name}",
         unit=f"Monolithic Unit, scale {d.scale:g}, cell {d.cell:g} mm, {d.count} chambers",
         status="partial" if stopped else "complete",
         reason=stopped,
@@ -126,8 +125,7 @@ def report_data(
         view=view,
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
-        rules=rules,
-        headline_rule=study.job.headline_rule,
+        ranking=ranking,
         search=study.search,
         search_picture=search_picture,
         light=study.light,
@@ -154,22 +152,19 @@ def report_data(
     )
 
 
-def _rule_result(study: Study, rule: str) -> RuleResult:
+def _ranking(study: Study) -> RankingResult:
     from ...placement.deviation import rank
 
-    found = [study.ranking.evaluations[w.name, rule] for w in study.windows]
-    j_hat = np.array([e.deviation.J_hat for e in found])
-    chosen = found[int(np.argmin(j_hat))].name
-    return RuleResult(
-        delta=np.array([e.deviation.delta for e in found]),
+    found = [study.ranking.evaluations[w.name].deviation for w in study.windows]
+    j_hat = np.array([d.J_hat for d in found])
+    return RankingResult(
+        delta=np.array([d.delta for d in found]),
         j_hat=j_hat,
-        j_cont=np.array([e.deviation.J_cont for e in found]),
+        j_cont=np.array([d.J_cont for d in found]),
         rank=[int(r) for r in rank(j_hat)],
-        stiffened_mm3=np.array([e.stiffened_mm3 for e in found]),
-        cylinder_mm3=np.array([e.cylinder_mm3 for e in found]),
-        chosen=chosen,
-        tied=study.ranking.tied(rule, chosen),
-        uncertainty_mm=study.ranking.uncertainty_mm.get(rule),
+        chosen=study.ranking.chosen,
+        tied=study.ranking.tied,
+        uncertainty_mm=study.ranking.uncertainty_mm,
     )
 
 
@@ -278,7 +273,7 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
         return None, []
     d = study.job.unit.dimensions
     parts = unit_parts(d, study.solid.vertices, study.solid.triangles)
-    name = study.context.summary.get("chosen", {}).get(study.job.headline_rule)
+    name = study.context.summary.get("chosen")
     window = next((w for w in study.windows if w.name == name), None)
     path = study.anchors[list(window.indices)] if window else study.anchors[:0]
     radius = max(d.inclusion_radius, d.waveguide_section / 2)

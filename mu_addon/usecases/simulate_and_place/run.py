@@ -54,7 +54,7 @@ def run_stages(study: Study) -> None:
             signals(study, job.optics)
         if job.paths == "graph":
             search_graph(study)
-        study.design(window(job.unit, chosen[job.headline_rule]), BEST)
+        study.design(window(job.unit, chosen), BEST)
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
@@ -66,17 +66,15 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
         # Without a sign on what rounds to nothing.
         ends = [(p, round(a, 1) + 0.0) for p, a in (ends[0], ends[-1])]
         lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in ends))
-    chosen = summary.get("chosen")
-    if isinstance(chosen, dict):
-        J, tied = summary["J_hat_mm"], summary["tied_with_chosen"]
-        for rule, name in chosen.items():
-            equal = f", tied with {', '.join(tied[rule])}" if tied[rule] else ""
-            lines.append(f"{rule}: {name}, J_hat {J[rule][name]:.4f} mm{equal}")
+    if name := summary.get("chosen"):
+        tied = summary["tied_with_chosen"]
+        equal = f", tied with {', '.join(tied)}" if tied else ""
+        lines.append(f"best path: {name}, J_hat {summary['J_hat_mm'][name]:.4f} mm{equal}")
     search = summary.get("search")
     if isinstance(search, dict):
         best = search["best"]
         lines.append(
-            f"whole-lattice search, {search['rule']}: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
+            f"whole-lattice search: {best['name']}, J_hat {best['J_hat_mm']:.4f} mm, "
             f"{best['length_mm']:.1f} mm long; {search['checked']} of {search['paths']} paths solved by the "
             "full model"
         )

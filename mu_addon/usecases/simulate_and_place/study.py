@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,7 @@ class Study:
             low, high = job.body.bounds.tolist()
             summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
         if simulates:
-            summary["study"] = {"times": job.times, "stations": job.stations, "rules": job.rules}
+            summary["study"] = {"times": job.times, "stations": job.stations}
             summary["study"] |= {"mesh": job.mesh.table(), "mesher": job.mesher}
             if job.lattice is not None:
                 summary["study"]["lattice"] = attrs.asdict(job.lattice)
@@ -207,8 +208,9 @@ class Study:
         with self.progress.stage("Model A"):
             model = job.model(self.mesh)
             if candidates_beside and job.workers > 1 and not job.in_time:
-                jobs = self._candidates_by_rule()
-                self._ahead = CandidateSolver(job, self.cache, self.mesh, jobs, samples[1], job.headline_rule)
+                self._ahead = CandidateSolver(
+                    job, self.cache, self.mesh, self.candidates, samples[1], whole=True
+                )
             try:
                 self.trajectory, self.contact = solve_model_a(
                     job, self.cache, model, samples, within(self.progress.update, 0.0, states), self._reached
@@ -273,45 +275,38 @@ class Study:
         write_model_a(folder, mesh, job.materials(mesh), supplied, remembered, touching_kPa)
         self.warn(*doubts_of_motion(job, mesh, states, summary))
 
-    def _candidates_by_rule(self) -> list[tuple[Candidate, str]]:
-        return [(c, rule) for rule in self.job.rules for c in self.candidates]
-
-    def place(self) -> dict[str, str]:
-        """Compare every candidate under every rule with Model A; return the chosen path of each rule."""
+    def place(self) -> str:
+        """Compare every candidate with Model A; return the chosen path."""
         assert self.mesh is not None
         assert self.trajectory is not None
-        jobs = self._candidates_by_rule()
         with self.progress.stage("candidates"):
             found = self.solve_candidates(
-                self.mesh, self.trajectory, jobs, self._ahead, verify=True, to_look_at=True
+                self.mesh, self.trajectory, self.candidates, self._ahead, verify=True, to_look_at=True
             )
-        self.ranking = Ranking({(e.name, e.rule): e for e in found})
-        chosen = self._write_ranking()
+        self.ranking = Ranking({e.name: e for e in found})
+        self._write_ranking()
         if self.job.mesh_check:
             try:
-                self._compare_meshes(jobs)
+                self._compare_meshes()
             except (ConvergenceError, MeshingError) as error:
                 self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
-            chosen = self._write_ranking()
-        return chosen
+            self._write_ranking()
+        return self.ranking.chosen
 
-    def _write_ranking(self) -> dict[str, str]:
-        found = self.ranking.write(self.folder, self.job, self.candidates)
-        self.context.summary |= found
-        chosen: dict[str, str] = found["chosen"]
-        return chosen
+    def _write_ranking(self) -> None:
+        self.context.summary |= self.ranking.write(self.folder, self.job, self.candidates)
 
     def solve_candidates(
         self,
         mesh: Mesh,
         trajectory: Trajectory,
-        jobs: list[tuple[Candidate, str]],
+        candidates: Sequence[Candidate],
         under_way: CandidateSolver | None = None,
         verify: bool = False,
         to_look_at: bool = False,
         done: float = 0.0,
     ) -> list[Evaluation]:
-        """Evaluation of every (candidate, rule) on a mesh against its Model A; see `ranking`.
+        """Evaluation of every candidate on a mesh against its Model A; see `ranking`.
 
         to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's. done: share of
         the stage that is done before.
@@ -321,7 +316,7 @@ class Study:
         update = within(self.progress.update, done, 1.0)
         solving = self._solving("candidates") if shown else 1.0
         found, figures = solve_candidates(
-            self.job, self.cache, mesh, trajectory, jobs, update, solving, under_way, verify, shown
+            self.job, self.cache, mesh, trajectory, candidates, update, solving, under_way, verify, shown
         )
         if not figures.pop("independent_of_path", True):
             self.warn(
@@ -334,7 +329,7 @@ class Study:
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = figures
         return found
 
-    def _compare_meshes(self, jobs: list[tuple[Candidate, str]]) -> None:
+    def _compare_meshes(self) -> None:
         """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures.
 
         Of printed paths, the best `PATHS_CHECKED`.
@@ -348,17 +343,18 @@ class Study:
             # The history of contact or wall is of the whole protocol.
             samples = job.protocol.sample(job.times)
             instants = list(range(job.times))
+        checked = self.candidates
         if self.mesh is not None and self.mesh.resolved:
-            jobs = self.ranking.best(jobs, PATHS_CHECKED)
+            checked = self.ranking.best(checked, PATHS_CHECKED)
         with self.progress.stage("mesh check"):
             meshing, moving = 0.04, 0.5
             update = self.progress.update
             mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing), self.warn)
             model = job.model(mesh)
             trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
-            found = self.solve_candidates(mesh, trajectory, jobs, done=moving)
+            found = self.solve_candidates(mesh, trajectory, checked, done=moving)
         fine = self.ranking.evaluations
-        self.ranking = Ranking(fine, mesh_change_mm(job, fine, found, instants))
+        self.ranking = Ranking(fine, mesh_change_mm(fine, found, instants))
 
 
 def begin_study(job: Job, folder: Path, context: RunContext) -> None:

@@ -152,15 +152,9 @@ class Run:
         return sorted((float(p), float(a)) for p, a in found.items())
 
     @property
-    def rule(self) -> str:
-        """Rule whose best path is the answer, or "" where no paths were ranked."""
-        rules = list(self.summary.get("chosen") or {})
-        return "volume_fraction" if "volume_fraction" in rules else (rules or [""])[0]
-
-    @property
     def ranking(self) -> list[tuple[str, float]]:
-        """Pairs (path, J_hat in mm) of the rule that gives the answer, the best first."""
-        found = (self.summary.get("J_hat_mm") or {}).get(self.rule) or {}
+        """Pairs (path, J_hat in mm), the best first; empty where no paths were ranked."""
+        found = self.summary.get("J_hat_mm") or {}
         return sorted(((name, float(j)) for name, j in found.items()), key=lambda pair: pair[1])
 
 
@@ -260,7 +254,7 @@ def best_of(found: Sequence[Run], design: str) -> Run | None:
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
     if ready:
-        return max(ready, key=lambda r: (r.complete, r.printed, r.refine, bool(r.rule), r.changed_s))
+        return max(ready, key=lambda r: (r.complete, r.printed, r.refine, bool(r.ranking), r.changed_s))
     others = [run for run in found if run.has_results]
     return next(iter(ordered(others or own)), None)
 

@@ -96,7 +96,7 @@ def blender(each_bpy, blenders, tmp_path_factory):
 
 
 # A coarse ranking, with one path of the whole lattice beside the ten of the anchors.
-PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.4", "--rule", "volume_fraction"]
+PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.4"]
 PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2", "--checks", "2"]
 PLACE += ["--no-report"]
 

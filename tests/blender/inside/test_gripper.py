@@ -141,12 +141,9 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     job = read_job(tmp_path / "asked")
     assert [cube.side_mm for cube in job.cubes] == [20.0]
     assert (job.grip.friction, job.grip.beyond_mm, job.grip.step_s) == (0.3, 3.0, 1.0)
-    assert (job.mesh.refine, job.rules) == (0.4, ())
+    assert job.mesh.refine == 0.4
     assert job.gripper.fingers.gap_mm == 26.5
     assert (job.mesh.fidelity, job.self_contact) == ("resolved", True)
-    props.detail = "paths"
-    grasps.write_inputs(root, tmp_path / "paths")
-    assert read_job(tmp_path / "paths").rules == ("printed",)
     props.detail = "part"
     assert grasps.job_of(root).cubes == ()
     assert "was not grasped yet" in drawn()
