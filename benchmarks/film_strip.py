@@ -24,7 +24,7 @@ from mu_addon.design.surface import stl_surface
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.report.render import Cut, Part, fit, render
 from mu_addon.report.shapes import tube
-from mu_addon.report.unit_pictures import PATH_COLOR, SAGITTAL, unit_parts
+from mu_addon.report.unit_pictures import MIRROR_PLANE, PATH_COLOR, unit_parts
 from mu_addon.usecases.simulate_and_place.motion_files import FOLDER, MODEL_A, read_motion
 
 PRESSURES_kPa = (-20, -10, 0, 20, 40)
@@ -69,7 +69,7 @@ def pictures(run: Path, name: str | None = None) -> tuple[list[np.ndarray], list
     ]
     width, height = FRAME
     camera = fit(seen, (1.0, 0.22, 0.10), aspect=width / height, margin=0.02)
-    cut = Cut(SAGITTAL.point, SAGITTAL.normal, SAGITTAL.color)
+    cut = Cut(MIRROR_PLANE.point, MIRROR_PLANE.normal, MIRROR_PLANE.color)
     frames = [render(scene, camera, width, height, cut=cut, background=(1.0, 1.0, 1.0)) for scene in scenes]
     return frames, [bending_angle_deg(motion.mesh, motion.model_a[s]) for s in states]
 

@@ -23,7 +23,7 @@ from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_polygon, cavity_radius, outer_polygon
 from mu_addon.design.solid import QUALITY, Facets, lattice_solid
-from mu_addon.meshing.lattice import load_gmsh
+from mu_addon.meshing.lattice_region import load_gmsh
 from mu_addon.meshing.mesh import (
     LATTICE,
     TRIANGLE_EDGES,
@@ -36,7 +36,7 @@ from mu_addon.meshing.mesh import (
     second_order,
 )
 from mu_addon.meshing.quality import dihedral_angles, element_volumes, folded_corners
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 from ..resolved.convergence import angles, resin
 from .remesh import Reference, remesh

@@ -23,7 +23,7 @@ from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.meshing.mesh import AXES, Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 from .tip import cap_angle_deg
 

@@ -17,7 +17,7 @@ import attrs
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.unit import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_of
 
 from .convergence import angles
 

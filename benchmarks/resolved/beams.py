@@ -22,7 +22,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 PRESSURES_KPA = -10.0, -5.0, 5.0, 10.0, 20.0, 40.0
 

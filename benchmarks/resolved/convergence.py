@@ -21,7 +21,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.resolved.lattice import clearance, struts
-from mu_addon.resolved.unit import Sizes, tied, wall_mesh
+from mu_addon.resolved.printed_mesh import Sizes, tied, wall_mesh
 
 from .tip import tip_section
 

@@ -22,7 +22,7 @@ from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import FIDELITIES, MeshSettings
-from mu_addon.resolved.unit import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_of
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 from .running import print_heading, print_row

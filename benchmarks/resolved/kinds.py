@@ -23,7 +23,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 CORNERS = list(product((0.0, 1.0), repeat=3))
 FACES = [tuple(0.5 + 0.5 * s * (axis == k) for k in range(3)) for axis in range(3) for s in (-1, 1)]

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from .body import Body as Body
     from .body import read_body as read_body
     from .dimensions import Dimensions as Dimensions
-    from .export import write_nodes as write_nodes
-    from .export import write_stl as write_stl
     from .gates import GateError as GateError
     from .gripper import Gripper as Gripper
     from .gripper import build_gripper as build_gripper
@@ -47,6 +45,8 @@ if TYPE_CHECKING:
     from .rigid_body import RigidBody as RigidBody
     from .solid import Solid as Solid
     from .solid import build_solid as build_solid
+    from .stl_and_nodes import write_nodes as write_nodes
+    from .stl_and_nodes import write_stl as write_stl
     from .strut_cell import StrutCell as StrutCell
     from .threemf import write_3mf as write_3mf
 else:

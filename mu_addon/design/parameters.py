@@ -19,8 +19,8 @@ from .dimensions import Dimensions
 from .grading import Field, Grading
 from .printed import as_printed
 from .quantity import PAPER, Description, choice, describe, in_MPa, quantity, text_quantity
-from .wall import Wall, require_used
 from .wall_factors import canonical_text, factors_by_chamber, parsed
+from .wall_material import Wall, require_used
 
 FORMAT = 1
 # Up to here a printed body's angles depend on its mesh as they do at 0.45, in half as much time again.

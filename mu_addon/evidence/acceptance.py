@@ -10,11 +10,11 @@ import numpy as np
 from .curved_reading import curved_reading
 from .effect import NUMERICS, SLIP, STEP
 from .fit import PRIOR, Fit, Fitter
+from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
 from .plausibility import at_a_bound, value_at_a_bound
 from .record import KNOWN
 from .residuals import Dependence
 from .scatter import STATED, excess
-from .selection import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
 
 Array = np.ndarray[Any, Any]
 

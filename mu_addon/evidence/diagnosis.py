@@ -13,9 +13,10 @@ from ..measured import Experiment
 from .acceptance import too_far
 from .detection_limits import at_bounds, with_true_limits
 from .drive import denoised_drives
-from .effect import Effect, Parameter
+from .effect import Effect
 from .fit import Fit, Fitter, interval, interval_by_curvature
 from .fitted_zeros import fitted_zeros
+from .found_causes import FALSE_ALARM_RATE, Selection
 from .gain_on_unseen import gain
 from .main_causes import mainly, share_taken
 from .next_experiment import propose_experiment
@@ -30,7 +31,6 @@ from .residuals import ALTERNATION, BY_TURN, strict_table, structure
 from .rivals import coinciding, with_promising_rivals
 from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
 from .search import further_owners, one_more, reselected, select, select_owned, select_pooled
-from .selection import FALSE_ALARM_RATE, Selection
 from .sensitivity import (
     WANDERING,
     Sensitivity,
@@ -39,15 +39,13 @@ from .sensitivity import (
 )
 from .simulator import Composite
 from .thinning import thinned
-from .verdict import Verdict, identifiability, nearest
+from .verdict import Verdict, identifiability, nearest, unlikely, verdict_kind
 
 Array = np.ndarray[Any, Any]
 Progress = Callable[[str], None]
 
 # Effects that may belong to one specimen, or differ among them, if no common one explains the data.
 OPEN = ("unexplained", "unidentifiable")
-# A nuisance this many spreads from its prior value is no longer only a nuisance.
-UNLIKELY = 3.0
 # This many effects stand in for one that differs among owners: three leaks as one, with valves shut late.
 STRAINED = 5.0
 # Noise around the causes larger or smaller than around the base model by this factor replaces it.
@@ -90,12 +88,7 @@ class Diagnosis:
     @property
     def kind(self) -> str:
         """One of `verdict.KINDS`."""
-        found = self.chosen
-        if (found.left and not self.graded) or found.doubted:
-            return "unexplained"
-        if found.causes:
-            return "ambiguous" if any(c.rivals for c in found.causes) else "named"
-        return "unidentifiable" if unlikely(self.fitter.curved, found.base) else "none"
+        return verdict_kind(self.chosen, self.fitter.curved, self.graded)
 
     def without(self, experiments: Sequence[Experiment], words: Sequence[str]) -> Diagnosis:
         """With experiments from which readings were taken, and these in words."""
@@ -322,12 +315,6 @@ def diagnose(
         tuple(unlikely(fitter.curved, chosen.base)),
         fitted_zeros(fitter, chosen.base),
     )
-
-
-def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
-    """Nuisances with values far from prior knowledge, the farthest first."""
-    away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
-    return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
 
 
 def _fitter(

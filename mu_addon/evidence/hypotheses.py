@@ -9,9 +9,9 @@ import numpy as np
 
 from .effect import CAMERA, Effect
 from .fit import Fit, Fitter
+from .found_causes import RIVAL_DELTA_CHI2
 from .plausibility import at_a_bound
 from .residuals import strict_table, structure
-from .selection import RIVAL_DELTA_CHI2
 from .sensitivity import ABSORBED
 
 # Number of models that the next effect is added to: the best may be wrong while two effects pass for one.

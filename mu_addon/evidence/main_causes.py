@@ -8,13 +8,13 @@ from .acceptance import JUMP, doubts, loss, share_by_experiment, sudden
 from .curved_reading import curved_reading
 from .effect import STEP
 from .fit import Fit, Fitter
+from .found_causes import LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import by_search, ranked
 from .outliers import NAME as OUTLIER
 from .plausibility import at_a_bound
 from .residuals import strict_table, structure
 from .rivals import causes_of, nearest, not_chosen, promising_rivals, with_rivals
 from .scatter import ALONE
-from .selection import LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .significance import by_count
 
 # Share of a misfit that one effect must take to be named although structure is left, and the factor by which

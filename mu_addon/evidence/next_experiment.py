@@ -12,9 +12,9 @@ from ..errors import MuError
 from ..measured import Experiment
 from .effect import BATCH, GEOMETRY, LIBRARY, OF, THICKNESS
 from .fit import Fit, Fitter
+from .found_causes import Selection
 from .noise import Whitening
 from .record import record
-from .selection import Selection
 from .sensitivity import Sensitivity
 
 Array = np.ndarray[Any, Any]

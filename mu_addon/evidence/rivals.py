@@ -11,9 +11,9 @@ import numpy as np
 
 from .effect import CAMERA, FORCE_SCALE, NUMERICS, Effect
 from .fit import Fit, Fitter
+from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection
 from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
 from .owned import MACHINE, owned_effects
-from .selection import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection
 from .sensitivity import Sensitivity
 
 # Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's

@@ -9,12 +9,12 @@ import attrs
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
 from .effect import BATCH, CAMERA, Effect
 from .fit import Fit, Fitter
+from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
 from .owned import owned_effects, owners
 from .pooled import fits_among, pooled_effects, sizes_of
 from .residuals import dependence_table, strict_table, structure, taken_by_scales
 from .rivals import causes_of, pairs_for
-from .selection import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .sensitivity import Sensitivity, sensitivities
 from .significance import by_count, by_gauges, false_alarm_probability, gain_of
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .fit import Fit, Fitter
+from .found_causes import RIVAL_DELTA_CHI2
 from .hypotheses import by_search
-from .selection import RIVAL_DELTA_CHI2
 from .sensitivity import ABSORBED, Sensitivity
 
 DRAWS = 20000

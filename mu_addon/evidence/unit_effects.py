@@ -57,7 +57,7 @@ OBSTACLE_HALVINGS = 2
 @lru_cache(maxsize=2)
 def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
     """A unit's mesh, cached: a process makes many runs of one unit, and most others move this mesh."""
-    from ..resolved.unit import mesh_of
+    from ..resolved.printed_mesh import mesh_of
 
     return mesh_of(unit, settings, cache=cache)
 
@@ -88,7 +88,7 @@ class Body:
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_of`."""
         from ..meshing.morph import morphed
-        from ..resolved.unit import mesh_of
+        from ..resolved.printed_mesh import mesh_of
 
         if self.mesh.resolved and self.drawn:
             # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.

@@ -19,7 +19,7 @@ from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
 from ..meshing.settings import HOMOGENISED, RESOLVED, MeshSettings, require_self_contact_resolvable
-from ..resolved.unit import mesh_of
+from ..resolved.printed_mesh import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores

@@ -12,8 +12,9 @@ import numpy as np
 
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
-from .fit import Fitter
+from .fit import Fit, Fitter
 from .fitted_zeros import FittedZeros
+from .found_causes import TOGETHER, Cause, Selection
 from .gain_on_unseen import Gain
 from .hypotheses import ranked
 from .main_causes import share_taken
@@ -21,7 +22,6 @@ from .next_experiment import Proposal
 from .noise import Source
 from .plausibility import at_a_bound
 from .record import Record
-from .selection import TOGETHER, Cause, Selection
 from .sensitivity import ABSORBED, SEEN, Sensitivity, best_seen
 
 Array = np.ndarray[Any, Any]
@@ -29,6 +29,8 @@ Array = np.ndarray[Any, Any]
 KINDS = ("none", "named", "ambiguous", "unidentifiable", "unexplained")
 # Of what the best effect takes, what another must take for the verdict to turn on it, and at a bound.
 NEAR, SOME = 0.75, 0.5
+# A nuisance this many spreads from its prior value is no longer only a nuisance.
+UNLIKELY = 3.0
 
 
 @attrs.frozen(eq=False)
@@ -152,6 +154,24 @@ class Verdict:
             "next_experiment": {"what": next_.what, "separates": list(next_.separates)} if next_ else None,
             "identifiability": dict(self.identifiability),
         }
+
+
+def verdict_kind(found: Selection, nuisances: Sequence[Parameter], graded: bool) -> str:
+    """Decide which of `KINDS` a search ends in.
+
+    graded: the causes are named although structure is left (`main_causes.mainly`).
+    """
+    if (found.left and not graded) or found.doubted:
+        return "unexplained"
+    if found.causes:
+        return "ambiguous" if any(c.rivals for c in found.causes) else "named"
+    return "unidentifiable" if unlikely(nuisances, found.base) else "none"
+
+
+def unlikely(nuisances: Sequence[Parameter], base: Fit) -> list[Parameter]:
+    """Nuisances with values far from prior knowledge, the farthest first."""
+    away = {p: abs(base.values[p.name] - p.null) / p.spread for p in nuisances if math.isfinite(p.spread)}
+    return sorted((p for p in away if away[p] > UNLIKELY), key=lambda p: -away[p])
 
 
 def nearest(fitter: Fitter, found: Selection) -> tuple[str, float] | None:

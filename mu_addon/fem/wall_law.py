@@ -11,7 +11,7 @@ from .laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from .materials import Layer
 
 if TYPE_CHECKING:
-    from ..design.wall import Wall
+    from ..design.wall_material import Wall
 
 Array = np.ndarray[Any, Any]
 

@@ -14,7 +14,7 @@ from ..design.assets import asset_file, asset_names
 from ..design.parameters import HIGHEST_POISSON
 from ..design.quantity import in_kPa
 from ..design.toml_text import parse, place
-from ..design.wall import Wall, require_used
+from ..design.wall_material import Wall, require_used
 from ..errors import InputError, did_you_mean
 from ..fem import laws
 from ..fem.materials import Layer, Materials

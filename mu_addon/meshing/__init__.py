@@ -16,7 +16,7 @@ from ..lazy import public_face
 if TYPE_CHECKING:
     from .homogenised_unit import MeshingWarning as MeshingWarning
     from .homogenised_unit import mesh_unit as mesh_unit
-    from .lattice import GmshUnavailable as GmshUnavailable
+    from .lattice_region import GmshUnavailable as GmshUnavailable
     from .mesh import LATTICE as LATTICE
     from .mesh import MEMBRANE as MEMBRANE
     from .mesh import Mesh as Mesh

@@ -15,8 +15,7 @@ from ..design.body import Body, half
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..errors import InputError, MeshingError
-from .lattice import GmshUnavailable, Sizes, lattice_mesh
-from .membrane import Membrane, WallGrid
+from .lattice_region import GmshUnavailable, Sizes, lattice_mesh
 from .mesh import (
     LATTICE,
     MEMBRANE,
@@ -35,6 +34,7 @@ from .quality import GAUSS, check_positive, folded_corners, shapes
 from .revolved import region_at, unit_surfaces
 from .settings import CELL_MM, MeshSettings
 from .surface import Surface, mesh_surface
+from .wall_grid import Membrane, WallGrid
 
 Progress = Callable[[str, float], None]
 

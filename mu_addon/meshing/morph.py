@@ -7,10 +7,10 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
-from .membrane import Membrane, WallGrid, unmovable
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, Array, Mesh, edge_keys, edges_of
 from .quality import check_positive
 from .settings import MeshSettings
+from .wall_grid import Membrane, WallGrid, unmovable
 
 
 class Harmonic:

@@ -25,7 +25,7 @@ from ..meshing.morph import Morph
 from ..meshing.settings import MeshSettings
 from ..placement.candidates import Candidate, roi, with_sensor
 from ..resolved.morph import PrintedMorph
-from ..resolved.unit import mesh_of
+from ..resolved.printed_mesh import mesh_of
 from .freedoms import Freedom, changed_unit
 from .gradient import Pair
 from .structure import WITHOUT, Structure

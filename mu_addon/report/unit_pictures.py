@@ -21,7 +21,7 @@ PATH_COLOR = (0.835, 0.369, 0.0)  # plots.CHOSEN
 ANCHOR_COLOR = (0.10, 0.11, 0.16)
 OBSTACLE_COLOR = (0.47, 0.45, 0.43)
 COLORS = {MEMBRANE: MEMBRANE_COLOR, LATTICE: LATTICE_COLOR}
-SAGITTAL = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
+MIRROR_PLANE = Cut((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), color=(0.95, 0.86, 0.72))
 WHITE = (1.0, 1.0, 1.0)
 
 # Node between two corners of a second-order tetrahedron, in VTK's order.
@@ -50,7 +50,7 @@ def side_view(
     """
     seen = [*parts, *_sensor(anchors, np.asarray(path, float), radius)]
     camera, aspect = _framed(seen, (1.0, 0.0, 0.0))
-    image = render(seen, camera, width, round(width / aspect), cut=SAGITTAL)
+    image = render(seen, camera, width, round(width / aspect), cut=MIRROR_PLANE)
     return SideView(image, camera.extent(aspect), anchors[:, 1:])
 
 
@@ -63,7 +63,7 @@ def portrait(
     """
     seen = [*parts, *_sensor(anchors, np.asarray(path, float), radius)]
     camera, aspect = _framed(seen, (1.0, 0.55, 0.30))
-    return render(seen, camera, width, round(width / aspect), cut=SAGITTAL, background=WHITE)
+    return render(seen, camera, width, round(width / aspect), cut=MIRROR_PLANE, background=WHITE)
 
 
 def _framed(parts: Sequence[Part], towards: tuple[float, float, float]) -> tuple[Camera, float]:
@@ -111,7 +111,7 @@ def motion(
     every = [part for scene in scenes for part in scene]
     standing = _behind(beside)
     camera, aspect = _framed(every, (-1.0 if outside else 1.0, 0.25, 0.12))
-    cut = None if flip or outside else Cut(SAGITTAL.point, SAGITTAL.normal)
+    cut = None if flip or outside else Cut(MIRROR_PLANE.point, MIRROR_PLANE.normal)
     return [
         Picture(
             png(

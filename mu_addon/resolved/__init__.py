@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
+    from .printed_mesh import mesh_of as mesh_of
+    from .printed_mesh import mesh_printed as mesh_printed
     from .strut import strut_mesh as strut_mesh
-    from .unit import mesh_of as mesh_of
-    from .unit import mesh_printed as mesh_printed
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -18,17 +18,17 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.elements import even_points, shape_functions, shape_gradients
 from ..fem.embedding import Footholds
-from ..meshing.membrane import unmovable
 from ..meshing.mesh import Array, Mesh, mirror
 from ..meshing.morph import shrunk, struts_alone_differ
 from ..meshing.quality import check_positive
 from ..meshing.settings import MeshSettings
+from ..meshing.wall_grid import unmovable
 from .beams import Layers, rotation_nodes
 from .joints import zones_of
 from .lattice import clearance, cuts
 from .octants import SweptNodes
+from .printed_mesh import Sizes, beam_layers, wall_grid, wall_of
 from .strut import is_half_diagonal
-from .unit import Sizes, beam_layers, wall_grid, wall_of
 
 # An element that the wall cuts is divided this often along each edge to tell the share outside.
 _STEPS = 8

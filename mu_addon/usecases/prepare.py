@@ -16,10 +16,10 @@ import numpy as np
 
 from ..design.anchors import window
 from ..design.body import Body, read_body
-from ..design.export import write_stl
 from ..design.gates import Gates, Guide
 from ..design.parameters import Unit, read_unit, to_toml
 from ..design.solid import Solid, build_solid
+from ..design.stl_and_nodes import write_stl
 from ..errors import InputError
 from ..files import read_npz, write_npz
 from ..reading import parse_json

@@ -13,10 +13,10 @@ import attrs
 
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.found_causes import RIVAL_DELTA_CHI2
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.record import KNOWN, record
-from mu_addon.evidence.selection import RIVAL_DELTA_CHI2
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from mu_addon.run.processes import one_thread_each

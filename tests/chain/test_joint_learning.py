@@ -14,7 +14,7 @@ from mu_addon.errors import InputError
 from mu_addon.fem import Equilibrium, Model, materials_of
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.unit import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_of
 from mu_addon.run.cache import Cache
 
 from .joined import full_model

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from mu_addon.design import lattice_kinds, solid
 from mu_addon.design.anchors import window
-from mu_addon.design.export import write_nodes
 from mu_addon.design.lattice import filled, lattice_of
 from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
 from mu_addon.design.parameters import Envelope, Unit, from_toml, to_toml
+from mu_addon.design.stl_and_nodes import write_nodes
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import lattice_graph
 

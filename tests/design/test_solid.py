@@ -9,9 +9,9 @@ import pytest
 
 from mu_addon.design import gates, shapes, solid, surface
 from mu_addon.design.anchors import window
-from mu_addon.design.export import write_nodes, write_stl
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Chambers, Envelope, Unit, Waveguide, load_preset
+from mu_addon.design.stl_and_nodes import write_nodes, write_stl
 from mu_addon.errors import InputError
 
 PRESETS = ("mu-0.75x", "mu-1.0x", "mu-1.5x")

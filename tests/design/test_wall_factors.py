@@ -99,7 +99,7 @@ def test_print_adds_to_every_wall_alike():
 
 
 def test_a_mesh_has_the_wall_that_is_drawn():
-    """As near as that of even walls is held to in `tests/meshing/test_unit`."""
+    """As near as that of even walls is held to in `tests/meshing/test_homogenised_unit`."""
     report = mesh_quality(mesh_unit(UNEVEN), UNEVEN)
     assert report.inverted == 0
     assert abs(report.membrane_volume_error) < 2e-4

@@ -6,6 +6,7 @@ import numpy as np
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import FORCE_SCALE
 from mu_addon.evidence.fit import Fitter
+from mu_addon.evidence.found_causes import Selection
 from mu_addon.evidence.noise import Source
 from mu_addon.evidence.owned import coincident_effects, owned_effects, strain_rate
 from mu_addon.evidence.plausibility import value_at_a_bound
@@ -18,7 +19,6 @@ from mu_addon.evidence.prediction.unit_pressure import TIMED
 from mu_addon.evidence.prediction.yielding import _borne_by_one
 from mu_addon.evidence.record import record
 from mu_addon.evidence.rivals import causes_of, with_promising_rivals
-from mu_addon.evidence.selection import Selection
 from mu_addon.evidence.simulator import Composite
 from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence.bench import experiment

@@ -9,10 +9,10 @@ from benchmarks.evidence.second_code.recording import write
 from benchmarks.evidence.second_code.sets import Order, made
 from mu_addon.evidence.acceptance import of_the_law
 from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.evidence.found_causes import LAW
 from mu_addon.evidence.prediction.coupon import CouponStress
 from mu_addon.evidence.prediction.effective_pressure import first_order_lag, spread_lag
 from mu_addon.evidence.prediction.specimen import turns
-from mu_addon.evidence.selection import LAW
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from tests.evidence import bench

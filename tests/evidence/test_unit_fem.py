@@ -316,7 +316,7 @@ def test_a_marker_across_the_mirror_moves_like_its_image(mesh):
     np.testing.assert_allclose(other, one * [-1, 1, 1])
 
 
-def test_without_x_a_marker_lies_in_the_sagittal_plane(mesh):
+def test_without_x_a_marker_lies_in_the_mirror_plane(mesh):
     (m,) = attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="yz")], 4.0)
     np.testing.assert_array_equal(m.point, [0.0, 20.0, 40.0])
     assert m.axes == "yz"

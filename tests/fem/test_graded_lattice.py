@@ -16,7 +16,7 @@ from mu_addon.fem.laws import CubicShear, DiagonalStretch, Foam, NeoHooke
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.unit import mesh_of, mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_of, mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.printed

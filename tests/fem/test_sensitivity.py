@@ -11,7 +11,7 @@ from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.sensitivity import of_residual
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 from tests.fem.bodies import box
 
 PRESSURE = 0.01

@@ -9,7 +9,7 @@ from mu_addon.placement.deviation import centreline, centreline_deviation, rank
 
 
 def arc(angle, n=6, length=60.0):
-    """Points on a circular arc of a given total angle in the sagittal plane."""
+    """Points on a circular arc of a given total angle in the mirror plane x = 0."""
     s = np.linspace(0, 1, n)
     radius = length / angle
     return np.stack([0 * s, radius * (1 - np.cos(angle * s)), radius * np.sin(angle * s)], axis=1)

@@ -15,7 +15,7 @@ from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.sensitivity_map import influence_map, loaded, parities
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 UNIT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))

@@ -13,7 +13,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report import unit_pictures as pictures
 from mu_addon.report.render import Part
 from mu_addon.report.unit_pictures import region_skin, skin
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 
 def cube(order, low=(0.0, -1.0, 0.0), high=(1.0, 1.0, 2.0)):

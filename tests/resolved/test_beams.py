@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mu_addon.design.body import Body
 from mu_addon.design.parameters import load_preset
-from mu_addon.design.wall import Wall
+from mu_addon.design.wall_material import Wall
 from mu_addon.errors import InputError
 from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.carried_nodes import Carried, following
@@ -22,7 +22,7 @@ from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
 from mu_addon.meshing.settings import SOLID, MeshSettings
 from mu_addon.resolved.beams import without_beams
 from mu_addon.resolved.joints import zones_of
-from mu_addon.resolved.unit import Sizes, mesh_printed
+from mu_addon.resolved.printed_mesh import Sizes, mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))

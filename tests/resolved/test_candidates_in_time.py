@@ -6,7 +6,7 @@ import pytest
 
 from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points, windows
-from mu_addon.design.wall import Wall
+from mu_addon.design.wall_material import Wall
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
 from mu_addon.fem.obstacle import Obstacle
@@ -14,7 +14,7 @@ from mu_addon.fem.rigid import Plane
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import SOLID, MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 SMALL = load_preset("mu-1.0x")
 SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))

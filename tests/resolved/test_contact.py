@@ -21,8 +21,8 @@ from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.resolved.lattice import clearance
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.strut import strut_mesh
-from mu_addon.resolved.unit import mesh_printed
 
 SMALL = load_preset("mu-1.0x")
 SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))

@@ -14,7 +14,7 @@ from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.lattice import strut_volume_mm3, struts
 from mu_addon.resolved.octants import graded_nodes
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
 
 UNIT = load_preset("mu-1.0x")

@@ -25,8 +25,8 @@ from mu_addon.resolved.beams import Layers, integrals
 from mu_addon.resolved.frame import frame_tensor, frame_zones
 from mu_addon.resolved.graph_beams import with_graph_beams
 from mu_addon.resolved.joints import POISSON, Zones, zones_of
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.strut import strut_mesh
-from mu_addon.resolved.unit import mesh_printed
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
 from tests.design.kinds import octet
 

@@ -12,7 +12,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.joints import concentration_factors, joint_stretch
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
 SMALL = 1e-4

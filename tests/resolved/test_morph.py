@@ -10,7 +10,7 @@ from mu_addon.fem.elements import solid_volumes
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.morph import PrintedMorph
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
 BEAMS = MeshSettings(refine=0.3, fidelity="resolved")

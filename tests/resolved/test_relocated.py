@@ -11,7 +11,7 @@ from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.resolved.morph import PrintedMorph
-from mu_addon.resolved.unit import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_of
 
 UNIT = Unit().evolve(count=3)
 SETTINGS = MeshSettings(refine=0.35, fidelity=RESOLVED)

@@ -17,8 +17,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import lattice_graph
 from mu_addon.placement.sensitivity_map import loaded
 from mu_addon.resolved.candidates import PrintedWaveguides
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.response import _frame, _natural, _stiffness, bar_response
-from mu_addon.resolved.unit import mesh_printed
 
 
 def test_an_even_beam_has_the_stiffness_of_the_textbook():

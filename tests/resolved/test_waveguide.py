@@ -23,8 +23,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.bar import bar_mesh, outside_bar
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.octants import thickened_nodes
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.start import eased, started
-from mu_addon.resolved.unit import mesh_printed
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
 
 from .ties import require_linear_motions_kept

@@ -9,7 +9,7 @@ from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
-from mu_addon.resolved.unit import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_of
 from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from mu_addon.usecases.simulate_and_place.job import Job as Study

@@ -1,6 +1,6 @@
 """Meshes as the paper's may have been: the whole body, without a mirror plane, equally coarse everywhere.
 
-The paper meshes with Gmsh and prints no size. Here the membrane is the grid of `meshing.membrane`, and the
+The paper meshes with Gmsh and prints no size. Here the membrane is the grid of `meshing.wall_grid`, and the
 lattice around it is filled by Gmsh's Delaunay without regard to anchors. A seed moves sizes by some per cent,
 and with them every element: two seeds are two meshes that nobody would call different.
 """
@@ -16,10 +16,10 @@ import numpy as np
 from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import MeshingError
-from mu_addon.meshing.lattice import gmsh_model, load_gmsh
-from mu_addon.meshing.membrane import WallGrid
+from mu_addon.meshing.lattice_region import gmsh_model, load_gmsh
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Array, Mesh, edges_of, mirror, oriented, second_order
 from mu_addon.meshing.quality import check_positive
+from mu_addon.meshing.wall_grid import WallGrid
 
 # The membrane's elements, along the meridian and around, in mm at a cell of 12.5 mm.
 _MERIDIAN_MM, _HOOP_MM = 2.5, 5.0

@@ -9,8 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ...design import settings
-from ...design.export import write_nodes, write_stl
 from ...design.solid import QUALITY
+from ...design.stl_and_nodes import write_nodes, write_stl
 from ..shared.operators import ValidUnitOperator
 from ..unit import object as unit_object
 from ..unit.fields import sentence

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
-from ...design.wall import Wall, offered
+from ...design.wall_material import Wall, offered
 from ..unit.broken import broken, description
 from ..unit.fields import field, label, shown_value
 from ..unit.object import active_root

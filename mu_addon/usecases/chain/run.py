@@ -24,7 +24,7 @@ from ...measured.pose import down
 from ...meshing.homogenised_unit import MeshingWarning
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_trajectory
-from ...resolved.unit import mesh_of
+from ...resolved.printed_mesh import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress

@@ -12,10 +12,10 @@ import numpy as np
 
 from ...evidence.effect import Parameter
 from ...evidence.fit import Fit
+from ...evidence.found_causes import RIVAL_DELTA_CHI2
 from ...evidence.record import KNOWN, repeats
 from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
 from ...evidence.scatter import noise_limit
-from ...evidence.selection import RIVAL_DELTA_CHI2
 from ...evidence.sensitivity import best_seen
 from ...files import write_text
 from ...report.charts import CHOSEN, INK, signed

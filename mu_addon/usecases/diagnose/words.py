@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...evidence.effect import FORCE_SCALE, OF, SLIP, THICKNESS, Effect, Parameter
+from ...evidence.found_causes import Cause
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
 from ...evidence.prediction.unit_pressure import MODULUS
 from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
-from ...evidence.selection import Cause
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
 from .remedies import what_to_do

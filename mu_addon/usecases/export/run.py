@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...design.beams import beam_parts
-from ...design.export import write_nodes
 from ...design.lattice import lattice_of
 from ...design.printing.printer import load_printer
 from ...design.printing.vents import Vented, vented
 from ...design.solid import QUALITY, Solid, build_solid
+from ...design.stl_and_nodes import write_nodes
 from ...design.surface import area, bad_edges, genus, stl_bytes, stl_surface, volume
 from ...design.threemf import Part, read_3mf, write_3mf
 from ...errors import MeshingError, OutputError

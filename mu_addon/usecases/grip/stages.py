@@ -21,7 +21,7 @@ from ...fem.state import State, rest
 from ...fem.unit_materials import materials_of, self_contact_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
-from ...resolved.unit import mesh_of
+from ...resolved.printed_mesh import mesh_of
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress

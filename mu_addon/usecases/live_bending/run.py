@@ -31,7 +31,7 @@ from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
 from ...resolved.morph import PrintedMorph
-from ...resolved.unit import mesh_of
+from ...resolved.printed_mesh import mesh_of
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study

@@ -9,11 +9,11 @@ import attrs
 import numpy as np
 
 from ...design.parameters import Material
-from ...design.wall import Wall
+from ...design.wall_material import Wall
 from ...meshing.homogenised_unit import MeshingWarning
 from ...meshing.mesh import Mesh
 from ...meshing.settings import MeshSettings
-from ...resolved.unit import mesh_of
+from ...resolved.printed_mesh import mesh_of
 from ...run.cache import Cache, key
 from .job import Job
 

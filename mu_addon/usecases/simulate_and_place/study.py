@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from ...design.anchors import Window, anchor_points, windows
-from ...design.export import write_nodes, write_stl
 from ...design.solid import Solid, build_solid
+from ...design.stl_and_nodes import write_nodes, write_stl
 from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.bending_angle import TipSection
 from ...fem.model import Model

@@ -21,7 +21,7 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.lattice import without_loose_parts
-from mu_addon.resolved.unit import mesh_printed
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 from ..fem.bodies import box
 from .ties import require_linear_motions_kept

@@ -17,7 +17,7 @@ from mu_addon.design.parameters import (
     to_toml,
     write_unit,
 )
-from mu_addon.design.wall import Wall
+from mu_addon.design.wall_material import Wall
 from mu_addon.errors import InputError
 from mu_addon.fem.laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
 from mu_addon.fem.materials import Materials

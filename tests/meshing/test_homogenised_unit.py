@@ -25,7 +25,7 @@ from mu_addon.meshing import (
     mesh_unit,
     mirror,
 )
-from mu_addon.meshing.lattice import GmshUnavailable
+from mu_addon.meshing.lattice_region import GmshUnavailable
 from mu_addon.meshing.mesh import FLIPPED_TET, TET_EDGES, TET_FACES, TRIANGLE_EDGES, boundary_faces, edges_of
 from mu_addon.meshing.quality import cavity_enclosed, check_positive, element_volumes
 

@@ -15,10 +15,10 @@ from ..design.parameters import Unit
 from ..errors import InputError
 from ..fem.embedding import embed
 from ..meshing.homogenised_unit import mesh_unit
-from ..meshing.membrane import Membrane, WallGrid
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
 from ..meshing.settings import CELL_MM, SOLID, MeshSettings
+from ..meshing.wall_grid import Membrane, WallGrid
 from .beams import REACH, with_beams
 from .frame import frame_zones
 from .graph_beams import with_graph_beams
