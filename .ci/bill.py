@@ -13,9 +13,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import gmsh_window
+import warp_cpu
 from slim import Slimmed
 
 NAME = "sbom.cdx.json"
+CHANGES = {library.FILE: library.CHANGE for library in (gmsh_window, warp_cpu)}
+"""What is done to a file that the build replaces."""
 _CLASSIFIER = "License :: "
 # A name of a licence, and not its text.
 _LONGEST_NAME = 60
@@ -80,11 +84,10 @@ def _pedigree(name: str, version: str, purl: str, change: Slimmed) -> dict[str, 
         "purl": purl,
         "hashes": [{"alg": "SHA-256", "content": change.sha256}],
     }
-    compiled = f"{', '.join(change.replaced)} compiled anew from this wheel's sources without CUDA; "
+    replaced = "".join(f"{file} {CHANGES[file]}; " for file in change.replaced)
     notes = (
         f"{change.files} files, {change.bytes} bytes, left out: {', '.join(change.patterns)}; "
-        f"{compiled if change.replaced else ''}"
-        "all others unchanged but RECORD and the build tag in WHEEL"
+        f"{replaced}all others unchanged but RECORD and the build tag in WHEEL"
     )
     return {"ancestors": [ancestor], "notes": notes}
 

@@ -11,9 +11,10 @@ Beside them it puts sample.blend and sample-NAME.blend, the sample scenes.
 
 Blender wants the manifest beside the package's `__init__.py`; the checkout keeps them apart so that the core
 is an ordinary package. What ships is copied together first. Wheels come from pip, each with the SHA-256 that
-wheels.csv pins, and are kept in FOLDER/wheels; six are slimmed (slim.py). numpy is never among them, since
+wheels.csv pins, and are kept in FOLDER/wheels; large ones are slimmed (slim.py). numpy is never among them:
 Blender has its own and a second one would replace it. For Linux, Warp's library is compiled without its CUDA
-part, 114 MB of the archive (warp_cpu.py). sbom.cdx.json in the archive lists what it holds.
+part, 114 MB of the archive (warp_cpu.py), and gmsh's asks for no library of its window (gmsh_window.py).
+sbom.cdx.json in the archive lists what it holds.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ import tomllib
 from itertools import product
 from pathlib import Path
 
+import gmsh_window
+import warp_cpu
 from bill import write_bill
 from slim import slim
-from warp_cpu import library
 from wheels import BLENDERS, PLATFORMS, PYTHONS, download, not_as_pinned, pinned, replaced
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -112,6 +114,13 @@ def bundle(source: Path, wheels: list[Path], platform: str, python: str) -> None
     manifest.write_text(f"{head}\n\n{permissions}{rest}", encoding="utf-8")
 
 
+def made_anew(file: str, wheel: Path, folder: Path) -> bytes:
+    """The library that takes the place of a wheel's own; raises RuntimeError where it is not as pinned."""
+    if file == gmsh_window.FILE:
+        return gmsh_window.library(wheel)
+    return warp_cpu.library(wheel, folder / "warp")
+
+
 def build(tool: Path, out: Path, platform: str | None = None, python: str = "", cuda: bool = False) -> int:
     """Stage, validate and build one .zip into `out`; the exit status of the first step that fails."""
     slimmed = []
@@ -123,7 +132,7 @@ def build(tool: Path, out: Path, platform: str | None = None, python: str = "", 
             wheels = []
             wanted = [w for w in pinned() if (w.platform, w.python) == (platform, python)]
             for pin, pinned_wheel in zip(wanted, download(out / "wheels", platform, python), strict=True):
-                new = {name: library(pinned_wheel, out / "wheels" / "warp") for name in replaced(pin, cuda)}
+                new = {name: made_anew(name, pinned_wheel, out / "wheels") for name in replaced(pin, cuda)}
                 wheel, change = slim(pinned_wheel, out / "wheels" / platform / python / "slim", new)
                 wheels.append(wheel)
                 slimmed += [change] if change else []

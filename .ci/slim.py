@@ -1,10 +1,10 @@
 """Wheels without what no module imports: tests, examples, manuals, headers, sources of compiled code.
 
 A slimmed wheel is made from the pinned one and no other: every file that stays is the same to the byte, but
-for the list of files (RECORD), the build tag in WHEEL, and Warp's library for Linux, which is compiled anew
-without CUDA (warp_cpu.py). Nothing is left out that another extension of Blender's could import, since all
-extensions share one folder of packages; licences stay. `sbom.cdx.json` names the wheel that it was made from,
-with its SHA-256, and what was left out or replaced.
+for the list of files (RECORD), the build tag in WHEEL, and two libraries for Linux: Warp's without CUDA
+(warp_cpu.py) and gmsh's without its window (gmsh_window.py). Nothing is left out that another extension of
+Blender's could import, since all extensions share one folder of packages; licences stay. `sbom.cdx.json`
+names the wheel that it was made from, with its SHA-256, and what was left out or replaced.
 
 Large files are compressed by LZMA, which takes a third less than deflate: Blender builds its Python with it
 on every system.
@@ -26,11 +26,16 @@ PARTS = {
     "cvxopt": (),
     "fonttools": ("fontTools/*.c", "fontTools/*.pyx", "fontTools/*.pxd"),
     "gmsh": ("gmsh-*.data/data/share/doc/*", "gmsh-*.data/data/include/*"),
+    "ipctk": (),
+    "kiwisolver": (),
+    "manifold3d": (),
     "matplotlib": ("*/tests/*", "matplotlib/mpl-data/sample_data/*"),
+    "pillow": (),
+    "pytetwild": (),
     "scipy": ("*/tests/*",),
     "warp_lang": ("warp/tests/*", "warp/examples/*"),
 }
-"""The wheels that are slimmed, and what is left out of each; `*` stands for folders, too."""
+"""The wheels that are made anew, and what is left out of each; `*` stands for folders, too."""
 LEGAL = ("licen", "copying", "notice", "credits")
 """A file with one of these in its name stays."""
 SMALL = 4096

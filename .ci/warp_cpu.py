@@ -14,17 +14,20 @@ from __future__ import annotations
 
 import hashlib
 import os
-import struct
 import subprocess
 import sys
 import tempfile
 import zipfile
 from pathlib import Path
 
+import elf
+
 FILE = "warp/bin/warp.so"
 """The library in Warp's wheel."""
 SHA256 = "dce0c8c4b9dd783702e9ac6e7223680c7427fbf7fa2252f743ffa3e299d982a6"
 """Of the library that is made from the wheel pinned in wheels.csv."""
+CHANGE = "compiled anew from this wheel's sources without CUDA"
+"""What is said of it in the bill of materials."""
 COMPILER = "ziglang==0.17.0"
 COMPILERS = (
     "97079827064a7492cce5541ceb438ae8003ce1e54e399676da2d62fb7a5dc08b",
@@ -42,7 +45,6 @@ _NATIVE = "warp/native/"
 _VOLUMES = ("volume.cpp", "volume_builder.cpp")
 _REFUSED = ("wp_volume_", "wp_nanovdb_")
 _EXPORTS = "{ global: wp_*; local: *; };\n"
-_DYNAMIC_SYMBOLS = 11  # SHT_DYNSYM of the ELF format
 
 
 def library(wheel: Path, folder: Path) -> bytes:
@@ -58,24 +60,6 @@ def library(wheel: Path, folder: Path) -> bytes:
     if digest != SHA256:
         raise RuntimeError(f"{kept} has SHA-256 {digest}, pinned is {SHA256} (warp_cpu.py)")
     return content
-
-
-def exported(content: bytes) -> set[str]:
-    """Names that a 64-bit little-endian ELF library defines for others."""
-    (start,) = struct.unpack_from("<Q", content, 0x28)
-    size, count = struct.unpack_from("<HH", content, 0x3A)
-    sections = [struct.unpack_from("<IIQQQQIIQQ", content, start + size * k) for k in range(count)]
-    names = set()
-    for _, kind, _, _, offset, length, link, _, _, entry in sections:
-        if kind != _DYNAMIC_SYMBOLS:
-            continue
-        strings = sections[link][4]
-        for at in range(offset, offset + length, entry):
-            name, _, _, section, _, _ = struct.unpack_from("<IBBHQQ", content, at)
-            if name and section:
-                end = content.index(b"\0", strings + name)
-                names.add(content[strings + name : end].decode())
-    return names
 
 
 def refusals(names: set[str]) -> str:
@@ -108,7 +92,7 @@ def _compiled(wheel: Path, packages: Path) -> bytes:
             if name.startswith(_NATIVE):
                 package.extract(name, root)
         sources = root / _NATIVE
-        wanted = exported(package.read(FILE))
+        wanted = elf.exported(package.read(FILE))
         (root / "refusals.cpp").write_text(refusals({n for n in wanted if n.startswith(_REFUSED)}))
         (root / "exports.ld").write_text(_EXPORTS)
         files = sorted(p.name for p in sources.glob("*.cpp") if p.name not in _VOLUMES)
@@ -136,7 +120,7 @@ def _compiled(wheel: Path, packages: Path) -> bytes:
             },
         )
         content = (root / "warp.so").read_bytes()
-    if exported(content) != wanted:
-        differ = ", ".join(sorted(exported(content) ^ wanted)[:5])
+    if elf.exported(content) != wanted:
+        differ = ", ".join(sorted(elf.exported(content) ^ wanted)[:5])
         raise RuntimeError(f"the library without CUDA differs from the published one in {differ}, ...")
     return content

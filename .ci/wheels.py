@@ -21,6 +21,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+import gmsh_window
 import warp_cpu
 from slim import differences, slimmed_name
 
@@ -91,9 +92,12 @@ def _pip(command: str, platform: str, python: str) -> list[str]:
 
 
 def replaced(wheel: Wheel, cuda: bool = False) -> dict[str, str]:
-    """SHA-256 of each file of a wheel that the build replaces, by name: Warp's library for Linux."""
-    warp = (wheel.platform, wheel.name) == ("linux-x64", "warp-lang")
-    return {warp_cpu.FILE: warp_cpu.SHA256} if warp and not cuda else {}
+    """SHA-256 of each file of a wheel that the build replaces, by name: two libraries for Linux."""
+    if (wheel.platform, wheel.name) == ("linux-x64", "gmsh"):
+        return {gmsh_window.FILE: gmsh_window.SHA256}
+    if (wheel.platform, wheel.name) == ("linux-x64", "warp-lang") and not cuda:
+        return {warp_cpu.FILE: warp_cpu.SHA256}
+    return {}
 
 
 def not_as_pinned(archive: Path, wheels: Iterable[Wheel], folder: Path, cuda: bool = False) -> list[str]:

@@ -1,4 +1,7 @@
-"""System libraries that gmsh needs, and the remedy where one is missing, found without loading gmsh."""
+"""System libraries that gmsh's published wheel needs, and the remedy where one is missing.
+
+Of these the extension's own gmsh asks for libgomp alone.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +32,7 @@ _CACHE = Path("/etc/ld.so.cache")
 
 
 def missing_libraries() -> list[str]:
-    """Names of those of SYSTEM_LIBRARIES that this system lacks; none where it cannot be known.
-
-    Nothing is loaded: Blender asks at every redraw.
-    """
+    """Names of those of SYSTEM_LIBRARIES that this system lacks; none where it cannot be known."""
     try:
         known = file_bytes(_CACHE)
     except OSError:

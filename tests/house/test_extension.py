@@ -2,15 +2,18 @@
 
 import base64
 import hashlib
+import importlib.metadata
 import importlib.util
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -236,7 +239,7 @@ def test_warps_library_is_replaced_by_the_pinned_one_alone(tmp_path, ci, publish
 def test_warps_library_for_the_processor_refuses_what_it_lacks(ci):
     warp_cpu = ci("warp_cpu")
     folder = Path(importlib.util.find_spec("warp").origin).parent
-    names = warp_cpu.exported((folder / "bin" / "warp.so").read_bytes())
+    names = ci("elf").exported((folder / "bin" / "warp.so").read_bytes())
     assert {"wp_init", "wp_volume_create_host", "wp_nanovdb_version", "wp_mesh_create_host"} <= names
     assert all(name.startswith("wp_") for name in names)
     lines = warp_cpu.refusals({n for n in names if n.startswith("wp_volume_")}).splitlines()
@@ -245,6 +248,65 @@ def test_warps_library_for_the_processor_refuses_what_it_lacks(ci):
     # What is compiled lies in the wheel, without the sources that need what it lacks.
     sources = {p.name for p in (folder / "native").glob("*.cpp")}
     assert {"warp.cpp", "mesh.cpp", "bvh_cubql.cpp", *warp_cpu._VOLUMES} <= sources
+
+
+def gmsh_library():
+    """gmsh's own library as its wheel installs it: None on another system than Linux."""
+    (files,) = [importlib.metadata.files("gmsh")]
+    return next((f.locate() for f in files if f.name.startswith("libgmsh.so")), None)
+
+
+@pytest.mark.skipif(gmsh_library() is None, reason="gmsh's library for Linux")
+def test_gmshs_library_asks_for_no_window_and_is_otherwise_the_same(ci):
+    elf, gmsh_window = ci("elf"), ci("gmsh_window")
+    published = gmsh_library().read_bytes()
+    made = gmsh_window.without_window(published)
+    assert hashlib.sha256(made).hexdigest() == gmsh_window.SHA256
+    asked = {library.name for library in elf.needed(published)}
+    struck = asked - {library.name for library in elf.needed(made)}
+    assert {"libGLU.so.1", "libXft.so.2", "libXcursor.so.1", "libXinerama.so.1"} <= struck
+    assert asked - struck >= {"libc.so.6", "libm.so.6", "libgomp.so.1", "libstdc++.so.6"}
+    weakened = {s.name for s in elf.symbols(made) if made[s.at + 4] != published[s.at + 4]}
+    assert {"gluSphere", "glBegin", "XftFontOpen", "XOpenDisplay", "FcPatternDestroy"} <= weakened
+    assert not weakened & elf.exported(published)
+    table = elf.dynamic(published)[0]
+    changed = np.flatnonzero(np.frombuffer(made, "u1") != np.frombuffer(published, "u1"))
+    outside = (changed < table.offset) | (changed >= table.offset + table.size)
+    assert int(outside.sum()) == len(weakened)
+
+
+STEP = """
+import sys
+import gmsh
+gmsh.initialize()
+gmsh.model.occ.addBox(0, 0, 0, 1, 2, 3)
+gmsh.model.occ.synchronize()
+gmsh.write("box.step")
+gmsh.model.mesh.generate(3)
+print(len(gmsh.model.mesh.getNodes()[0]))
+files = {line.split("/")[-1].strip() for line in open("/proc/self/maps")}
+print(sorted(name for name in files if name.startswith(("libX", "libGL", "libfontconfig", "libgmsh"))))
+"""
+
+
+@pytest.mark.skipif(gmsh_library() is None, reason="gmsh's library for Linux")
+def test_gmsh_without_its_window_loads_none_of_its_libraries_and_writes_step(tmp_path, ci):
+    made = tmp_path / gmsh_library().name
+    made.write_bytes(ci("gmsh_window").without_window(gmsh_library().read_bytes()))
+    # gmsh takes the library that lies beside its module. The loader reads all names at once.
+    shutil.copy(importlib.util.find_spec("gmsh").origin, tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-c", STEP],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(tmp_path), "PATH": ""},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    nodes, files = done.stdout.splitlines()[-2:]
+    assert (int(nodes) > 8, files) == (True, f"['{made.name}']")
+    assert "CLOSED_SHELL" in (tmp_path / "box.step").read_text()
 
 
 def test_a_library_of_other_bytes_than_pinned_is_refused(tmp_path, ci, monkeypatch):
