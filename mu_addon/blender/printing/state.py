@@ -82,7 +82,7 @@ _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[dict[str, Limit]] = FileCache()
 _checks: FileCache[Any] = FileCache()
 _file_checks: FileCache[tuple[Any, dict[str, Any]]] = FileCache()
-_exports: FileCache[dict[str, Any]] = FileCache()
+_exports: FileCache[tuple[dict[str, Any], str]] = FileCache()
 
 
 def printer_of(root: Any) -> Printer:
@@ -306,16 +306,18 @@ class Exported:
 
 def exported(root: Any) -> Exported | None:
     """Content of the unit's folder of exports, or None if nothing there is complete."""
-    path = folder_of(root, EXPORT) / MANIFEST
+    path, unit = (folder_of(root, EXPORT) / name for name in (MANIFEST, "unit.toml"))
 
-    def read() -> dict[str, Any]:
+    def read() -> tuple[dict[str, Any], str]:
         manifest = parse_json(file_bytes(path), path.name)
-        return {name: manifest[name] for name in ("unit", "path", "resin", "files", "refused", "vents")}
+        kept = {name: manifest[name] for name in ("path", "resin", "files", "refused", "vents")}
+        return kept, shape_hash(read_unit(unit))
 
-    found = _exports.read([path], read)
-    if found is None:
+    known = _exports.read([path, unit], read)
+    if known is None:
         return None
-    of = [found["unit"]["sha256"], (found["path"] or {}).get("name", ""), ""]
+    found, shape = known
+    of = [shape, (found["path"] or {}).get("name", ""), ""]
     try:
         same = _shape(root, to_unit(root.mu_unit)) == of
     except MuError:

@@ -130,14 +130,14 @@ def parameter(column, root, section: str, d: Description) -> None:
     if value is not None:
         right = row.row(align=True)
         right.alert = False
-        fix_button(right, root, section, d.name, value, found.text, text="Set ")
+        fix_button(right, root, section, d.name, value, found.text, short=True)
 
 
-def fix_button(layout, root, section: str, name: str, value, why: str, text: str | None = None) -> None:
-    """Draw a button that sets a parameter to a valid value, with that as its label: "Neck Ø 24 mm"."""
+def fix_button(layout, root, section: str, name: str, value, why: str, short: bool = False) -> None:
+    """Draw a button that sets a parameter to a valid value: "Neck Ø 24 mm", or short "24 mm"."""
     d = description(section, name)
     shown = shown_value(getattr(root.mu_unit, section), d, value)
-    button = layout.operator("mu.fit", text=f"{label(d)} {shown}" if text is None else text + shown)
+    button = layout.operator("mu.fit", text=shown if short else f"{label(d)} {shown}")
     button.section, button.name, button.why = section, name, why
 
 

@@ -278,6 +278,7 @@ def test_an_export_as_chosen(tmp_path):
     assert "nodes.txt" in texts
     assert "unit.3mf" not in texts
     assert "Done in" in texts
+    assert "Stale: they belong" not in texts
     root.mu_unit.chambers.wall_mm = 1.0
     assert "Stale: they belong to other parameters" in drawn()
     manifest = printing.exported(root).folder / "manifest.json"
