@@ -34,7 +34,7 @@ from circumstances import circumstances  # noqa: E402
 from interrupts import CHAIN, CHAIN_PROTOCOL, DESIGN, SWEEP  # noqa: E402
 
 LEAST_S = 10.0
-QUICK = "--fidelity homogenised --order 1 --refine 0.4 --times 5"
+QUICK = "--refine 0.4 --times 3"
 UNIT = "--preset mu-0.75x"
 ROWS = (
     "presets",
@@ -43,7 +43,6 @@ ROWS = (
     f"export {UNIT} --path alpha4",
     "specimens",
     f"simulate {UNIT} {QUICK}",
-    f"simulate {UNIT} --refine 0.4 --times 3",
     f"place {UNIT} {QUICK} --stations 11",
     "resume FOLDER",
     f"homogenize {UNIT} --no-specimen --refine 0.5",
@@ -54,7 +53,7 @@ ROWS = (
     "optimize design.toml",
     "sweep sweep.toml",
     "graph assets/graphs/unit.toml",
-    "grip --preset gripper --fidelity homogenised --coarse --cube 25 --refine 0.25",
+    "grip --preset gripper --coarse --cube 25 --refine 0.25",
     "chain chain.toml",
     "ports",
     "stream --simulate --seconds 20",

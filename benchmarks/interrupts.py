@@ -80,11 +80,9 @@ parameter = "material.lattice_modulus_kPa"
 low = 10
 high = 30
 """
-PLACE = ["--fidelity", "homogenised", "--preset", "mu-1.0x", "--refine", "0.4", "--order", "1"]
-PLACE += ["--times", "7", "--stations", "11"]
 # The printed body of three chambers at one pressure: the least that has every stage.
-RESOLVED = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--fidelity", "resolved", "--refine", "0.4"]
-RESOLVED += ["--times", "2", "--stations", "5", "--no-mesh-check"]
+PLACE = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--refine", "0.4"]
+PLACE += ["--times", "2", "--stations", "5", "--no-mesh-check"]
 PROTOCOL = "time_s,pressure_kPa\n0,0\n1,1\n"
 CHAIN = """
 format = 1
@@ -114,10 +112,9 @@ COMMANDS = {
     "optimize": ["optimize", "design.toml"],
     "optimize, two workers": ["optimize", "design.toml", "--workers", "2"],
     "place": ["place", *PLACE],
-    "place, resolved": ["place", *RESOLVED],
     "simulate": ["simulate", "--unit", "unit.toml", "--refine", "0.4", "--times", "3"],
     "homogenize": ["homogenize", "--preset", "mu-1.0x", "--cells", "2", "--refine", "0.5"],
-    "grip": ["grip", "--preset", "gripper", "--fidelity", "homogenised", *GRIP],
+    "grip": ["grip", "--preset", "gripper", *GRIP],
     "chain": ["chain", "chain.toml"],
     "diagnose": ["diagnose", str(ROOT / "assets/examples/paper-moduli")],
     "fit-material": ["fit-material", str(ROOT / "tests/data/treloar")],

@@ -3,7 +3,7 @@
     python -m benchmarks.resolved.diagnose_bending FOLDER [--refine 0.5] [--finer 0.7] [--pressures 9]
         [--effects NAME ...] [--workers 1]
 
-As `diagnose assets/examples/paper-bending --fidelity resolved --self-contact`, on a coarser mesh, at fewer
+As `diagnose assets/examples/paper-bending`, on a coarser mesh, at fewer
 pressures and for chosen effects, which that command does not offer. Simulations are kept in FOLDER and found
 again there.
 """
@@ -42,7 +42,7 @@ def main() -> None:
         self_contact=True,
         workers=options.workers,
     )
-    job = Job(read_folder(DATA), settings=settings, fidelity=RESOLVED, self_contact=True)
+    job = Job(read_folder(DATA), settings=settings)
     context = RunContext(Progress())
     USE_CASE.start(job, options.folder, context)
     print(json.dumps(context.summary, indent=1, default=str))

@@ -1,7 +1,7 @@
 """Verdicts with the printed body as base, on data made by the printed body on another mesh.
 
     python -m benchmarks.resolved.diagnose_printed FOLDER [--only clean,gravity] [--refine 1.2] [--seed 1]
-        [--low 0] [--fidelity homogenised]
+        [--low 0] [--homogenised]
 
 A unit of three chambers is bent through suction and pressure; each set hides one static effect or a gauge's
 zero, and is diagnosed as `diagnose` does, or by the homogenised lattice. All sets have one protocol: the
@@ -23,6 +23,7 @@ from benchmarks.evidence.second_code.recording import Trial, instrument, read, w
 from benchmarks.evidence.second_code.whole_unit import small_unit, verdict_on
 from mu_addon.design.parameters import to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
+from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
@@ -94,7 +95,7 @@ def main() -> None:
     parser.add_argument("--refine", type=float, default=1.2, help="of the mesh that the data are of")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--low", type=float, default=LOW_kPa, help="least pressure, kPa")
-    parser.add_argument("--fidelity", default=RESOLVED, help="of the base")
+    parser.add_argument("--homogenised", action="store_true", help="base with a homogenised lattice")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     unit = given.folder / "unit.toml"
@@ -111,18 +112,18 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(data, trials(name, rng, bent, given.low))
         began, used = time.time(), _processor_s()
-        found = verdict_on(
-            data, unit, given.folder / f"diagnosis-{given.fidelity}", "--fidelity", given.fidelity
-        )
-        write_text(given.folder / f"{data.name}-{given.fidelity}.json", json.dumps(found, indent=1))
+        base = "homogenised" if given.homogenised else "printed"
+        settings = UnitSettings() if given.homogenised else None
+        found = verdict_on(data, unit, given.folder / f"diagnosis-{base}", settings)
+        write_text(given.folder / f"{data.name}-{base}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")
         print("| " + " | ".join(row) + " |", flush=True)
 
 
 def _processor_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 if __name__ == "__main__":

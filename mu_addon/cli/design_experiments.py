@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_fidelity, add_measured_folder, add_report, add_unit, fidelity_of, unit_if_named
+from .options import add_measured_folder, add_report, add_self_contact, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -27,7 +27,7 @@ def add(commands: Commands[Any]) -> None:
         "numbers.",
     )
     add_unit(command, required=False)
-    add_fidelity(command)
+    add_self_contact(command)
     add_report(command)
     command.add_argument(
         "--noise",
@@ -46,5 +46,5 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     unit = unit_if_named(options)
     noise = noise_of(options.noise)
-    job = Job(read_folder(Path(options.folder)), unit, noise, *fidelity_of(options))
+    job = Job(read_folder(Path(options.folder)), unit, noise, self_contact=options.self_contact)
     USE_CASE.start(job, Path(options.out), context)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_fidelity, add_measured_folder, add_report, add_unit, fidelity_of, unit_if_named
+from .options import add_measured_folder, add_report, add_self_contact, add_unit, unit_if_named
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -23,7 +23,7 @@ def add(commands: Commands[Any]) -> None:
     )
     add_measured_folder(command)
     add_unit(command, required=False)
-    add_fidelity(command)
+    add_self_contact(command)
     command.add_argument(
         "--model",
         metavar="FILE",
@@ -42,12 +42,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     unit = unit_if_named(options)
     known = load_model(Path(options.model)) if options.model else None
-    fidelity, self_contact = fidelity_of(options)
-    job = Job(
-        read_folder(Path(options.folder)),
-        unit,
-        fidelity=fidelity,
-        known=known,
-        self_contact=self_contact,
-    )
+    measured = read_folder(Path(options.folder))
+    job = Job(measured, unit, known=known, self_contact=options.self_contact)
     USE_CASE.start(job, Path(options.out), context)

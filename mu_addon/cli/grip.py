@@ -6,16 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import (
-    add_fidelity,
-    add_report,
-    add_results,
-    add_setting,
-    add_solid,
-    fidelity_of,
-    help_of,
-    require_out,
-)
+from .options import add_report, add_results, add_setting, add_solid, add_struts, help_of, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -57,7 +48,7 @@ def add(commands: Commands[Any]) -> None:
     )
     default = f"{REFINE.default:g}; {COARSE_REFINE:g} with --coarse"
     command.add_argument("--refine", type=float, metavar="F", help=help_of(REFINE, default))
-    add_fidelity(command)
+    add_struts(command)
     add_setting(command, COARSE)
     command.add_argument(
         "--solid-only", action="store_true", help="Write only the printable part; simulate nothing."
@@ -75,8 +66,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
-    fidelity, self_contact = fidelity_of(options)
-    detail = detailed(options.coarse, fidelity, options.refine)
+    detail = detailed(options.coarse, options.refine, options.solid_struts)
     density = options.density_g_per_ml
     job = Job(
         gripper=gripper,
@@ -84,7 +74,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         grip=detail.grip(friction=options.friction, beyond_mm=options.beyond_mm),
         phases=shipped_phases() if options.protocol is None else read_phases(Path(options.protocol)),
         mesh=detail.mesh,
-        self_contact=self_contact,
+        self_contact=options.self_contact,
         quality=options.quality,
     )
     USE_CASE.start(job, Path(options.out), context)

@@ -197,49 +197,36 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_fidelity(command: argparse.ArgumentParser, homogenised_with: str = "") -> None:
-    """Add fidelity and self-contact; homogenised_with: options that choose the homogenised lattice."""
-    from ..meshing.settings import FIDELITY, SELF_CONTACT
+def add_struts(command: argparse.ArgumentParser) -> None:
+    """--solid-struts and --self-contact of a printed body."""
+    from ..meshing.settings import SOLID_STRUTS
 
-    words = str(FIDELITY.default)
-    if homogenised_with:
-        words += f"; homogenised with {homogenised_with}, which need it"
-    command.add_argument("--fidelity", choices=FIDELITY.choices, help=help_of(FIDELITY, words))
-    command.add_argument("--self-contact", action=argparse.BooleanOptionalAction, help=help_of(SELF_CONTACT))
+    add_setting(command, SOLID_STRUTS)
+    add_self_contact(command)
 
 
-def fidelity_of(options: argparse.Namespace) -> tuple[str, bool]:
-    """The fidelity that options ask for, or that they alone have; and whether parts keep apart."""
-    from ..meshing.settings import HOMOGENISED, fidelity_where_none_is_named
+def add_self_contact(command: argparse.ArgumentParser) -> None:
+    """--self-contact and --no-self-contact."""
+    from ..meshing.settings import SELF_CONTACT
 
-    if options.fidelity is None:
-        order, mesher = getattr(options, "order", 2), getattr(options, "mesher", "auto")
-        others = mesher != "auto", getattr(options, "lattice", None)
-        fidelity, apart = fidelity_where_none_is_named(order, (), *others)
-    else:
-        fidelity, apart = options.fidelity, options.fidelity != HOMOGENISED
-    return fidelity, apart if options.self_contact is None else options.self_contact
+    command.add_argument(
+        "--self-contact",
+        action=argparse.BooleanOptionalAction,
+        default=SELF_CONTACT.default,
+        help=help_of(SELF_CONTACT),
+    )
 
 
 def add_simulation(command: argparse.ArgumentParser) -> None:
     """Protocol, mesh and material of a simulation."""
-    from ..meshing.settings import ORDER, REFINE
-    from ..usecases.simulate_and_place.settings import MESHER, PROTOCOL, SELF_FRICTION, TIMES
+    from ..meshing.settings import REFINE
+    from ..usecases.simulate_and_place.settings import PROTOCOL, SELF_FRICTION, TIMES
 
     add_setting(command, PROTOCOL, "CSV")
-    add_setting(command, ORDER, "P")
     add_setting(command, REFINE, "F")
-    add_fidelity(command, "--lattice, --mesher or --order 1")
+    add_struts(command)
     add_setting(command, SELF_FRICTION, "MU")
-    command.add_argument(
-        "--lattice",
-        metavar="FILE",
-        help="Lattice law computed from struts and resin, the effective.toml of `homogenize`; a copy is "
-        "stored with the results (default: neo-Hookean with the unit's material.lattice_modulus_kPa "
-        "and lattice_poisson).",
-    )
     add_setting(command, TIMES, "K")
-    add_setting(command, MESHER)
     add_solver(command)
 
 

@@ -37,7 +37,7 @@ def add(commands: Commands[Any]) -> None:
         "place",
         help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
         "motion (the main job).",
-        epilog="example: run.py place --preset mu-1.0x --fidelity homogenised --out out/mu-1.0x",
+        epilog="example: run.py place --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
     )
     add_unit(command)
     add_report(command)

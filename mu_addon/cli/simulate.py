@@ -28,7 +28,7 @@ def add(commands: Commands[Any]) -> None:
     command = commands.add_parser(
         "simulate",
         help="Run `design`, then simulate the unit's motion under a pressure protocol.",
-        epilog="example: run.py simulate --preset mu-1.0x --fidelity homogenised --out out/mu-1.0x",
+        epilog="example: run.py simulate --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
     )
     add_unit(command)
     add_report(command)

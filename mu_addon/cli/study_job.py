@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import fidelity_of, modelled, solver_of, unit_of
+from .options import modelled, solver_of, unit_of
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,10 +22,8 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     """Study job from the options; raises InputError."""
-    from ..homogenize.effective_file import read_effective
-    from ..meshing.settings import MeshSettings
+    from ..meshing.settings import MeshSettings, printed
     from ..placement.graph import Limits
-    from ..usecases.simulate_and_place.extended_unit import require_same_print
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
     extra: dict[str, Any] = {}
@@ -33,17 +31,13 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit = unit_of(options)
     else:
         unit, effects = modelled(options, context)
-        fidelity, self_contact = fidelity_of(options)
-        mesh = MeshSettings(order=options.order, refine=options.refine, fidelity=fidelity)
         extra = {
             "effects": effects,
-            "mesh": mesh,
-            "self_contact": self_contact,
+            "mesh": MeshSettings(refine=options.refine, fidelity=printed(options.solid_struts)),
+            "self_contact": options.self_contact,
             "self_friction": options.self_friction,
             "times": options.times,
-            "mesher": options.mesher,
             "solver": solver_of(options),
-            "lattice": None if options.lattice is None else read_effective(options.lattice),
         }
     if "place" in options.stages:
         extra |= {
@@ -55,8 +49,6 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "most_checks": options.checks,
             "optics": optics_of(options.light),
         }
-    if extra.get("lattice") is not None and context.summary.get("model", {}).get("applied"):
-        require_same_print(unit, extra["lattice"], options.model)
     protocol = protocol_of(getattr(options, "protocol", None))
     if getattr(options, "body", None) is not None:
         extra["body"] = body_for(unit, options.body, options.stages, getattr(options, "paths", "windows"))

@@ -18,7 +18,7 @@ from ..fem.lattice_law import LatticeLaw
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
-from ..meshing.settings import HOMOGENISED, RESOLVED, MeshSettings, require_self_contact_resolvable
+from ..meshing.settings import RESOLVED, MeshSettings, require_self_contact_resolvable
 from ..resolved.printed_mesh import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
@@ -100,12 +100,9 @@ class UnitSettings:
     workers: int = attrs.field(factory=cores)
 
     @classmethod
-    def of(cls, fidelity: str, self_contact: bool = False) -> UnitSettings:
-        """Settings for a unit simulated homogenised or resolved (`MeshSettings.fidelity`)."""
-        if fidelity != HOMOGENISED:
-            mesh, changes = (attrs.evolve(mesh, fidelity=fidelity) for mesh in (STRUTS, STRUTS_COARSE))
-            return cls(mesh, changes=changes, whole=frozenset(), self_contact=self_contact)
-        return cls(self_contact=self_contact)
+    def printed(cls, self_contact: bool = True) -> UnitSettings:
+        """Settings for the printed body; without any the unit is homogenised."""
+        return cls(STRUTS, changes=STRUTS_COARSE, whole=frozenset(), self_contact=self_contact)
 
     def further(self, names: Collection[str]) -> UnitSettings | None:
         """With those of some effects at every size that are not yet; None where all are."""

@@ -23,9 +23,7 @@ from .foam_fit import NAME, FoamFit, Misfit, lattice_law, require_stable, stable
 Array = np.ndarray[Any, Any]
 
 FORMAT = 1
-_HEAD = (
-    "# Effective moduli of a lattice and its law for the analysis mesh; `place --lattice` takes this file."
-)
+_HEAD = "# Effective moduli of a lattice, and a law of its continuum."
 # Every key that is read, by its table; those of [cell], [resin] and [provenance] are whatever was written.
 _KEYS = {
     "moduli": ("relative_density", "C11_kPa", "C12_kPa", "C44_kPa"),

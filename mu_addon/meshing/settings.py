@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import attrs
@@ -23,27 +22,24 @@ FIDELITY = described(
     "these), or a continuum",
     choices=FIDELITIES,
 )
+SOLID_STRUTS = described(
+    "solid_struts",
+    False,
+    "mesh every strut as a solid, to check the beams that stand for whole ones; three to four times as long",
+)
 SELF_CONTACT = described(
     "self_contact",
     True,
-    "keep walls and struts of a resolved unit apart, at several times the cost; without it they may cross, "
-    "and the run gives the pressure",
+    "keep walls and struts apart, at several times the cost; without it they may cross, and the run gives "
+    "the pressure",
 )
 OF_CONTINUUM = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 """Parameters of a unit that its printed struts do not have: theirs are the resin's."""
 
 
-def fidelity_where_none_is_named(
-    order: int | None = None, parameters: Iterable[str] = (), *others: Any
-) -> tuple[str, bool]:
-    """Fidelity of a run that names none, and whether its walls and struts are kept apart.
-
-    The printed body, unless what is asked for needs a continuum: elements of `order` 1, one of `parameters`
-    in OF_CONTINUUM, or any of `others`: a mesher, a law of the lattice.
-    """
-    if order == 1 or any(others) or not {*OF_CONTINUUM}.isdisjoint(parameters):
-        return HOMOGENISED, False
-    return str(FIDELITY.default), bool(SELF_CONTACT.default)
+def printed(solid_struts: bool) -> str:
+    """Fidelity of a printed body: its whole struts as beams, or all of them as solids."""
+    return SOLID if solid_struts else RESOLVED
 
 
 def _one_of(*allowed: Any) -> Any:
@@ -111,5 +107,5 @@ def require_self_contact_resolvable(mesh: MeshSettings, self_contact: bool) -> N
         raise InputError(
             "self-contact needs walls and struts as they are printed",
             "--self-contact",
-            "also give --fidelity resolved, or leave it out",
+            "leave self-contact out, or simulate the printed body",
         )

@@ -18,6 +18,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.headless.processes import coarse
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
 BLENDER = shlex.split(os.environ.get("MU_BLENDER", ""))
@@ -86,30 +88,15 @@ def test_a_designers_day(installed, home, tmp_path):
     assert (tmp_path / "unit.stl").stat().st_size > 1_000_000
 
 
-COARSE = (
-    "place",
-    "--preset",
-    "mu-0.75x",
-    "--fidelity",
-    "homogenised",
-    "--refine",
-    "0.5",
-    "--times",
-    "5",
-    "--stations",
-    "11",
-    "--no-mesh-check",
-)
-
-
 def test_the_command_line_gives_the_same_digits_as_plain_python(installed, home, tmp_path):
     """Blender has a CHOLMOD of its own loaded, of another version than the one in the extension's wheels."""
     run = ROOT / "headless" / "run.py"
-    call(home, "-b", "--python-exit-code", "4", "-P", run, "--", *COARSE, "--out", tmp_path / "blender")
+    inside, outside = (coarse(tmp_path / name, times=5, mesh_check=False) for name in ("blender", "plain"))
+    call(home, "-b", "--python-exit-code", "4", "-P", run, "--", *inside)
     (packages,) = installed.glob(".local/lib/python*/site-packages")
     # By the Python that this Blender runs on, in a process that never saw Blender. Its packages lie as
     # Blender unpacked them, which this file of the extension's knows.
-    line = [str(ROOT / "mu_addon/blender/jobs/child_main.py"), *COARSE, "--out", str(tmp_path / "plain")]
+    line = [str(ROOT / "mu_addon/blender/jobs/child_main.py"), *map(str, outside)]
     plain = f"""
 import os, subprocess, sys
 path = os.pathsep.join([{str(packages)!r}, *(p for p in sys.path if p.endswith("-packages"))])

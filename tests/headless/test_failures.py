@@ -8,6 +8,10 @@ import sys
 import pytest
 
 from mu_addon.design.parameters import load_preset, read_unit, to_toml
+from mu_addon.fem.protocol import read_protocol
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.usecases.simulate_and_place.job import Job, write_study
+from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from .processes import assert_clear_failure, command, here, run
 
@@ -144,21 +148,11 @@ def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
     file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
     unit.write_text("format = 1\n[chambers]\ncount = 3\n")
     out = tmp_path / "out"
-    done = here(
-        "simulate",
-        "--unit",
-        unit,
-        "--out",
-        out,
-        "--protocol",
-        file,
-        "--refine",
-        "0.5",
-        "--times",
-        "21",
-        "--order",
-        "1",
+    job = Job(
+        read_unit(unit), read_protocol(file), MeshSettings(refine=0.5, order=1), times=21, stages=STAGES[:2]
     )
+    write_study(job, out)
+    done = here("resume", out)
     assert_clear_failure(done, 4, "no equilibrium at", "kPa", "mm", "what to do")
     summary = json.loads((out / "summary.json").read_text())
     assert summary["status"] == "partial"

@@ -9,50 +9,40 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 
-import attrs
 import meshio
 import numpy as np
 import pytest
 
 from mu_addon.design.anchors import anchor_points
-from mu_addon.design.parameters import load_preset, read_unit, to_toml
+from mu_addon.design.parameters import read_unit
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.placement.graph import Limits
+from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
-from .processes import COARSE, PATIENCE_S, ROOT, RUN, command, here, run, worker_of
+from .processes import PATIENCE_S, ROOT, RUN, UNIT, coarse, command, here, run, worker_of
 
-# Four chambers, three paths: as many stages as six and ten have.
-UNIT = load_preset("mu-1.0x")
-UNIT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4))
 PATHS = ["alpha1", "alpha2", "alpha3"]
 
 
 @pytest.fixture(scope="module")
-def unit(tmp_path_factory):
-    file = tmp_path_factory.mktemp("unit") / "unit.toml"
-    file.write_text(to_toml(UNIT))
-    return "--unit", file
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory, unit, with_light):
+def finished(tmp_path_factory, with_light):
     folder = with_light(tmp_path_factory.mktemp("place") / "out")
-    done = here("place", *unit, "--out", folder, *COARSE, "--refine", "0.3", "--workers", "1")
+    done = here(*coarse(folder, mesh=MeshSettings(refine=0.3)), "--workers", "1")
     assert done.returncode == 0, done.stderr
     return folder, done
 
 
-# Linear elements, one rule and no pictures show as well that a run comes to the same digits by another way.
-SMALL = (*COARSE, "--order", "1", "--no-mesh-check")
-QUICK = (*SMALL, "--no-report")
-# Its motion alone.
-MOTION = (*COARSE[: COARSE.index("--stations")], "--order", "1", "--no-report")
+def quick_in(folder, **changes):
+    """Of linear elements: it shows as well that a run comes to the same digits by another way."""
+    return coarse(folder, **({"mesh": MeshSettings(refine=0.5, order=1), "mesh_check": False} | changes))
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory, unit, with_light):
+def quick(tmp_path_factory, with_light):
     """The same run of linear elements, for what is compared with itself."""
     folder = with_light(tmp_path_factory.mktemp("quick") / "out")
-    done = run("place", *unit, "--out", folder, *QUICK)
+    done = run(*quick_in(folder), "--no-report")
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -174,11 +164,10 @@ def test_the_report_of_a_real_run_opens_whole_in_a_browser(finished):
 
 
 @pytest.fixture(scope="module")
-def searched(tmp_path_factory, unit, with_light):
+def searched(tmp_path_factory, with_light):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
     folder = with_light(tmp_path_factory.mktemp("search") / "out")
-    limits = ("--paths", "graph", "--shortest-cells", "2.5", "--longest-cells", "3", "--bend-deg", "20")
-    done = run("place", *unit, "--out", folder, *QUICK, *limits)
+    done = run(*quick_in(folder, paths="graph", limits=Limits(2.5, 3.0, 20.0)), "--no-report")
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -215,15 +204,15 @@ def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     assert float(solved[text]) == pytest.approx(every["alpha3"], rel=2e-3)
 
 
-def test_limits_that_leave_no_path_are_refused(tmp_path, unit):
+def test_limits_that_leave_no_path_are_refused(tmp_path):
     limits = ("--paths", "graph", "--shortest-cells", "40")
-    done = here("place", *unit, "--out", tmp_path / "out", *COARSE, *limits)
+    done = here("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", *limits)
     assert done.returncode == 2
     assert "no path of the lattice" in done.stderr
 
 
-def started(out, unit):
-    words = command("place", *unit, "--out", out, *SMALL)
+def started(out):
+    words = command(*quick_in(out))
     return subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -245,9 +234,9 @@ def alive(group):
     return True
 
 
-def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_path, unit):
+def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_path):
     out = tmp_path / "out"
-    process = started(out, unit)
+    process = started(out)
     wait_for_a_state_swept(process, out)
     # Whoever watches, and the group of those who work.
     groups = process.pid, os.getpgid(worker_of(out))
@@ -262,11 +251,11 @@ def test_killed_it_leaves_no_process_behind_and_does_not_pass_for_complete(tmp_p
 
 
 @pytest.fixture
-def interrupted(tmp_path, unit, with_light):
+def interrupted(tmp_path, with_light):
     """Folder of a run that was stopped among its candidates, and what it said."""
     for attempt in range(3):
         out = with_light(tmp_path / str(attempt))
-        process = started(out, unit)
+        process = started(out)
         wait_for_a_state_swept(process, out)
         # As a terminal does it: to every process of the group.
         os.killpg(process.pid, signal.SIGINT)
@@ -294,9 +283,9 @@ def test_interrupted_it_keeps_what_it_has(interrupted):
 
 
 @pytest.mark.nightly("tests/headless/test_resume.py::test_killed_at_any_stage_it_goes_on_to_the_same_digits")
-def test_interrupted_it_resumes_to_the_same_digits(interrupted, quick, unit):
+def test_interrupted_it_resumes_to_the_same_digits(interrupted, quick):
     out, _ = interrupted
-    assert run("place", *unit, "--out", out, *QUICK).returncode == 0
+    assert run("resume", out, "--no-report").returncode == 0
     assert same_delta(out, quick)
 
 
@@ -309,13 +298,13 @@ def same_delta(one, other):
 @pytest.mark.parametrize(
     "job", ["simulate", pytest.param("place", marks=pytest.mark.nightly("test_it_is_the_same_inside_bpy"))]
 )
-def test_it_is_the_same_inside_bpy(request, unit, with_light, tmp_path, job):
+def test_it_is_the_same_inside_bpy(request, with_light, tmp_path, job):
     pytest.importorskip("bpy", reason="the bpy wheel is for Python 3.11 only")
-    out = with_light(tmp_path / "out")
+    out, stages = with_light(tmp_path / "out"), STAGES[: STAGES.index(job) + 1]
+    words = [str(word) for word in quick_in(out, stages=stages)]
     script = f"""
 import bpy, runpy, sys
-sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", {job!r}, "--unit", {str(unit[1])!r}]
-sys.argv += ["--out", {str(out)!r}, *{list(QUICK if job == "place" else MOTION)!r}]
+sys.argv = ["blender", "-b", "-P", {str(RUN)!r}, "--", *{words!r}, "--no-report"]
 runpy.run_path({str(RUN)!r}, run_name="__main__")
 """
     done = subprocess.run(
@@ -327,5 +316,5 @@ runpy.run_path({str(RUN)!r}, run_name="__main__")
         assert same_delta(out, other)
     else:
         other = tmp_path / "here"
-        assert here("simulate", *unit, "--out", other, *MOTION).returncode == 0
+        assert here(*quick_in(other, stages=stages), "--no-report").returncode == 0
     assert (out / "angle.csv").read_bytes() == (other / "angle.csv").read_bytes()

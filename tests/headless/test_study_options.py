@@ -24,21 +24,9 @@ def test_the_printed_body_whose_walls_may_touch_is_the_default(command):
     assert found.mesh.fidelity == "resolved"
     assert found.self_contact
     assert not job(command, "--no-self-contact").self_contact
+    assert job(command, "--solid-struts").mesh.fidelity == "solid"
 
 
-def test_a_homogenised_unit_has_no_walls_that_touch():
-    found = job("place", "--fidelity", "homogenised")
-    assert found.mesh.fidelity == "homogenised"
-    assert not found.self_contact
-    with pytest.raises(InputError, match="self-contact"):
-        job("place", "--fidelity", "homogenised", "--self-contact")
-
-
-def test_what_only_a_homogenised_unit_has_chooses_it():
-    for words in (("--order", "1"), ("--mesher", "gmsh")):
-        assert job("simulate", *words).mesh.fidelity == "homogenised"
-
-
-def test_what_only_a_homogenised_unit_has_is_refused_beside_the_other():
-    with pytest.raises(InputError, match="linear elements"):
-        job("simulate", "--order", "1", "--fidelity", "resolved")
+def test_options_that_exclude_each_other_are_refused():
+    with pytest.raises(InputError, match="friction between walls and struts"):
+        job("simulate", "--no-self-contact", "--self-friction", "0.3")

@@ -17,16 +17,16 @@ RUN = re.compile(r"(?:\S*python|blender -b -P) headless/run\.py (?:-- )?(.*)")
 # Names of options that say a file or a folder which is there already.
 READ = {
     "angles", "body", "calibration", "clip", "compensate", "data", "file", "files", "folder", "gripper",
-    "lattice", "limits", "markers", "model", "pressure", "protocol", "recording", "stl", "unit", "wall_resin",
+    "limits", "markers", "model", "pressure", "protocol", "recording", "stl", "unit", "wall_resin",
 }  # fmt: skip
 # A choice of an option that may name a file, too.
 _NO_FILE = {"compensate": "unit"}
 # What makes a command of a page a matter of seconds, and keeps all that it writes and reads.
-QUICK_STUDY = ("--fidelity", "homogenised", "--order", "1", "--refine", "0.4", "--times", "3")
+QUICK_STUDY = ("--no-self-contact", "--refine", "0.2", "--times", "3")
 QUICK = {
     "simulate": QUICK_STUDY,
     "place": (*QUICK_STUDY, "--stations", "11", "--no-mesh-check"),
-    "grip": ("--fidelity", "homogenised", "--refine", "0.25"),
+    "grip": ("--refine", "0.25"),
     "homogenize": ("--cells", "2", "--no-specimen"),
     "design": ("--no-report",),
 }

@@ -19,6 +19,7 @@ from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
 from mu_addon.evidence.prediction.lattice_compression import LatticeStress
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.folder import keep_inputs
@@ -41,7 +42,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "assets" / "examples" / "paper-moduli"
 OFFSET_mm = 0.09
 # Of data in closed form: a printed unit's effects are simulated at few sizes first.
-ALL_SIZES = {"fidelity": "homogenised"}
+ALL_SIZES = {"settings": UnitSettings()}
 
 
 def run(folder, out, *arguments, **options):
@@ -220,9 +221,8 @@ def test_a_unit_is_judged_by_its_angle_and_markers(tmp_path, monkeypatch, gauge_
     assert 'name = "mu-1.0x"' in (out / "unit.toml").read_text()
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "fast cycles" in html
-    # What it was simulated as stands under the title, and a warning beside a homogenised one.
+    # What it was simulated as stands under the title.
     assert "held out; the unit with a homogenised lattice" in html
-    assert "own error may be named" in html
     # Of each experiment the angle and the two markers that move most; the rest is in the table.
     assert f"{3 * (len(analytic.CHANNELS) - 3)} more channels are in residuals.csv." in html
     channels = {r["channel"] for r in csv.DictReader((out / "residuals.csv").open())}
@@ -272,52 +272,37 @@ def analytic_unit(monkeypatch):
 
 def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
     measured = read_folder(ROOT / "assets" / "examples" / "paper-bending")
-    with pytest.raises(InputError, match="self-contact needs walls and struts"):
-        Job(measured, fidelity="homogenised", self_contact=True)
-    jobs = [Job(measured, fidelity="resolved", self_contact=apart) for apart in (False, True)]
-    assert Job(measured, fidelity="resolved").self_contact
+    jobs = [Job(measured, self_contact=apart) for apart in (False, True)]
     assert [job.unit_settings.self_contact for job in jobs] == [False, True]
     assert jobs[0].texts()["diagnose.toml"] != jobs[1].texts()["diagnose.toml"]
-    for job in (*jobs, Job(measured, fidelity="homogenised")):
+    for job in jobs:
         for name, text in job.texts().items():
             (tmp_path / name).write_text(text)
         again = read_job(tmp_path)
-        assert (again.fidelity, again.self_contact) == (job.fidelity, job.self_contact)
+        assert again.self_contact == job.self_contact
         assert again.texts() == job.texts()
 
 
-def test_every_face_simulates_the_printed_unit_unless_told_otherwise(tmp_path, monkeypatch):
+def test_every_face_simulates_the_printed_unit(tmp_path, monkeypatch):
     folder = ROOT / "assets" / "examples" / "paper-bending"
-    measured, printed = read_folder(folder), ("resolved", True)
-    assert [(j.fidelity, j.self_contact) for j in (Job(measured), Plan(measured))] == [printed] * 2
-    started = []
+    measured, started = read_folder(folder), [Job(read_folder(folder)), Plan(read_folder(folder))]
     for use_case in (USE_CASE, PLANNING):
         monkeypatch.setattr(type(use_case), "start", lambda _, job, *__: started.append(job))
     for command in ("diagnose", "design-experiments"):
         main([command, str(folder), "--out", str(tmp_path / "out")])
-        main([command, str(folder), "--fidelity", "homogenised", "--out", str(tmp_path / "out")])
-    assert [(j.fidelity, j.self_contact) for j in started] == [printed, ("homogenised", False)] * 2
+    assert all(job.unit_settings.mesh.resolved and job.self_contact for job in started)
+    assert len(started) == 4
+    main(["diagnose", str(folder), "--no-self-contact", "--out", str(tmp_path / "out")])
+    assert not started[-1].self_contact
     node = definitions()["diagnose"]
-    assert {s.name: s.description.default for s in node.settings} == {
-        "fidelity": "resolved",
-        "self_contact": True,
-    }
-    assert [j.body for j in started[:2]] == [
+    assert {s.name: s.description.default for s in node.settings} == {"self_contact": True}
+    assert [Job(measured, settings=settings).body for settings in (None, UnitSettings())] == [
         "the unit as printed, walls kept apart",
         "the unit with a homogenised lattice",
     ]
-    # A run from before every one named it stays what it was.
-    text = Job(measured).texts()["diagnose.toml"]
-    named = ('fidelity = "resolved"\n', "self_contact = true\n")
-    assert all(words in text for words in named)
-    for words in named:
-        text = text.replace(words, "")
-    (tmp_path / "diagnose.toml").write_text(text)
-    again = read_job(tmp_path)
-    assert (again.fidelity, again.self_contact) == ("homogenised", False)
     # Of blocks nothing is said: their cells are computed either way.
     blocks = Job(read_folder(PAPER))
-    assert "fidelity" not in blocks.texts()["diagnose.toml"]
+    assert "self_contact" not in blocks.texts()["diagnose.toml"]
     assert not blocks.body
 
 
@@ -414,10 +399,11 @@ def test_a_printed_diagnosis_takes_longer_with_more_chambers_and_where_walls_tou
     small = attrs.evolve(small, chambers=attrs.evolve(small.chambers, count=3))
     pressed = [e for e in measured.experiments if e["pressure_kPa"].min() > 0.0]
 
-    def seconds(unit, experiments, fidelity="resolved"):
-        return dict(simulations_plan(experiments, unit, fidelity))["unit"]
+    def seconds(unit, experiments, settings=None):
+        return dict(simulations_plan(experiments, unit, settings or UnitSettings.printed()))["unit"]
 
     every = measured.experiments
     assert seconds(load_preset("mu-1.0x"), every) == pytest.approx(2.0**1.6 * seconds(small, every))
     assert seconds(small, every) == 2.0 * seconds(small, pressed)
-    assert seconds(small, every, "homogenised") == seconds(load_preset("mu-1.0x"), pressed, "homogenised")
+    alike = UnitSettings()
+    assert seconds(small, every, alike) == seconds(load_preset("mu-1.0x"), pressed, alike)

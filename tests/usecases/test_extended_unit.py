@@ -12,8 +12,7 @@ from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.evidence.prediction.lattice_compression import LatticeStress
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.measured import Experiment
-from mu_addon.usecases.simulate_and_place.extended_unit import extend, read_extended, require_same_print
-from tests.homogenize.lattice_laws import body_centred
+from mu_addon.usecases.simulate_and_place.extended_unit import extend, read_extended
 
 
 def model(verdict="named", **values):
@@ -134,17 +133,6 @@ def test_a_computed_block_hands_its_stiffness_to_the_unit():
     # 0.15 mm at 0.75x is 0.2 mm at 1.0x: twice as stiff as drawn.
     assert found.material.lattice_modulus_kPa == pytest.approx(20.0, rel=1e-9)
     assert found.print.offset_xy_mm == 0.15
-
-
-def test_a_law_of_struts_as_drawn_is_refused_beside_a_model_that_prints_them_thicker():
-    unit = extend(Unit(), model(overcure__offset_mm=0.1)).unit
-    drawn, printed = (
-        attrs.evolve(body_centred(), cell={"offset_xy_mm": o, "offset_z_mm": o}) for o in (0.0, 0.1)
-    )
-    require_same_print(unit, printed, "model.toml")
-    with pytest.raises(InputError, match=r"offset_xy_mm = 0\.1, .*struts with 0") as caught:
-        require_same_print(unit, drawn, "model.toml")
-    assert "homogenize" in caught.value.remedy
 
 
 def test_a_model_is_the_same_from_its_file(tmp_path):

@@ -181,7 +181,6 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("times = 7", "times = 1", "times = 1 is out of bounds"),
         ("times = 7", "tmies = 7", "unknown key 'tmies'"),
         ("times = 7", 'times = 7\nobstacles = "post.obj"', "does not take obstacles"),
-        ("times = 7", 'times = 7\nlattice = "effective.toml"', "does not take lattice"),
         ("refine = 0.4", "refine = 99.0", "refine"),
         ("mesh = {", "mesh = 3 #", "not a table"),
         ("low = 0.8, high = 1.2", "low = 1.2, high = 0.8", "are not a range"),

@@ -9,8 +9,9 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run import progress
 from mu_addon.usecases.simulate_and_place import job as study
 from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work
+from tests.headless.processes import homogenised
 
-STUDY = ["--fidelity", "homogenised", "--order", "1", "--refine", "0.3", "--times", "3"]
+STUDY = ["--no-self-contact", "--refine", "0.3", "--times", "3"]
 SWEEP = """
 format = 1
 preset = "mu-0.75x"
@@ -30,7 +31,8 @@ def messages_of(monkeypatch, tmp_path, words):
     """Every message of a command."""
     found = []
     monkeypatch.setattr(progress, "terminal", lambda stream: found.append)
-    assert main([*words, "--out", str(tmp_path / "out"), "--no-report"]) == 0
+    with homogenised(order=1):
+        assert main([*words, "--out", str(tmp_path / "out"), "--no-report"]) == 0
     return found
 
 

@@ -18,8 +18,6 @@ from mu_addon.usecases.simulate_and_place.job import Job, grasp, read_job
 from mu_addon.usecases.simulate_and_place.settings import STAGES
 from mu_addon.usecases.simulate_and_place.study_file import compose, parse, read
 
-from ..homogenize.lattice_laws import body_centred
-
 JOB = Job(
     unit=load_preset("mu-0.75x"),
     protocol=Protocol(np.arange(3.0), np.array([0.0, -10.0, 20.0])),
@@ -32,7 +30,6 @@ JOB = Job(
     paths="graph",
     limits=Limits(3.0, np.inf, 60.0),
     most_checks=7,
-    lattice=body_centred(),
 )
 
 
@@ -71,7 +68,6 @@ def test_a_larger_job_adds_its_stages(tmp_path):
     [
         lambda folder: attrs.evolve(JOB, unit=load_preset("mu-1.0x"), stages=STAGES[:1]),
         lambda folder: attrs.evolve(JOB, times=5, stages=STAGES[:2]),
-        lambda folder: attrs.evolve(JOB, lattice=None, stages=STAGES[:2]),
         lambda folder: attrs.evolve(JOB, stations=12),
         # The protocol was changed by hand: what was found with the old one holds no more.
         lambda folder: (
@@ -79,7 +75,7 @@ def test_a_larger_job_adds_its_stages(tmp_path):
             attrs.evolve(JOB, stages=STAGES[:1]),
         )[1],
     ],
-    ids=["unit", "times", "lattice", "stations", "protocol.csv"],
+    ids=["unit", "times", "stations", "protocol.csv"],
 )
 def test_what_changed_is_not_current(tmp_path, change):
     keep_inputs(tmp_path, JOB.texts())
@@ -106,7 +102,7 @@ GOOD = compose(JOB.tables())
         ("format = 2\ndesign = 3\n", "not a table"),
         ('format = 2\n[design]\nunit = "../../unit.toml"\n', "not in the folder"),
         (GOOD.replace('"unit.toml"', '"/etc/passwd"'), "not in the folder"),
-        (GOOD.replace('"effective.toml"', '"effective.toml\\u0000"'), "not in the folder"),
+        (GOOD.replace('"protocol.csv"', '"protocol.csv\\u0000"'), "not in the folder"),
         (GOOD.replace("times = 3", 'times = "__import__(\\"os\\")"'), "study.toml, .*times"),
         (GOOD.replace("times = 3", "times = 3\nhook = 1"), "unknown key 'hook'"),
         (GOOD.replace("times = 3", "times = 1000000000"), "1000000000"),

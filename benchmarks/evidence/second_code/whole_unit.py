@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -20,18 +19,23 @@ from typing import Any
 import attrs
 import numpy as np
 
-from mu_addon.design.parameters import Unit, load_preset, to_toml
+from mu_addon.design.parameters import Unit, load_preset, read_unit, to_toml
+from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.files import write_text
+from mu_addon.measured import read_folder
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import AXES, LATTICE, Mesh
-from mu_addon.meshing.settings import HOMOGENISED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress, terminal
+from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.run import USE_CASE
 
 from .recording import Trial, instrument, read, write
 from .units import _softened
 
 Array = np.ndarray[..., np.dtype[np.float64]]
 
-ROOT = Path(__file__).resolve().parents[3]
 PRESSURES_kPa = np.linspace(-10.0, 30.0, 9)
 # Newton's last update over the largest displacement.
 TOLERANCE = 1e-5
@@ -218,16 +222,15 @@ def _stuck(angle: Array) -> Array:
     return np.array(held)
 
 
-def verdict_on(folder: Path, unit: Path, out: Path, *options: str) -> dict[str, Any]:
+def verdict_on(folder: Path, unit: Path, out: Path, settings: UnitSettings | None = None) -> dict[str, Any]:
     """The program's verdict on a folder, in one folder for all sets: its simulations are kept there.
 
-    options: further ones of `diagnose`.
+    settings: of the unit's simulation; None: the printed body.
     """
-    command = [sys.executable, str(ROOT / "headless/run.py"), "diagnose", str(folder), "--unit", str(unit)]
-    command += [*options, "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(done.stdout + done.stderr)
+    with run_to_end(Progress([terminal(sys.stderr)])) as context:
+        USE_CASE.start(Job(read_folder(folder), read_unit(unit), settings), out, context)
+    if context.status:
+        raise SystemExit(context.status)
     return dict(json.loads((out / "verdict.json").read_text()))
 
 
@@ -250,7 +253,7 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(folder, trials(name, rng, angles))
         began = time.time()
-        found = verdict_on(folder, described, given.out / "diagnosis", "--fidelity", HOMOGENISED)
+        found = verdict_on(folder, described, given.out / "diagnosis", UnitSettings())
         causes = ", ".join(c["effect"] for c in found["causes"])
         hidden = ", ".join(SETS[name]) or ("a mount that sticks" if name == "sticks" else "nothing")
         row = (name, hidden, str(found["verdict"]), causes, f"{time.time() - began:.0f}")

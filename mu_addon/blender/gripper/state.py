@@ -44,13 +44,12 @@ GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", h
 def job_of(root: Any) -> Job:
     """Grasp job from a gripper's properties; raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
-    from ...meshing.settings import RESOLVED
     from ...usecases.grip.grasp import Cube, Grip
     from ...usecases.grip.job import Job, detailed
 
     props = root.mu_gripper
     grasps = props.detail != "part"
-    detail = detailed(props.detail == "quick", RESOLVED)
+    detail = detailed(props.detail == "quick")
     grip = detail.grip(friction=exact(props.friction), beyond_mm=gripper_object.beyond_mm(root))
     return Job(
         gripper=to_gripper(props),

@@ -21,12 +21,7 @@ from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import described, experiments_digest, require_same_data
-from ...meshing.settings import (
-    FIDELITY,
-    HOMOGENISED,
-    MeshSettings,
-    require_self_contact_resolvable,
-)
+from ...meshing.settings import SELF_CONTACT
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
@@ -34,7 +29,7 @@ from ...run.inputs import FORMAT, named_path, read_inputs
 from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ...toml_writer import toml_text
-from .job import UNIT, fidelity_in, fidelity_of, unit_behind
+from .job import UNIT, self_contact_in, self_contact_of, unit_behind
 from .simulators import simulations_plan, simulators_of
 from .words import bare, listed, readable
 
@@ -94,20 +89,20 @@ class Job:
     """Inputs of a design of experiments.
 
     measured: laid out as for `diagnose`; columns to be measured may hold any numbers. unit: the preset
-    without one. noise: standard deviation of a reading, by quantity. fidelity: homogenised or resolved unit;
-    self_contact: of a resolved one's walls and struts.
+    without one. noise: standard deviation of a reading, by quantity. self_contact: of the unit's walls and
+    struts. settings: of its simulation, in place of the printed body's.
     """
 
     measured: Measured
     unit: Unit | None = None
     noise: Mapping[str, float] = attrs.field(factory=lambda: dict(NOISE))
-    fidelity: str = FIDELITY.field()
-    self_contact: bool = attrs.field(
-        default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
-    )
+    self_contact: bool = SELF_CONTACT.field()
+    settings: UnitSettings | None = None
 
-    def __attrs_post_init__(self) -> None:
-        require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)
+    @property
+    def unit_settings(self) -> UnitSettings:
+        """Settings of the unit's simulation: of every effect at its first sizes alone."""
+        return attrs.evolve(self.settings or UnitSettings.printed(self.self_contact), whole=None)
 
     @property
     def subject(self) -> Unit | None:
@@ -120,7 +115,7 @@ class Job:
             "format": FORMAT,
             "experiments_sha256": experiments_digest(self.measured),
             **self.noise,
-            **fidelity_of(self),
+            **self_contact_of(self),
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -140,7 +135,7 @@ def read_job(folder: Path) -> Job:
         measured,
         read_unit(unit) if unit.is_file() else None,
         noise,
-        **fidelity_in(values, path),
+        **self_contact_in(values),
     )
 
 
@@ -150,7 +145,7 @@ def design_experiments(job: Job, folder: Path, context: RunContext) -> Plan:
     Raises InputError, OutputError.
     """
     measured, progress = job.measured, context.progress
-    settings = attrs.evolve(UnitSettings.of(job.fidelity, job.self_contact), whole=None)
+    settings = job.unit_settings
     simulators, remarks = simulators_of(
         measured.experiments, job.subject, folder / "cache", progress, settings
     )
@@ -309,7 +304,7 @@ USE_CASE = UseCase(
     design_experiments,
     console_summary,
     plan=lambda job: [
-        *simulations_plan(job.measured.experiments, job.subject, job.fidelity),
+        *simulations_plan(job.measured.experiments, job.subject, job.unit_settings),
         ("sensitivities", SENSITIVITIES_S),
     ],
 )

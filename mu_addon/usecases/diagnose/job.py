@@ -16,13 +16,7 @@ from ...evidence.extended import ExtendedModel, load_model
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import FILE, described, experiments_digest, require_same_data
 from ...measured.kinds import OF_A_UNIT
-from ...meshing.settings import (
-    FIDELITIES,
-    FIDELITY,
-    HOMOGENISED,
-    MeshSettings,
-    require_self_contact_resolvable,
-)
+from ...meshing.settings import SELF_CONTACT
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
 from ...toml_writer import toml_text
@@ -46,22 +40,18 @@ class Job:
     """Inputs of a diagnosis.
 
     unit: of unit_pressure experiments and of blocks with counted cells, whatever its scale; the preset
-    `PRESET` without one. fidelity: homogenised or resolved; self_contact: of a resolved unit's walls and
-    struts. settings: of the simulation, in place of these. known: result of an earlier diagnosis, or None:
-    its effects are in the model from the start and stay; moduli and zeros are fitted anew.
+    `PRESET` without one. self_contact: of its walls and struts. settings: of the simulation, in place of the
+    printed body's. known: result of an earlier diagnosis, or None: its effects are in the model from the
+    start and stay; moduli and zeros are fitted anew.
     """
 
     measured: Measured
     unit: Unit | None = None
     settings: UnitSettings | None = None
-    fidelity: str = FIDELITY.field()
     known: ExtendedModel | None = None
-    self_contact: bool = attrs.field(
-        default=attrs.Factory(lambda job: job.fidelity != HOMOGENISED, takes_self=True)
-    )
+    self_contact: bool = SELF_CONTACT.field()
 
     def __attrs_post_init__(self) -> None:
-        require_self_contact_resolvable(MeshSettings(fidelity=self.fidelity), self.self_contact)
         if not any(e.role == "fit" for e in self.measured.experiments):
             raise InputError(
                 "every experiment is held out",
@@ -79,16 +69,17 @@ class Job:
         """What a unit is simulated as, in words; empty where none is."""
         if not bends(self.measured.experiments):
             return ""
-        if self.fidelity == HOMOGENISED:
+        settings = self.unit_settings
+        if not settings.mesh.resolved:
             return "the unit with a homogenised lattice"
-        return f"the unit as printed, {'walls kept apart' if self.self_contact else 'walls may cross'}"
+        return f"the unit as printed, {'walls kept apart' if settings.self_contact else 'walls may cross'}"
 
     @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation."""
         from ...evidence.unit_fem import UnitSettings
 
-        return self.settings or UnitSettings.of(self.fidelity, self.self_contact)
+        return self.settings or UnitSettings.printed(self.self_contact)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; diagnose.toml is the first."""
@@ -97,7 +88,7 @@ class Job:
             "experiments_sha256": experiments_digest(self.measured),
             "program_sha256": _program(),
             "settings": None if self.settings is None else repr(self.settings),
-            **fidelity_of(self),
+            **self_contact_of(self),
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -119,31 +110,19 @@ def read_job(folder: Path) -> Job:
     return Job(
         measured,
         read_unit(unit) if unit.is_file() else None,
-        **fidelity_in(values, path),
+        **self_contact_in(values),
         known=load_model(known) if known.is_file() else None,
     )
 
 
-def fidelity_of(job: Any) -> dict[str, Any]:
-    """Fidelity and self-contact as entries of a job's file of inputs; none where no unit is simulated."""
-    if not bends(job.measured.experiments):
-        return {}
-    apart = None if job.fidelity == HOMOGENISED else job.self_contact
-    return {"fidelity": job.fidelity, "self_contact": apart}
+def self_contact_of(job: Any) -> dict[str, Any]:
+    """Self-contact as an entry of a job's file of inputs; none where no unit is simulated."""
+    return {"self_contact": job.self_contact} if bends(job.measured.experiments) else {}
 
 
-def fidelity_in(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Fidelity and self-contact of a file of inputs; raises InputError.
-
-    Homogenised where it names none, as runs were before every one of a unit named it.
-    """
-    found = values.get("fidelity", HOMOGENISED)
-    if found not in FIDELITIES:
-        raise InputError(
-            f"fidelity = {found!r} is unknown", str(path), f"write one of {', '.join(FIDELITIES)}"
-        )
-    apart = values.get("self_contact", found != HOMOGENISED)
-    return {"fidelity": found, "self_contact": apart is True}
+def self_contact_in(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Self-contact of a file of inputs."""
+    return {"self_contact": values.get("self_contact", SELF_CONTACT.default) is True}
 
 
 def bends(experiments: Sequence[Experiment]) -> bool:

@@ -24,7 +24,6 @@ from ...evidence.verdict import Verdict
 from ...files import write_csv, write_json
 from ...measured import Measured
 from ...measured.kinds import OF_A_UNIT
-from ...meshing.settings import HOMOGENISED
 from ...reading import file_bytes, parse_json
 from ...run.context import RunContext
 from ...run.folder import begin, same_inputs
@@ -46,10 +45,6 @@ SET = 3
 """Records among the data for which the plan's seconds of a verdict hold."""
 RECORD = 10
 """Rows from which an experiment is a record, not a few readings."""
-NOT_AS_PRINTED = (
-    "the unit is simulated with a homogenised lattice: of a printed unit, its own error may be named, or "
-    "hide a cause"
-)
 
 
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
@@ -83,9 +78,6 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     Raises InputError, OutputError.
     """
     measured, unit, progress = job.measured, job.subject, context.progress
-    homogenised = bool(job.body) and job.fidelity == HOMOGENISED
-    if homogenised:
-        progress.warning(NOT_AS_PRINTED, "fidelity", "choose resolved for a printed unit")
     for remark in measured.remarks:
         progress.warning(remark.what, remark.where, remark.remedy)
     if "verdict" in context.summary:
@@ -126,7 +118,6 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
-    remarks = [NOT_AS_PRINTED] * homogenised + remarks
     found = JudgedData(measured, simulator, verdict, model, unit, tuple(remarks), job.body)
     write_json(folder / "verdict.json", verdict.as_json())
     found.model.save(folder / "model.toml")
@@ -315,7 +306,7 @@ def plan_of(job: Job) -> Plan:
     # A few readings take next to nothing.
     records = sum(len(e.rows) >= RECORD for e in experiments) / SET
     judged = {"noise": 0.5, "sensitivities": 2.0, "effects": 15.0, "gain": 0.5}
-    simulated = dict(simulations_plan(experiments, job.subject, job.fidelity))
+    simulated = dict(simulations_plan(experiments, job.subject, job.unit_settings))
     looks = {name: share * simulated[BASE] for name, share in SHARES.items() if BASE in simulated}
     last = [(SIZES, looks.pop(SIZES))] if looks else []
     return [

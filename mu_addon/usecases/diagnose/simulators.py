@@ -15,7 +15,6 @@ from ...evidence.prediction.bench import bench_simulators
 from ...evidence.simulator import Simulator
 from ...measured import Experiment
 from ...measured.kinds import OF_A_UNIT
-from ...meshing.settings import HOMOGENISED
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 
@@ -40,11 +39,11 @@ FREE: dict[str, Callable[..., Simulator]] = {
 }
 
 
-def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, fidelity: str) -> Plan:
+def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, settings: UnitSettings) -> Plan:
     """Stages of `simulators_of` with the expected seconds of each on two cores."""
     kinds = {e.kind for e in experiments}
     unit = UNIT_S
-    if fidelity != HOMOGENISED:
+    if settings.mesh.resolved:
         lowest = min(
             (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
         )

@@ -85,7 +85,7 @@ def _inputs(value: Any) -> Row:
     found |= {f"{section}.{d.name}": v for section, d, v in stated(design.unit)}
     if isinstance(value, Study):
         job = value.job
-        found |= {"times": job.times, "lattice law": "computed" if job.lattice else "neo-Hookean"}
+        found |= {"times": job.times}
         found |= {f"mesh.{key}": v for key, v in job.mesh.table().items()}
         found |= {"effects": "; ".join(job.effects.words())}
     return found

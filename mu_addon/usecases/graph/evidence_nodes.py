@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...graph.definition import FOLDER, Call, Definition, Input, Output, Outputs, setting
 from ...measured import read_folder
-from .shared_settings import FIDELITY, SELF_CONTACT, of_orders
+from .shared_settings import SELF_CONTACT, of_orders
 
 DATA, NUMBERS = "Data", "Number"
 COMPARED = ("unit", "study", "grasp", "diagnosis")
@@ -73,7 +73,7 @@ def evidence_nodes() -> tuple[Definition, ...]:
                 Output("diagnosis", "diagnosis", "the verdict"),
                 Output("model", "model", "the extended model, for a node Simulate"),
             ),
-            (FIDELITY, SELF_CONTACT),
+            (SELF_CONTACT,),
             order=of_orders("diagnose_order"),
             read=lambda call, done: {"diagnosis": done, "model": done.folder / "model.toml"},
             muting="this node and those that need it are not computed",

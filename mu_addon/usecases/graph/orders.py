@@ -16,9 +16,8 @@ from ...design.settings import PRINTER
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...homogenize.effective_file import Effective, read_effective
 from ...measured import Measured
-from ...meshing.settings import HOMOGENISED, MeshSettings
+from ...meshing.settings import MeshSettings, printed
 from ..check_print.job import Job as CheckJob
 from ..check_print.run import USE_CASE as CHECK
 from ..diagnose.job import Job as DiagnoseJob
@@ -34,7 +33,7 @@ from ..homogenize.job import Job as HomogenizeJob
 from ..homogenize.job import frictions_of
 from ..homogenize.job import resin_of as lattice_resin
 from ..homogenize.run import USE_CASE as HOMOGENIZE
-from ..simulate_and_place.extended_unit import read_extended, require_same_print
+from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
 from ..simulate_and_place.run import USE_CASE as STUDY
@@ -63,24 +62,19 @@ def _simulated(call: Call) -> Job:
     """Study of a node Simulate; raises InputError."""
     s, design = call.settings, call.inputs["unit"]
     unit, effects = design.unit, NamedEffects(orientation_deg=s["orientation_deg"], where=call.node)
-    lattice: Effective | None = call.inputs["law"]
     model: Path | None = call.inputs["model"]
     if model is not None:
         found = read_extended(unit, model)
         unit, effects = found.unit, attrs.evolve(found.effects, orientation_deg=s["orientation_deg"])
-        if lattice is not None and found.applied:
-            require_same_print(unit, lattice, model)
     obstacles = tuple(body for _, body in call.inputs["obstacles"])
     require_beside(obstacles, unit.dimensions, design.body)
-    mesh = MeshSettings(order=s["order"], refine=s["refine"], fidelity=s["fidelity"])
     return Job(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
-        mesh=mesh,
+        mesh=MeshSettings(refine=s["refine"], fidelity=printed(s["solid_struts"])),
         times=s["times"],
-        self_contact=mesh.resolved and s["self_contact"],
+        self_contact=s["self_contact"],
         self_friction=s["self_friction"],
-        lattice=lattice,
         body=design.body,
         obstacles=obstacles,
         effects=effects,
@@ -198,7 +192,7 @@ def export_order(call: Call) -> Order:
 def grip_order(call: Call) -> Order:
     """Run of a gripper's grasp."""
     s = call.settings
-    detail = detailed(s["coarse"], s["fidelity"])
+    detail = detailed(s["coarse"], solid_struts=s["solid_struts"])
     try:
         sides = [float(word) for word in s["cubes_mm"].split()]
     except ValueError:
@@ -210,7 +204,7 @@ def grip_order(call: Call) -> Order:
         cubes=tuple(Cube(side, s["density_g_per_ml"]) for side in sides),
         grip=detail.grip(friction=s["friction"]),
         mesh=detail.mesh,
-        self_contact=detail.mesh.resolved and s["self_contact"],
+        self_contact=s["self_contact"],
     )
     return Order(GRIP, job)
 
@@ -237,14 +231,7 @@ def diagnose_order(call: Call) -> Order:
     design, measured = call.inputs["unit"], call.inputs["data"]
     assert isinstance(measured, Measured)
     unit = None if design is None else design.unit
-    s = call.settings
-    apart = s["self_contact"] and s["fidelity"] != HOMOGENISED
-    return Order(DIAGNOSE, DiagnoseJob(measured, unit, fidelity=s["fidelity"], self_contact=apart))
-
-
-def law_of(call: Call, done: Finished) -> Outputs:
-    """Lattice law of a run of `homogenize`."""
-    return {"law": read_effective(done.folder / "effective.toml"), "run": done}
+    return Order(DIAGNOSE, DiagnoseJob(measured, unit, self_contact=call.settings["self_contact"]))
 
 
 def check_of(call: Call, done: Finished) -> Outputs:

@@ -16,13 +16,12 @@ from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .parts import refuse_body
 from .shared_settings import (
-    FIDELITY,
-    ORDER,
     ORIENTATION,
     PROTOCOL,
     REFINE,
     SELF_CONTACT,
     SELF_FRICTION,
+    SOLID_STRUTS,
     TIMES,
     of_orders,
 )
@@ -81,7 +80,6 @@ def study_nodes() -> tuple[Definition, ...]:
             "the unit's motion under a pressure protocol",
             (
                 _TAKES_UNIT,
-                Input("law", ("law",), "the lattice's law, by a node Homogenize", needed=False),
                 Input("model", ("model",), "an extended model, by a node Diagnose", needed=False),
                 Input("obstacles", ("obstacle",), "link nodes Obstacle", needed=False, many=True),
             ),
@@ -89,9 +87,8 @@ def study_nodes() -> tuple[Definition, ...]:
             (
                 PROTOCOL,
                 TIMES,
-                ORDER,
                 REFINE,
-                FIDELITY,
+                SOLID_STRUTS,
                 SELF_CONTACT,
                 SELF_FRICTION,
                 ORIENTATION,
@@ -163,14 +160,14 @@ def study_nodes() -> tuple[Definition, ...]:
             "homogenize",
             "Homogenize",
             SIMULATE,
-            "the lattice's law from its struts and its resin",
+            "the lattice's moduli from its struts and its resin",
             (_TAKES_UNIT,),
-            (Output("law", "law", "the lattice's law"),),
+            (Output("moduli", "file", "moduli, and a law of the lattice's continuum"),),
             tuple(map(Setting, (RESIN, CELLS, SPECIMEN, STRAIN, CELL_REFINE))),
             order=of_orders("homogenize_order"),
-            read=of_orders("law_of"),
+            read=lambda call, done: {"moduli": done},
             muting=_LEFT_OUT,
-            remark=lambda outputs: f"{outputs['run'].summary['moduli_kPa']['E100']:.4g} kPa",
+            remark=lambda outputs: f"{outputs['moduli'].summary['moduli_kPa']['E100']:.4g} kPa",
         ),
         Definition(
             "check",
@@ -231,7 +228,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (Output("grasp", "grasp", "the grasp"),),
             (
                 *(Setting(d) for d in (CUBES, DENSITY, FRICTION, COARSE)),
-                FIDELITY,
+                SOLID_STRUTS,
                 SELF_CONTACT,
             ),
             order=of_orders("grip_order"),

@@ -7,13 +7,12 @@ from ...graph.definition import Call, Definition, Input, Output, Outputs, Settin
 from ..parameter_study import settings as study
 from .parts import described
 from .shared_settings import (
-    FIDELITY,
-    ORDER,
     PROTOCOL,
     QUICK_REFINE,
     QUICK_TIMES,
     SELF_CONTACT,
     SELF_FRICTION,
+    SOLID_STRUTS,
     of_orders,
 )
 
@@ -116,9 +115,8 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 Setting(study.SEED),
                 PROTOCOL,
                 QUICK_TIMES,
-                ORDER,
                 QUICK_REFINE,
-                FIDELITY,
+                SOLID_STRUTS,
                 SELF_CONTACT,
                 SELF_FRICTION,
                 setting("minimize", "", "columns of the table to minimise, for Pareto fronts"),

@@ -13,7 +13,7 @@ import attrs
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...meshing.settings import HOMOGENISED
+from ...meshing.settings import printed
 from ...reading import file_text
 from ..parameter_study.plan import TABLE, Plan
 from ..parameter_study.run import LAST, USE_CASE, Job
@@ -58,11 +58,11 @@ def _plan_of(call: Call) -> Plan:
     s, design = call.settings, call.inputs["unit"]
     refuse_body(design, "a parameter study")
     protocol = protocol_of(s["protocol"] or None)
-    mesh = {"order": s["order"], "refine": s["refine"], "fidelity": s["fidelity"]}
+    mesh = {"refine": s["refine"], "fidelity": printed(s["solid_struts"])}
     tables: dict[str, dict[str, Any]] = {
         "design": {},
         "simulate": {"times": s["times"], "mesh": mesh}
-        | ({"self_contact": True} if s["self_contact"] and s["fidelity"] != HOMOGENISED else {})
+        | ({"self_contact": True} if s["self_contact"] else {})
         | ({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
         "place": {},
     }

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FILES = {
     "homogenize.toml": "inputs of this run",
     "unit.toml": "parameters of the unit",
-    "effective.toml": "moduli and the lattice's law: `place --lattice effective.toml` takes it",
+    "effective.toml": "moduli of the lattice, and a law of its continuum",
     "tensor.csv": "effective elasticity, kPa, in Voigt's order with engineering shears",
     "cell.csv": "the periodic lattice in tension and compression along an axis",
     "cell.vtu": "analysis mesh of an eighth of a cell (ParaView)",

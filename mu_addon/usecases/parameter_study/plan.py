@@ -15,7 +15,7 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.quantity import Description
 from ...errors import InputError, MuError, did_you_mean
 from ...fem.protocol import Protocol
-from ...meshing.settings import fidelity_where_none_is_named
+from ...meshing.settings import FIDELITY, HOMOGENISED, OF_CONTINUUM, SELF_CONTACT
 from ...reading import parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, read_toml
@@ -247,7 +247,7 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
 def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     """The document with the fidelity that its studies have where it names none.
 
-    A file that names a mesher or varies the order of its elements needs a continuum.
+    A file that names a mesher, has linear elements or varies what only a continuum has is homogenised.
     """
     simulate, place, vary = (document.get(name, {}) for name in ("simulate", "place", "vary"))
     # What is no table is refused later, by name.
@@ -259,10 +259,11 @@ def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
     varied = _flat(vary)
     if "simulate.mesh.fidelity" in varied:
         return document
-    others = "simulate.mesh.order" in varied, "mesher" in simulate
-    fidelity, apart = fidelity_where_none_is_named(mesh.get("order"), varied, *others)
-    kept_apart = {"self_contact": apart} if apart else {}
-    return document | {"simulate": kept_apart | simulate | {"mesh": mesh | {"fidelity": fidelity}}}
+    of_continuum = not {*OF_CONTINUUM, "simulate.mesh.order"}.isdisjoint(varied)
+    if of_continuum or mesh.get("order") == 1 or "mesher" in simulate:
+        return document | {"simulate": simulate | {"mesh": mesh | {"fidelity": HOMOGENISED}}}
+    apart = {"self_contact": SELF_CONTACT.default}
+    return document | {"simulate": apart | simulate | {"mesh": mesh | {"fidelity": FIDELITY.default}}}
 
 
 def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:

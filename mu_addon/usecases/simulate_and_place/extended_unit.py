@@ -8,14 +8,12 @@ from pathlib import Path
 
 import attrs
 
-from ...design.parameters import Printing, Unit
-from ...design.strut_cell import strut_cell
+from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, Fitted, load_model
 from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice_compression import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
-from ...homogenize.effective_file import Effective
 from ..diagnose.words import readable
 from .named_effects import NAMES, NamedEffects, law_within
 
@@ -121,25 +119,6 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
         )
     kept = ExtendedModel(model.verdict, {n: v for n, v in beside.items() if n in effects.values}, {})
     return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
-
-
-def require_same_print(unit: Unit, lattice: Effective, origin: str | Path) -> None:
-    """Raise InputError where a lattice law is of another print than a unit with a model in it.
-
-    Offset and skin change struts as they change walls: a law of struts as drawn would ignore half of the
-    model.
-    """
-    own = strut_cell(unit)
-    for name in (f.name for f in attrs.fields(Printing)):
-        if name not in lattice.cell:
-            continue
-        law, mine = float(lattice.cell[name]), float(getattr(own, name))
-        if not math.isclose(law, mine, rel_tol=1e-6, abs_tol=1e-9):
-            raise InputError(
-                f"the model prints {name} = {mine:.4g}, and the lattice's law is of struts with {law:.4g}",
-                f"--model {origin} with --lattice",
-                f"run `homogenize` with --model {origin} too, and give its effective.toml as --lattice",
-            )
 
 
 def _put(unit: Unit, origin: str, key: str, fitted: Fitted, put: Put) -> tuple[Unit, str]:

@@ -42,11 +42,9 @@ if TYPE_CHECKING:
     # The inputs of a study are made without the solver: Blender's window waits for them.
     from ...fem.materials import Materials
     from ...fem.model import Model
-    from ...homogenize.effective_file import Effective
     from ...meshing.mesh import Mesh
 
 GRASP = "protocols/grasp.csv"
-LATTICE_LAW = FILES["lattice"]
 
 
 @attrs.frozen
@@ -70,8 +68,6 @@ class Job:
     # Optical constants of the resin, for the signal beside each path's disturbance.
     optics: Optics = attrs.field(factory=Optics)
     most_checks: int = CHECKS.field()
-    # The lattice's law, by homogenizing its cell, in place of the unit's one modulus for it.
-    lattice: Effective | None = None
     # A sound body that replaces the lattice's box.
     body: Body | None = None
     # Rigid bodies that the unit may touch, fixed in its frame.
@@ -103,12 +99,12 @@ class Job:
         without, one = "the search of the whole lattice does not support", "leave one of them out"
         graph, two_levels = places and self.paths == "graph", self.solver.method == "iterative"
         resolved = simulates and self.mesh.resolved
-        for what, where, asked in (
-            ("a law for the lattice", "--lattice", self.lattice is not None),
-            ("linear elements", "--order", self.mesh.order == 1),
-        ):
-            words = f"the resolved model does not support {what}"
-            yield resolved and asked, words, where, "choose fidelity homogenised"
+        yield (
+            resolved and self.mesh.order == 1,
+            "a printed body has no linear elements",
+            "mesh.order",
+            "choose order 2",
+        )
         yield graph and bool(self.obstacles), f"{without} obstacles", "obstacles, paths", one
         yield (
             bool(self.self_friction) and not self.self_contact,
@@ -142,8 +138,8 @@ class Job:
         yield (
             two_levels and simulates and self.mesh.order == 1,
             "the iterative solver needs quadratic elements",
-            "--solver, --order",
-            "give --order 2 or --solver direct",
+            "--solver, mesh.order",
+            "choose order 2, or --solver direct",
         )
         yield (
             not self.samples[1].any(),
@@ -219,7 +215,7 @@ class Job:
         """Materials of the unit's mesh, effects and all."""
         from ...fem.unit_materials import materials_of
 
-        drawn = materials_of(self.unit, mesh, None if self.lattice is None else self.lattice.law)
+        drawn = materials_of(self.unit, mesh)
         return self.effects.materials(drawn, mesh)
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
@@ -262,8 +258,6 @@ class Job:
         found = {"unit": to_toml(self.unit), "protocol": protocol_text(self.protocol)}
         if self.body is not None:
             found["body"] = self.body.text()
-        if self.lattice is not None:
-            found["lattice"] = self.lattice.text()
         if self.obstacles:
             found["obstacles"] = self.obstacles_text()
         return found
@@ -322,7 +316,7 @@ def read_job(folder: Path) -> Job:
         raise InputError(
             "an input file has changed since this study was made",
             str(folder),
-            "restore it, or start a new study with it: --unit, --protocol, --lattice, --obstacle",
+            "restore it, or start a new study with it: --unit, --protocol, --obstacle",
         )
     asked = read_run(folder).get("stages", list(tables))
     return job_of({stage: table for stage, table in tables.items() if stage in asked}, folder)
@@ -352,10 +346,6 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
         job["body"] = read_body(folder / FILES["body"])
     if "simulate" in tables:
         job["protocol"] = read_protocol(folder / FILES["protocol"])
-        if "lattice" in tables["simulate"]:
-            from ...homogenize.effective_file import read_effective
-
-            job["lattice"] = read_effective(folder / FILES["lattice"])
         if "obstacles" in tables["simulate"]:
             friction = tables["simulate"].get("friction")
             job["obstacles"] = read_rigid_bodies(folder / FILES["obstacles"], friction)

@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-import attrs
-import numpy as np
-
 from ...design.quantity import in_kPa
-from ...design.strut_cell import strut_cell
-from ...fem.lattice_law import deformation_gradients, stretches
 from ...fem.self_intersection import first_self_intersection
 from ...fem.state import State, rest
-from ...homogenize.foam_response import ellipticity
-from ...meshing.mesh import LATTICE
 
 if TYPE_CHECKING:
-    from ...homogenize.effective_file import Effective
     from ...meshing.mesh import Mesh
     from .job import Job
 
@@ -25,14 +17,12 @@ if TYPE_CHECKING:
 HOMOGENISED = (
     "The lattice is simulated as a homogenised continuum. With its struts as printed, which buckle, mu-1.0x "
     "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
-    "motion matters, choose the fidelity resolved."
+    "motion matters, simulate the printed body."
 )
 
 
 def doubts_of_job(job: Job) -> Iterator[str]:
     """Warnings on what the settings of a simulation leave out."""
-    if job.lattice is not None:
-        yield from _another_cell(job, job.lattice)
     # Uniform samples miss the protocol's extremes.
     corners, samples = job.protocol.pressure_kPa, job.supplied_kPa
     for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
@@ -47,26 +37,10 @@ def doubts_of_job(job: Job) -> Iterator[str]:
         yield HOMOGENISED
 
 
-def _another_cell(job: Job, lattice: Effective) -> Iterator[str]:
-    """Warn where the lattice's law was found for another cell than the unit's."""
-    own = strut_cell(job.unit)
-    values = {f.name: getattr(own, f.name) for f in attrs.fields(type(own))} | {"kind": own.kind.name}
-    other = []
-    for name, value in lattice.cell.items():
-        mine = values.get(name, value)
-        words = isinstance(value, str) or isinstance(mine, str)
-        if value != mine and (words or not np.isclose(value, mine, rtol=1e-6)):
-            other.append(f"{name} {value} (unit: {mine})")
-    if other:
-        yield f"The lattice law was computed for another cell than the unit's: {', '.join(other)}."
-
-
 def doubts_of_motion(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
     """Warnings on a motion's states; their figures go into the summary."""
     yield from _walls_cross(job, mesh, states, summary)
     yield from _snaps(job, states)
-    if job.lattice is not None:
-        yield from _beyond_the_fit(job.lattice, mesh, states, summary)
     most = summary.get("nearest_to_break", {})
     if most.get("percent", 0.0) > 100.0:
         x, y, z = most["place_mm"]
@@ -115,40 +89,3 @@ def _snaps(job: Job, states: Sequence[State]) -> Iterator[str]:
                 "mm at most: later states are those that a damped motion reaches, and unloading "
                 "takes a different path."
             )
-
-
-def _beyond_the_fit(
-    lattice: Effective, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]
-) -> Iterator[str]:
-    """Warn where the lattice is strained beyond the range of its law's fit or stability."""
-    law = lattice.law
-    low, high = law.stretch
-    inside = np.flatnonzero(mesh.region == LATTICE)
-    found = summary["lattice_stretch"] = {}
-    for state in states:
-        F, volume = deformation_gradients(mesh, state.u, inside)
-        a = stretches(F)
-        beyond = (a[:, :, 0] < low) | (a[:, :, 2] > high)
-        # One point an element: it takes a while.
-        lost = ellipticity(law, F[:, 0]) <= 0
-        found[f"{state.pressure_kPa:.6g}"] = {
-            "least": float(a.min()),
-            "largest": float(a.max()),
-            "share_beyond_fit": float((volume * beyond).sum() / volume.sum()),
-            "share_not_elliptic": float((volume.sum(axis=1) * lost).sum() / volume.sum()),
-        }
-    least, largest = (pick(s[n] for s in found.values()) for pick, n in ((min, "least"), (max, "largest")))
-    pressure, worst = max(found.items(), key=lambda item: item[1]["share_beyond_fit"])
-    if worst["share_beyond_fit"]:
-        yield (
-            f"The lattice is strained to stretches from {least:.2f} to {largest:.2f}, but its law was "
-            f"fitted from {low:g} to {high:g}: at {pressure} kPa {worst['share_beyond_fit']:.1%} of the "
-            "lattice volume is outside that range, where the law is extrapolated."
-        )
-    pressure, worst = max(found.items(), key=lambda item: item[1]["share_not_elliptic"])
-    if worst["share_not_elliptic"]:
-        yield (
-            f"At {pressure} kPa the law is no longer elliptic in {worst['share_not_elliptic']:.1%} of "
-            "the lattice volume: struts buckle there, and the result depends on the mesh. Compare two "
-            "meshes (--refine)."
-        )

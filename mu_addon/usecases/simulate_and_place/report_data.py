@@ -21,23 +21,18 @@ from ...report.results import (
     SideView,
 )
 from ...run.versions import package_versions
-from .job import LATTICE_LAW
 from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
 
 if TYPE_CHECKING:
-    from ...homogenize.effective_file import Effective
     from .named_effects import NamedEffects
     from .study import Study
 
 NO_PICTURES = "This report has no pictures: they take most of its time, and this run was asked to stop."
-# What the lattice's law stands in for.
-REPLACED = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 FILES = {
     "study.toml": "inputs of this run",
     "unit.toml": "parameters of the unit",
     "protocol.csv": "pressure protocol",
-    "effective.toml": "law of the lattice, from its struts and resin",
     "obstacles.obj": "rigid obstacles, mm",
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
@@ -174,11 +169,7 @@ def _parameters(study: Study) -> list[Parameter]:
     rows = [Parameter("scale", unit.scale, "", "paper")]
     for section, d, value in stated(unit):
         path = f"{section}.{d.name}"
-        if study.job.lattice is not None and path in REPLACED:
-            rows.append(Parameter(path, value, d.unit, f"not used: {LATTICE_LAW} gives the lattice law"))
-            continue
         rows.append(Parameter(path, value, d.unit, reasons.get(path, d.source), d.assumed))
-    rows += _lattice_parameters(study.job.lattice)
     rows += _effects(study.job.effects)
     m, k, j = study.job.mesh, study.job.times, study.job.stations
     rows += [
@@ -213,32 +204,6 @@ def _effects(effects: NamedEffects) -> list[Parameter]:
             "orientation", effects.orientation_deg, "deg", "given by the user; 0: hanging, tip down"
         )
         rows.append(turned)
-    return rows
-
-
-def _lattice_parameters(lattice: Effective | None) -> list[Parameter]:
-    """Parameters of the lattice's law, and its origin."""
-    if lattice is None:
-        return []
-    made = f"{LATTICE_LAW}: {lattice.cell.get('kind', 'a')} cell"
-    if "name" in lattice.resin:
-        made += f" of {lattice.resin['name']}"
-    low, high = lattice.stretch
-    fitted = f"{made}; fitted from stretch {low:g} to {high:g}"
-    rows = [
-        Parameter("lattice law.E100_kPa", lattice.E100_kPa, "kPa", f"{made}; small strain, along an axis"),
-        Parameter("lattice law.nu100", lattice.nu100, "", f"{made}; small strain, along an axis"),
-        Parameter("lattice law.C44_kPa", lattice.C44_kPa, "kPa", f"{made}; small strain, shear between axes"),
-        Parameter("lattice law.relative_density", lattice.relative_density, "", made),
-    ]
-    for law, values in lattice.law.layers:
-        for name, value in zip(law.parameter_names, values, strict=True):
-            unit = "MPa" if name.endswith("_MPa") else ""
-            rows.append(Parameter(f"lattice law.{law.name}.{name}", float(value), unit, fitted))
-    rows += [
-        Parameter(f"lattice law.misfit_{name}", value, "", "root mean square over the largest value")
-        for name, value in attrs.asdict(lattice.misfit).items()
-    ]
     return rows
 
 

@@ -98,8 +98,6 @@ class Study:
         if simulates:
             summary["study"] = {"times": job.times, "stations": job.stations}
             summary["study"] |= {"mesh": job.mesh.table(), "mesher": job.mesher}
-            if job.lattice is not None:
-                summary["study"]["lattice"] = attrs.asdict(job.lattice)
             if job.effects:
                 summary["study"] |= job.effects.tables
             study.warn(*doubts_of_job(job))

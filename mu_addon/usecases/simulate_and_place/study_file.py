@@ -23,10 +23,9 @@ FILES = {
     "unit": "unit.toml",
     "body": "body.obj",
     "protocol": "protocol.csv",
-    "lattice": "effective.toml",
     "obstacles": "obstacles.obj",
 }
-FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "lattice", "obstacles"), "place": ()}
+FILES_OF = {"design": ("unit", "body"), "simulate": ("protocol", "obstacles"), "place": ()}
 LAYOUT = FolderLayout(
     NAME,
     HEADER,

@@ -14,9 +14,11 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.evidence import unit_fem
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.placement.graph import Limits
 
 from ...evidence import analytic
-from ...headless.processes import run
+from ...headless.processes import coarse, run
 from ...made_once import made_once
 from ...usecases.bent_motion import write_bent_run
 from ...usecases.diagnosis_data import bent_unit, weighed_blocks
@@ -96,9 +98,15 @@ def blender(each_bpy, blenders, tmp_path_factory):
 
 
 # A coarse ranking, with one path of the whole lattice beside the ten of the anchors.
-PLACE = ["place", "--preset", "mu-0.75x", "--order", "1", "--refine", "0.4"]
-PLACE += ["--no-mesh-check", "--workers", "1", "--paths", "graph", "--longest-cells", "2", "--checks", "2"]
-PLACE += ["--no-report"]
+PLACE = {
+    "mesh": MeshSettings(refine=0.4, order=1),
+    "times": 13,
+    "stations": 51,
+    "mesh_check": False,
+    "paths": "graph",
+    "limits": Limits(longest_cells=2.0),
+    "most_checks": 2,
+}
 
 
 @pytest.fixture(scope="session")
@@ -106,7 +114,8 @@ def placed(tmp_path_factory, with_light):
     """A finished study of `place`; whoever writes into it takes `study`."""
 
     def make(folder):
-        done = run(*PLACE, "--out", with_light(folder))
+        line = coarse(with_light(folder), load_preset("mu-0.75x"), **PLACE)
+        done = run(*line, "--workers", "1", "--no-report")
         assert done.returncode == 0, done.stderr
 
     return made_once(tmp_path_factory, "placed", make)

@@ -412,17 +412,17 @@ def editor(tree):
 def test_a_tree_runs_in_a_process_of_its_own_and_its_states_stay_with_the_file(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "runs.blend"))
     tree = new("three-walls")
-    for name in ("Wall 0.9 mm", "Motion, wall 0.9"):
+    for name in ("Wall 0.9 mm", "Motion, wall 0.9", "Wall 1 mm", "Motion, wall 1"):
         tree.nodes.remove(tree.nodes[name])
-    for node in tree.nodes:
-        if node.definition.kind == "simulate":
-            node.fidelity, node.order, node.refine, node.times = "homogenised", 1, 0.4, 4
+    (tmp_path / "pressed.csv").write_text("time_s,pressure_kPa\n0,0\n1,2\n")
+    motion = tree.nodes["Motion, wall 0.8"]
+    motion.refine, motion.times, motion.protocol = 0.2, 2, str(tmp_path / "pressed.csv")
     assert states(tree)["Compare"] == "waiting"
     child = ended(state.start(tree))
     assert child.state == DONE, child.error
     found = state.refresh(tree)
     assert {s.state for s in found.values()} == {"cached"}
-    assert "° at 40 kPa" in found["Motion, wall 0.8"].remark
+    assert "° at 2 kPa" in found["Motion, wall 0.8"].remark
     folder = state.folder_of(tree)
     assert json.loads((folder / "nodes.json").read_text())["nodes"]["Compare"]["state"] == "computed"
     assert state.place_of(tree, tree.nodes["Compare"], "table").is_file()
