@@ -137,7 +137,7 @@ def options(command):
 @pytest.mark.parametrize(
     ("command", "d"),
     [
-        *(("place", d) for d in (mesh.ORDER, mesh.REFINE, study.TIMES, study.STATIONS)),
+        *(("place", d) for d in (mesh.REFINE, study.TIMES, study.STATIONS)),
         *(("place", d) for d in (study.WORKERS, study.CHECKS, study.PATHS)),
         *(
             ("place", d)
@@ -164,7 +164,7 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", study.TIMES),
         ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
-        ("sweep", mesh.ORDER),
+        ("sweep", mesh.SOLID_STRUTS),
         ("homogenize", lattice.REFINE),
         ("sweep", sweep.POINTS),
         ("grip", grip.DENSITY),
