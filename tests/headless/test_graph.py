@@ -228,7 +228,7 @@ def every_kind(wall, bench):
     )  # fmt: skip
     add(
         "Two", "chain", {"units": "U.unit"}, copies=2, turns_deg="0 90", reach_mm="0 -2 110", high_kPa=20.0,
-        step_kPa=50.0, loaded=False, order=1, refine=0.25,
+        step_kPa=50.0, loaded=False, refine=0.25,
     )  # fmt: skip
     add("Heaviest", "best", {"table": "Study.table"}, figure="mass_g")
     angles = str(ROOT / "assets" / "examples" / "bench" / "angles.csv")

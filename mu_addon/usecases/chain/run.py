@@ -34,8 +34,8 @@ from ...run.versions import package_versions
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 
-JOINT_S = 17.0
-"""Seconds in which a joint is learned at one pressure on the default mesh."""
+JOINT_S, PRINTED = 17.0, 17.0
+"""Seconds in which a homogenised joint is learned at one pressure on the default mesh; factor if printed."""
 
 
 def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
@@ -77,7 +77,8 @@ def plan_of(job: Job) -> Plan:
     for n, span in enumerate(spans.values(), 1):
         finer = job.mesh.refine / REFINE.default
         # Those at rest take as long as those under two pressures.
-        joint_s = JOINT_S * finer * (len(job.joint.pressures(*span)) + 2)
+        one_s = JOINT_S * (PRINTED if job.mesh.resolved else 1.0)
+        joint_s = one_s * finer * (len(job.joint.pressures(*span)) + 2)
         plan += [(f"mesh of unit {n}", 4.0 * finer**2), (f"joint of unit {n}", joint_s)]
     return [*plan, ("chain", 2.0 if job.target is None else 12.0), ("files", 2.0), ("report", 3.5)]
 

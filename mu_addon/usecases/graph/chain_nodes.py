@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from ...chain import settings as chain
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from .shared_settings import ORDER
 
 if TYPE_CHECKING:
     from ...graph.evaluation import Finished, Order
@@ -24,7 +23,7 @@ def _remark(outputs: Outputs) -> str:
 def _chain(call: Call) -> Order:
     from ...chain.joint_learning import Sampling
     from ...graph.evaluation import Order
-    from ...meshing.settings import MeshSettings
+    from ...meshing.settings import RESOLVED, MeshSettings
     from ..chain.job import MOST_UNITS, ChainUnit, Job, Target, read_pressures
     from ..chain.run import USE_CASE
     from .parts import refuse_body
@@ -54,7 +53,7 @@ def _chain(call: Call) -> Order:
         orientation_deg=s["orientation_deg"],
         tip_mass_g=s["tip_mass_g"],
         times=s["times"],
-        mesh=MeshSettings(order=s["order"], refine=s["refine"], fraction="full"),
+        mesh=MeshSettings(refine=s["refine"], fraction="full", fidelity=RESOLVED),
         joint=Sampling(pressure_step_kPa=s["step_kPa"], loaded=s["loaded"]),
     )
     return Order(USE_CASE, job)
@@ -110,7 +109,6 @@ def chain_nodes() -> tuple[Definition, ...]:
                 Setting(chain.TIMES),
                 Setting(chain.PRESSURE_STEP._replace(name="step_kPa")),
                 Setting(chain.LOADED),
-                ORDER,
                 Setting(chain.REFINE),
             ),
             order=_chain,

@@ -14,7 +14,7 @@ SOLID_STRUTS, SELF_CONTACT = Setting(mesh.SOLID_STRUTS), Setting(mesh.SELF_CONTA
 SELF_FRICTION, TIMES = Setting(study.SELF_FRICTION), Setting(study.TIMES)
 ORIENTATION = Setting(study.ORIENTATION)
 PROTOCOL = Setting(study.PROTOCOL, FILE)
-ORDER, REFINE = Setting(mesh.ORDER), Setting(mesh.REFINE)
+REFINE = Setting(mesh.REFINE)
 QUICK_TIMES = Setting(study.TIMES._replace(default=7))
 QUICK_REFINE = Setting(mesh.REFINE._replace(default=0.5))
 
