@@ -29,7 +29,7 @@ def sine(p, share):
 def measured(law, share, seed=0):
     rng = np.random.default_rng(seed)
     tests = []
-    for name, t, p, how in analytic.protocols(0.2, 4):
+    for name, t, p, how in analytic.protocols(0.5, 4):
         y = analytic.channels(p)
         y += np.array([0.1, *[0.05] * 6])[:, None] * rng.normal(size=y.shape)
         read = law(p, share) + 0.02 * rng.normal(size=len(p))

@@ -15,7 +15,7 @@ from mu_addon.evidence.prediction.marker_slip import Recordings, searched, slip_
 from mu_addon.usecases.diagnose.words import sentence, to_do
 from tests.evidence import analytic
 
-DT = 0.25
+DT = 0.4
 SHARE = 0.37
 KEY = "marker_slip.marker2_"
 

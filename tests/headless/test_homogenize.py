@@ -13,7 +13,7 @@ from .processes import here
 
 COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
 # A block between plates takes two thirds of the time.
-CELL = ("--no-specimen", "--refine", "0.5")
+CELL = ("--no-specimen", "--refine", "0.3")
 TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
 
 

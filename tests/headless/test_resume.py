@@ -22,7 +22,7 @@ JOB = Job(
     attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4)),
     grasp(),
     mesh=MeshSettings(refine=0.4, order=1),
-    times=7,
+    times=4,
     stations=11,
     mesh_check=False,
 )

@@ -3,15 +3,15 @@
 import ast
 import importlib
 import re
-from functools import cache
 from pathlib import Path
 
 import pytest
 
+from .sources import SOURCES, nodes
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "engineering" / "security.md").read_text(encoding="utf-8")
 LIMITS = re.findall(r"^\| (\d+)[^|]*\|[^|]+\| `(mu_addon[\w.]*)\.(\w+)` \|$", PAGE, re.MULTILINE)
-SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
 
 # Who reads without a limit, and why that is no file from elsewhere.
 UNLIMITED = {
@@ -65,11 +65,6 @@ def name_of(node):
     if isinstance(node, ast.Attribute):
         return f"{node.value.id}.{node.attr}" if isinstance(node.value, ast.Name) else node.attr
     return ""
-
-
-@cache
-def nodes(path):
-    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
 def calls(path):

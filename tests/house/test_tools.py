@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from .sources import SOURCES, nodes
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -49,8 +51,8 @@ def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
 def test_the_core_imports_itself_relatively():
     """In Blender the package has another name, so that an absolute import would find another copy or none."""
     absolute = []
-    for path in (ROOT / "mu_addon").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in SOURCES:
+        for node in nodes(path):
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and node.level == 0:

@@ -10,9 +10,10 @@ import pytest
 
 from mu_addon.cli.main import parser
 
+from .sources import SOURCES, nodes
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
-SOURCES = sorted((ROOT / "mu_addon").rglob("*.py"))
 
 # Phrases of texts, with the term of the glossary that took their place.
 PHRASES = {
@@ -61,21 +62,16 @@ IDENTIFIERS = {
 }
 
 
-@cache
-def _nodes(path):
-    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-
-
 def _texts(path):
     """Line and text of every string of a module, docstrings included."""
-    for node in _nodes(path):
+    for node in nodes(path):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.lineno, " ".join(node.value.split())
 
 
 def _messages(path):
     """Every string of a module as a user reads it: "..." stands for each field of an f-string."""
-    for node in _nodes(path):
+    for node in nodes(path):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.value
         elif isinstance(node, ast.JoinedStr):
@@ -94,7 +90,7 @@ def _is_a_message(quoted):
 
 
 def _identifiers(path):
-    for node in _nodes(path):
+    for node in nodes(path):
         if isinstance(node, ast.Name):
             yield node.lineno, node.id
         elif isinstance(node, ast.Attribute):

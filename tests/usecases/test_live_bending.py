@@ -18,7 +18,7 @@ from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from .test_obstacles import WALL
 
 UNIT = Unit().evolve(count=3)
-PROTOCOL = Protocol([0.0, 1.0], [0.0, 20.0])
+PROTOCOL = Protocol([0.0, 1.0], [0.0, 8.0])
 
 
 @pytest.fixture(autouse=True)
@@ -27,7 +27,7 @@ def coarse(monkeypatch):
     monkeypatch.setattr(run, "RUNGS", 2)
 
 
-def answered(bending, number, unit, kPa=20.0):
+def answered(bending, number, unit, kPa=8.0):
     """Pairs of kPa and degrees that answer a request, and its motion."""
     requests.ask(bending.folder, number, Study(unit, PROTOCOL), kPa)
     assert bending.step()
@@ -40,19 +40,19 @@ def answered(bending, number, unit, kPa=20.0):
 def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     warm, anew = LiveBending(tmp_path / "warm"), LiveBending(tmp_path / "anew")
     first, motion = answered(warm, 1, UNIT)
-    assert set(first) == {0.0, 10.0, 20.0}
-    assert 0.0 == first[0.0] < first[10.0] < first[20.0]
-    assert motion.state_kPa.tolist() == [0.0, 10.0, 20.0]
+    assert set(first) == {0.0, 4.0, 8.0}
+    assert 0.0 == first[0.0] < first[4.0] < first[8.0]
+    assert motion.state_kPa.tolist() == [0.0, 4.0, 8.0]
     thicker = UNIT.evolve(wall_mm=1.1)
     second, moved = answered(warm, 2, thicker)
     assert (moved.mesh.nodes != motion.mesh.nodes).any(), "the mesh was moved"
     wanted, _ = answered(anew, 1, thicker)
-    assert second[20.0] < first[20.0]
-    for kPa in (10.0, 20.0):
+    assert second[8.0] < first[8.0]
+    for kPa in (4.0, 8.0):
         assert second[kPa] == pytest.approx(wanted[kPa], rel=5e-3)
     assert not warm.step(), "nothing more was asked for"
-    above, _ = answered(warm, 3, thicker, 30.0)
-    assert max(above) == 30.0, "beyond the protocol's pressures"
+    above, _ = answered(warm, 3, thicker, 12.0)
+    assert max(above) == 12.0, "beyond the protocol's pressures"
 
 
 @pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")
@@ -67,10 +67,10 @@ def test_other_struts_are_meshed_anew_and_begin_at_the_states_of_the_design_befo
     monkeypatch.setattr(run, "LEVELS", requests.LEVELS[:1])
     assert own.mesh.nodes.shape != moved.mesh.nodes.shape
     wanted, _ = answered(LiveBending(tmp_path / "thin"), 1, thin)
-    assert third[20.0] == pytest.approx(wanted[20.0], rel=1e-4)
+    assert third[8.0] == pytest.approx(wanted[8.0], rel=1e-4)
     settings = MeshSettings(refine=requests.LEVELS[0][0], fidelity=RESOLVED)
     assert (own.mesh.tied_weights == mesh_of(thin, settings).tied_weights).all()
-    assert 0.0 < third[10.0] < third[20.0]
+    assert 0.0 < third[4.0] < third[8.0]
 
 
 def test_stretch_and_stress_come_after_the_shape_where_they_are_asked_for(tmp_path, monkeypatch):
@@ -84,7 +84,7 @@ def test_stretch_and_stress_come_after_the_shape_where_they_are_asked_for(tmp_pa
         told.append((len(motion.state_kPa), bool(motion.fields["lattice"])))
 
     monkeypatch.setattr(LiveBending, "_tell", tell)
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0, fields=True)
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0, fields=True)
     assert bending.step()
     assert told == [(2, False), (2, True), (3, True)]
     motion = read_motion(tmp_path / json.loads((tmp_path / requests.BENT).read_text())["folder"])
@@ -101,10 +101,10 @@ def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
         write(self, found, error, finished)
         told.append(self._number)
         if len(told) == 1:
-            requests.ask(tmp_path, 2, Study(UNIT, PROTOCOL), 10.0)
+            requests.ask(tmp_path, 2, Study(UNIT, PROTOCOL), 4.0)
 
     monkeypatch.setattr(LiveBending, "_tell", tell)
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0)
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0)
     assert bending.step()
     assert told == [1], "one state, and no more"
     assert bending.step()
@@ -120,12 +120,12 @@ def test_a_newer_request_ends_the_one_before(tmp_path, monkeypatch):
 )
 def test_what_is_not_bent_live_is_refused(tmp_path, study, words):
     with pytest.raises(InputError, match=words):
-        requests.ask(tmp_path, 1, study, 20.0)
+        requests.ask(tmp_path, 1, study, 8.0)
     assert not LiveBending(tmp_path).step()
 
 
 def test_a_unit_without_a_shape_is_told(tmp_path):
-    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 20.0)
+    requests.ask(tmp_path, 1, Study(UNIT, PROTOCOL), 8.0)
     (tmp_path / requests.ASKED / "1" / "unit.toml").write_text("format = 1\nscale = -1.0\n")
     assert LiveBending(tmp_path).step()
     found = json.loads((tmp_path / requests.BENT).read_text())

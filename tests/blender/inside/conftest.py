@@ -13,17 +13,13 @@ import types
 import pytest
 
 from mu_addon.design.parameters import load_preset
-from mu_addon.evidence import unit_fem
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 
-from ...evidence import analytic
 from ...headless.processes import coarse, run
 from ...made_once import made_once
 from ...usecases.bent_motion import write_bent_run
-from ...usecases.diagnosis_data import bent_unit, weighed_blocks
-from ...usecases.test_diagnose import ALL_SIZES
-from ...usecases.test_diagnose import run as diagnosed
+from ...usecases.diagnosis_data import weighed_blocks
 from ..filming import ANGLES, film, pressures
 from ..session import Blender, needs_bpy
 
@@ -100,7 +96,7 @@ def blender(each_bpy, blenders, tmp_path_factory):
 # A coarse ranking, with one path of the whole lattice beside the ten of the anchors.
 PLACE = {
     "mesh": MeshSettings(refine=0.4, order=1),
-    "times": 13,
+    "times": 7,
     "stations": 51,
     "mesh_check": False,
     "paths": "graph",
@@ -149,25 +145,6 @@ def home(finished_runs, tmp_path):
 def blocks(tmp_path):
     """Measured data of weighed blocks, overcured by 0.09 mm; not diagnosed."""
     return weighed_blocks(tmp_path / "data", 0.09)
-
-
-@pytest.fixture(scope="session")
-def clogged(tmp_path_factory):
-    """A unit with a clogged chamber and the verdict on it; a written response stands for its simulation."""
-    root = tmp_path_factory.mktemp("clogged")
-    folder = bent_unit(root / "data", {"clogged_chamber.share_lost": 0.5})
-
-    def responses(unit, experiments, settings, cache, progress):
-        return tuple(
-            analytic.response(*k) for k in sorted({(e.scale, e.orientation_deg) for e in experiments})
-        )
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(unit_fem, "unit_responses", responses)
-        ending, messages = diagnosed(folder, root / "study" / "evidence", load_preset("mu-1.0x"), **ALL_SIZES)
-    assert ending.status == 0, messages[-1]
-    assert ending.summary["verdict"] == "named"
-    return root
 
 
 @pytest.fixture

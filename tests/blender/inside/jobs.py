@@ -26,13 +26,14 @@ def fake(kind, root, how, folder=None):
 
 
 def watch(until):
-    """Poll until something holds."""
+    """Poll until something holds, ever less often: a poll is not free."""
     # Timers never fire in background: the test is the timer.
-    end = time.monotonic() + PATIENCE_S
+    end, pause = time.monotonic() + PATIENCE_S, 0.02
     while not until():
         assert time.monotonic() < end, "it never came"
         start_child.poll()
-        time.sleep(0.05)
+        time.sleep(pause)
+        pause = min(1.1 * pause, 0.25)
 
 
 def ended(child):

@@ -1,0 +1,50 @@
+"""A unit with a clogged chamber and the verdict on it, judged once for all who read it.
+
+A written response stands for the unit's simulation.
+"""
+
+import json
+
+import attrs
+import pytest
+
+from mu_addon.design.parameters import load_preset
+from mu_addon.evidence import unit_fem
+from mu_addon.measured import read_folder
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.run import USE_CASE
+
+from .evidence import analytic
+from .made_once import made_once
+from .usecases.diagnosis_data import bent_unit
+
+
+def responses(unit, experiments, settings, cache, progress):
+    assert unit.name
+    progress("base", 1.0)
+    kinds = sorted({(e.scale, e.orientation_deg) for e in experiments})
+    every = tuple(analytic.response(*k) for k in kinds)
+    # What was not asked for is not simulated.
+    return every if settings.effects else tuple(attrs.evolve(r, variants={}) for r in every)
+
+
+def judge(folder, gauge_kPa=0.0):
+    """Fill data/ and study/evidence/ of a folder, and said.json with the messages of the run."""
+    data = bent_unit(folder / "data", {"clogged_chamber.share_lost": 0.5}, gauge_kPa=gauge_kPa)
+    messages = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(unit_fem, "unit_responses", responses)
+        with run_to_end(Progress([messages.append])) as context:
+            job = Job(read_folder(data), load_preset("mu-1.0x"), settings=unit_fem.UnitSettings())
+            USE_CASE.start(job, folder / "study" / "evidence", context)
+    assert context.status == 0, messages[-1]
+    (folder / "said.json").write_text(json.dumps(messages, default=str))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def clogged(tmp_path_factory):
+    """The folder, see `judge`; nobody writes into it."""
+    return made_once(tmp_path_factory, "clogged", judge)
