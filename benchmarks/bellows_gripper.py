@@ -102,7 +102,7 @@ def ours(given, contact, top_kPa):
     model.self_contact = SelfContact(given.mesh, GAP_mm, STIFFNESS_MPa) if contact else None
     every = np.arange(len(given.mesh.tets))
     materials = Materials((Layer(MooneyRivlin, every, np.tile([C1, C2, KAPPA], (len(every), 1))),))
-    equilibrium = Equilibrium(model, materials, SELF_CONTACT_NEWTON, explains=False)
+    equilibrium = Equilibrium(model, materials, SELF_CONTACT_NEWTON)
     states = [equilibrium.at_zero_pressure()]
     print(f"{len(model.free)} unknowns", flush=True)
     for pressure in np.arange(STEP_kPa, top_kPa + 0.1, STEP_kPa):

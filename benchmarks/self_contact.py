@@ -28,7 +28,7 @@ def close(unit, mesh, contact, vacuum_kPa):
     model = Model(mesh, threads=1)
     model.self_contact = contact
     settings = CONTACT_NEWTON if contact is None else SELF_CONTACT_NEWTON
-    equilibrium = Equilibrium(model, materials_of(unit, mesh), settings, explains=False)
+    equilibrium = Equilibrium(model, materials_of(unit, mesh), settings)
     states = [equilibrium.at_zero_pressure()]
     print(
         f"{len(model.free)} unknowns, {'no contact' if contact is None else f'{len(contact.facets)} facets'}"

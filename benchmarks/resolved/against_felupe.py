@@ -137,7 +137,7 @@ def main() -> None:
     law = Materials.neo_hooke(np.full(count, options.modulus), np.full(count, options.poisson))
     mu, kappa = law.layers[0].parameters[0]
     model = Model(mesh, threads=1, mean_dilatation=False)
-    solver = Equilibrium(model, law, explains=False)
+    solver = Equilibrium(model, law)
     print("| kPa | ours deg | felupe deg | largest u mm | difference | Newton | felupe s |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     worst = 0.0

@@ -64,7 +64,7 @@ def motion(unit, settings):
     began = time.process_time()
     mesh = mesh_printed(unit, settings)
     model = Model(mesh, threads=1)
-    solver = Equilibrium(model, materials_of(unit, mesh), explains=False)
+    solver = Equilibrium(model, materials_of(unit, mesh))
     tip, found = TipSection.of(mesh), {}
     for sign in (-1.0, 1.0):
         states = [solver.at_zero_pressure()]

@@ -43,7 +43,7 @@ def resin(mesh, modulus_MPa=2.5, poisson=0.45):
 def angles(mesh, d, pressures_kPa, materials, parts=("cap",), threads=1):
     """Angles {kPa: {part: deg}} from rest outward on either side, with the seconds of each under "s"."""
     sections = {part: tip_section(mesh, d, part) for part in parts}
-    solver = Equilibrium(Model(mesh, threads=threads), materials, explains=False)
+    solver = Equilibrium(Model(mesh, threads=threads), materials)
     found = {}
     for sign in (-1.0, 1.0):
         states = [solver.at_zero_pressure()]

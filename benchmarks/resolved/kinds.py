@@ -46,7 +46,7 @@ def angle(kind: LatticeKind, chambers: int, fidelity: str, kPa: float, folder: P
     """Bending angle in degrees at a pressure, and the number of unknowns."""
     unit = load_preset("mu-1.0x").evolve(kind=register(kind).name, count=chambers, seats=False)
     mesh = mesh_printed(unit, MeshSettings(fidelity=fidelity, refine=0.5), cache=folder)
-    solver = Equilibrium(Model(mesh), materials_of(unit, mesh), explains=False)
+    solver = Equilibrium(Model(mesh), materials_of(unit, mesh))
     state = solver.reach(kPa / 1000.0, [solver.at_zero_pressure()])
     return bending_angle_deg(mesh, state.u), len(solver.model.free)
 

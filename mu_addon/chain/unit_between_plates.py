@@ -110,9 +110,7 @@ class PlateBody:
         supports[self.tip] = True
         materials = materials_of(unit, mesh)
         settings = attrs.evolve(RESOLVED_NEWTON, follow_snaps=False) if mesh.resolved else NewtonSettings()
-        self.equilibrium = Equilibrium(
-            Model(mesh, supports, threads=threads), materials, settings, explains=False
-        )
+        self.equilibrium = Equilibrium(Model(mesh, supports, threads=threads), materials, settings)
         self._open = Model(mesh, threads=threads)
         self.parameters = self.equilibrium.parameters
         nodal = nodal_mass_g(unit, mesh, density_g_per_ml)

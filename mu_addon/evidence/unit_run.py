@@ -137,7 +137,7 @@ def run(case: Run, cache: Path | None = None) -> Result:
             model.self_contact = self_contact_of(body.unit, mesh)
         if effect and effect.load:
             model.load = effect.load(body, mesh, case.size)
-        equilibrium = Equilibrium(model, materials, body.newton(effect), explains=not case.effect)
+        equilibrium = Equilibrium(model, materials, body.newton(effect))
         start = equilibrium.at_zero_pressure()
         beside = _beside(case, len(mesh.nodes), cache)
         if body.gap_mm is not None:

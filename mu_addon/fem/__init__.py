@@ -2,7 +2,7 @@
 
 A `Model` is a discretised body, `Materials` what fills it, and `Equilibrium` finds its states by Newton's
 method: `simulate` along a pressure protocol, `simulate_in_time` where a law or friction remembers,
-`trace_branch` through limit points. `bending_angle_deg` and `probe` read results off a deformed mesh. Units:
+`bending_angle_deg` and `probe` read results off a deformed mesh. Units:
 mm, N, MPa, s; kPa and degrees only where the name says so.
 
     >>> from mu_addon.fem import NeoHooke
@@ -15,14 +15,10 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .arc_length import ContinuationSettings as ContinuationSettings
     from .batched_newton import BatchedNewton as BatchedNewton
     from .batched_newton import Variant as Variant
     from .bending_angle import TipSection as TipSection
     from .bending_angle import bending_angle_deg as bending_angle_deg
-    from .continuation import Branch as Branch
-    from .continuation import limit_pressure as limit_pressure
-    from .continuation import trace_branch as trace_branch
     from .dead_loads import gravity as gravity
     from .dead_loads import traction as traction
     from .embedding import Embedding as Embedding

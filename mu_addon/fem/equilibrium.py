@@ -11,7 +11,6 @@ import numpy as np
 
 from ..design.quantity import in_kPa
 from ..errors import ConvergenceError
-from .continuation import limit_pressure
 from .damped_descent import EXACT_BELOW, damped_minimum
 from .factor import IndefiniteError
 from .line_search import Descent
@@ -44,9 +43,7 @@ class Equilibrium:
     `reach` one from states before it with adaptive load steps, `path` several in order. No state is
     returned that did not converge or is unstable: ConvergenceError says at what pressure, where and why.
 
-    explains: whether a failure also looks for the limit point that caused it, at some twenty
-    factorisations. settings: tolerances, by default a residual of 1e-9 of the root sum of squares of all
-    element forces.
+    settings: tolerances, by default a residual of 1e-9 of the root sum of squares of all element forces.
     """
 
     def __init__(
@@ -54,11 +51,9 @@ class Equilibrium:
         model: Model,
         materials: Materials,
         settings: NewtonSettings | None = None,
-        explains: bool = True,
     ) -> None:
         self.model = model
         self.settings = settings or NewtonSettings()
-        self.explains = explains
         self.parameters = model.parameters(materials)
         self._stiffening: tuple[Pattern, Array] | None = None
 
@@ -334,11 +329,8 @@ class Equilibrium:
         return found[1:]
 
     def _failure(self, last: State, pressure: float, why: str) -> ConvergenceError:
-        # Load steps may give up a little before the limit.
-        ahead = last.pressure_MPa + 8 * (pressure - last.pressure_MPa)
-        if self.explains:
-            with contextlib.suppress(ConvergenceError):
-                why = str(limit_pressure(self, last, ahead) or why)
+        if "limit point" not in why:
+            why += "; it may have passed a limit point, or buckles"
         least, element = self.model.smallest_jacobian(last.u, self.parameters)
         nodes = self.model.mesh.tets[element]
         place = (self.model.mesh.nodes[nodes] + last.u[nodes]).mean(axis=0)

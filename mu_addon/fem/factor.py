@@ -186,59 +186,6 @@ class SuperLU:
         return Lower(order, scaled.indptr.astype(np.int64), scaled.indices, scaled.data)
 
 
-class LDL:
-    """L D L^T of a symmetric matrix, definite or not, and how many of its eigenvalues are negative.
-
-    An LU without row exchanges of a symmetric matrix is its L D L^T, D being U's diagonal; scipy's took
-    half the time of CHOLMOD's simplicial L D L^T. Without exchanges rounding can grow, so that each
-    solution is refined against the matrix.
-    """
-
-    refinements = 3
-    tolerance = 1e-13
-
-    def __init__(self, indptr: Array, indices: Array, order: Array) -> None:
-        self._indptr, self._indices, self._order = indptr, indices, order
-        self.size = len(indptr) - 1
-        self.negative = 0
-
-    def factor(self, values: Array) -> LDL:
-        """Factorise for the values (nnz,) of the lower triangle by columns, and count `negative` eigenvalues.
-
-        Raises ArithmeticError where a pivot vanishes.
-        """
-        from scipy.sparse.linalg import splu
-
-        lower = sparse.csc_matrix((values, self._indices, self._indptr), shape=(self.size, self.size))
-        self._matrix = sparse.csr_matrix(lower + sparse.tril(lower, -1).T)[self._order][:, self._order]
-        try:
-            self._lu = splu(
-                self._matrix.tocsc(),
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
-        except RuntimeError as error:
-            raise ArithmeticError(f"no L D L^T: {error}") from None
-        if not np.array_equal(self._lu.perm_r, self._lu.perm_c):
-            raise ArithmeticError("no L D L^T: a pivot vanishes")
-        self.negative = int((self._lu.U.diagonal() < 0).sum())
-        return self
-
-    def solve(self, b: Array) -> Array:
-        """Solve for one (n,) or several (n, k) right-hand sides, refined up to `refinements` times."""
-        b = np.ascontiguousarray(b[self._order])
-        y = self._lu.solve(b)
-        for _ in range(self.refinements):
-            left = b - self._matrix @ y
-            if np.linalg.norm(left) <= self.tolerance * np.linalg.norm(b):
-                break
-            y += self._lu.solve(left)
-        x = np.empty_like(y)
-        x[self._order] = y
-        return x
-
-
 def make_factor(indptr: Array, indices: Array, order: Array) -> Cholesky | SuperLU:
     """The fastest factorisation installed: `Cholesky`, or `SuperLU` where cvxopt is missing.
 

@@ -125,7 +125,7 @@ def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[C
     factorisations = 0
     for name, wall_mm in sorted({(c.materials, c.wall_mm) for c in wanted}, key=repr):
         model = structure.under(Condition(name, 0.0, wall_mm))
-        equilibrium = Equilibrium(model, structure.materials[name], structure.newton, explains=False)
+        equilibrium = Equilibrium(model, structure.materials[name], structure.newton)
         if equilibrium.parameters.has_history or model.has_friction:
             raise InputError(
                 "the state of a body with friction or memory depends on its history",

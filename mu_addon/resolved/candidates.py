@@ -128,9 +128,7 @@ class PrintedWaveguides:
         if number not in self._last:
             self._last.clear()
             mesh = self._mesh(self.paths[number])
-            self._last[number] = Equilibrium(
-                self.model_of(mesh), self.materials_of(mesh), self.settings, explains=False
-            )
+            self._last[number] = Equilibrium(self.model_of(mesh), self.materials_of(mesh), self.settings)
         found = self._last[number]
         found.model.forget_contact()
         return found

@@ -195,7 +195,7 @@ def full_model(
         length = float(np.linalg.norm(loads.down))
         load += length * gravity(joined, np.concatenate(density), np.asarray(loads.down, float))
     model.load = load if load.any() else None
-    equilibrium = Equilibrium(model, Materials(tuple(layers)), explains=False)
+    equilibrium = Equilibrium(model, Materials(tuple(layers)))
     return FullModel(joined, model, equilibrium, corners, height)
 
 

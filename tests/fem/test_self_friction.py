@@ -35,7 +35,7 @@ def stacked(below=4, above=5, order=1):
 def with_friction(mesh, friction=MU, material=(E, NU)):
     model = Model(mesh, threads=1)
     model.self_contact = SelfContact(mesh, D, K, friction)
-    return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON, explains=False)
+    return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON)
 
 
 def moved(mesh, way):

@@ -67,7 +67,7 @@ def test_a_ring_collapses_and_lies_flat_as_the_elastica_does():
     model = Model(mesh, held, threads=1)
     contact = model.self_contact = SelfContact(mesh, WALL / 8, 1e-3)
     settings = attrs.evolve(SELF_CONTACT_NEWTON, max_step_MPa=0.3 * UNIT_MPa, min_step_MPa=1e-3 * UNIT_MPa)
-    eq = Equilibrium(model, bodies.uniform(mesh, E, NU), settings, explains=False)
+    eq = Equilibrium(model, bodies.uniform(mesh, E, NU), settings)
     pressures = (2.8, 3.0, 3.5, 4.5, 8.0, 20.0)
     states = eq.path([-p * UNIT_MPa for p in pressures], rest(mesh))
 
@@ -139,7 +139,7 @@ def test_a_round_body_on_a_flat_one_presses_as_hertz_says():
     held[far, 2] = True
     model = Model(mesh, held, threads=1)
     contact = model.self_contact = SelfContact(mesh, gap, 0.1)
-    eq = Equilibrium(model, bodies.uniform(mesh, E, NU), SELF_CONTACT_NEWTON, explains=False)
+    eq = Equilibrium(model, bodies.uniform(mesh, E, NU), SELF_CONTACT_NEWTON)
     u, squeezed = np.zeros_like(mesh.nodes), np.zeros_like(mesh.nodes)
     # The surface that touches stays where it is, so that no start goes through the other one.
     squeezed[upper, 2] = (gap - z[upper]) / side

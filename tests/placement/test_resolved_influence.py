@@ -28,7 +28,7 @@ def materials(factor):
 
 
 def solve(model, factor):
-    solver = Equilibrium(model, materials(factor), TIGHT, explains=False)
+    solver = Equilibrium(model, materials(factor), TIGHT)
     return simulate(solver, np.arange(2.0), np.array([0.0, 3.0]))
 
 

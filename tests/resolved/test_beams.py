@@ -46,7 +46,7 @@ def test_beams_bend_a_unit_as_solid_struts_do(mesh):
     found = []
     solid = mesh_printed(SMALL, MeshSettings(refine=0.6, fidelity=SOLID), sizes=Sizes(layers=9))
     for body in (mesh, solid):
-        solver = Equilibrium(Model(body, threads=1), materials_of(SMALL, body), explains=False)
+        solver = Equilibrium(Model(body, threads=1), materials_of(SMALL, body))
         state = solver.reach(0.005, [solver.at_zero_pressure()])
         found.append((TipSection.of(body).angle_deg(state.u), len(solver.model.free)))
     (angle, unknowns), (solid_angle, solid_unknowns) = found

@@ -37,7 +37,7 @@ def mesh():
 def beside(mesh, obstacle):
     model = Model(mesh, threads=1)
     model.obstacles = (obstacle,)
-    return Equilibrium(model, materials_of(SMALL, mesh), CONTACT_NEWTON, explains=False)
+    return Equilibrium(model, materials_of(SMALL, mesh), CONTACT_NEWTON)
 
 
 def test_struts_inside_the_wall_cannot_be_touched(mesh):
@@ -65,14 +65,14 @@ def test_a_rigid_plate_presses_a_lattice_as_a_prescribed_displacement_does():
     top = mesh.nodes[:, 2] == half
     moved = held.copy()
     moved[top, 2] = True
-    eq = Equilibrium(Model(mesh, moved, threads=1), block.materials, CONTACT_NEWTON, explains=False)
+    eq = Equilibrium(Model(mesh, moved, threads=1), block.materials, CONTACT_NEWTON)
     u = eq.newton(-strain * mesh.nodes * [0.0, 0.0, 1.0], 0.0).u
     prescribed = -eq.model.residual(u, 0.0, eq.parameters)[top, 2].sum()
     plate = Obstacle(mesh, Plane((0.0, 0.0, half), (0.0, 0.0, -1.0)), 0.1, 1e-4)
     model = Model(mesh, held, threads=1)
     model.obstacles = (plate,)
     plate.pose = Pose(shift=(0.0, 0.0, -strain * half))
-    pressed = Equilibrium(model, block.materials, CONTACT_NEWTON, explains=False).newton(0.0 * u, 0.0)
+    pressed = Equilibrium(model, block.materials, CONTACT_NEWTON).newton(0.0 * u, 0.0)
     assert plate.force_N(pressed.u)[2] == pytest.approx(prescribed, rel=2e-3)
     assert plate.deepest_mm(pressed.u) < 2e-3 * strain * half
 

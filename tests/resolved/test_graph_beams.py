@@ -107,7 +107,7 @@ def sensed(unit, meshes):
 
 
 def bent(unit, mesh, kPa=5.0):
-    solver = Equilibrium(Model(mesh, threads=1), materials_of(unit, mesh), explains=False)
+    solver = Equilibrium(Model(mesh, threads=1), materials_of(unit, mesh))
     state = solver.reach(kPa / 1000, [solver.at_zero_pressure()])
     return bending_angle_deg(mesh, state.u), len(solver.model.free)
 

@@ -64,7 +64,7 @@ def test_a_users_body_that_cuts_slivers_off_still_bears_its_pressure():
     lattice = attrs.evolve(SMALL.lattice, junction_diameter_mm=1.398)
     thin = attrs.evolve(SMALL, chambers=chambers, lattice=lattice)
     mesh = mesh_printed(thin, MeshSettings(refine=0.3), body=read_body(folder / "body.obj"))
-    body = Equilibrium(Model(mesh, threads=1), materials_of(thin, mesh), explains=False)
+    body = Equilibrium(Model(mesh, threads=1), materials_of(thin, mesh))
     assert bending_angle_deg(mesh, body.reach(0.002, [body.at_zero_pressure()]).u) > 0.1
 
 
@@ -143,7 +143,7 @@ def test_weight_is_that_of_the_resin_and_lost_to_no_tie(mesh):
 
 @pytest.mark.nightly("tests/placement/test_search.py::test_the_half_mesh_predicts_what_the_whole_one_does")
 def test_a_half_bends_as_the_whole_does(mesh):
-    half = Equilibrium(Model(mesh), materials_of(SMALL, mesh), explains=False)
+    half = Equilibrium(Model(mesh), materials_of(SMALL, mesh))
     state = half.reach(0.002, [half.at_zero_pressure()])
     whole = mirror(mesh, "x")
     body = Model(whole)

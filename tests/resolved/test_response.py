@@ -84,7 +84,7 @@ def test_it_predicts_what_a_printed_waveguide_does():
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
     anchors, graph = anchor_points(unit), lattice_graph(unit.printed)
     half = mesh_printed(unit, MeshSettings(refine=0.6))
-    solver = Equilibrium(Model(half), materials_of(unit, half), RESOLVED_NEWTON, explains=False)
+    solver = Equilibrium(Model(half), materials_of(unit, half), RESOLVED_NEWTON)
     mesh, trajectory = whole_body(half, simulate(solver, np.arange(2.0), np.array([0.0, 1.0])))
     chain = (2, 11, 24, 31)
     found = bar_response(

@@ -170,7 +170,7 @@ def test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path(mesh):
     def materials(m):
         return materials_of(SMALL, m)
 
-    still = Equilibrium(Model(mesh), materials(mesh), RESOLVED_NEWTON, explains=False)
+    still = Equilibrium(Model(mesh), materials(mesh), RESOLVED_NEWTON)
     state = still.reach(-0.004, [still.at_zero_pressure()])
     anchors = anchor_points(SMALL)
     candidates = PrintedWaveguides(SMALL, mesh, (anchors,), anchors, materials, Model, RESOLVED_NEWTON)
@@ -189,7 +189,7 @@ def test_a_start_far_from_rest_inverts_nothing_once_its_struts_give_way(mesh, se
     u[:, 2] = -0.1 * (mesh.nodes[:, 2] - mesh.nodes[mesh.base[0], 2])
     u[mesh.beams[:, 1::2]] = 0.0
     following(mesh, u)
-    equilibrium = Equilibrium(Model(sensed), materials_of(SMALL, sensed), RESOLVED_NEWTON, explains=False)
+    equilibrium = Equilibrium(Model(sensed), materials_of(SMALL, sensed), RESOLVED_NEWTON)
     least = equilibrium.model.smallest_jacobian
     start = started(mesh, sensed, anchor_points(SMALL), u)
     found = eased(equilibrium, start, u)

@@ -244,7 +244,7 @@ def grasp(
     grip = grip or Grip()
     model = Model(mesh, threads=threads)
     model.self_contact = self_contact
-    equilibrium = Equilibrium(model, materials, newton, explains=False)
+    equilibrium = Equilibrium(model, materials, newton)
     return _Hand(gripper, cube, phases, equilibrium, grip, on_instant).work()
 
 

@@ -164,7 +164,7 @@ class LiveBending:
         before = self._levels.get(refine)
         found = self._begun(study, before)
         old = {} if before is None else _carried_over(before, found)
-        body = Equilibrium(found.model, study.materials(found.mesh), NEWTON, explains=False)
+        body = Equilibrium(found.model, study.materials(found.mesh), NEWTON)
         first = round(first_kPa, 3)
         top = max(float(study.protocol.pressure_kPa.max()), first_kPa, 1.0)
         halfway = [first_kPa / 2.0] if first_kPa > in_kPa(NEWTON.max_step_MPa) and not old else []
