@@ -6,6 +6,7 @@ import bpy
 
 from ...design.gripper import SECTIONS
 from ...design.quantity import describe
+from ...usecases.grip.phases import WORDS
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import RootPanel, alert, wrapped
 from ..unit.fields import field
@@ -14,8 +15,6 @@ from . import state as grasps
 from . import timeline
 
 JOB = "grasp_"
-PHASES = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
-"""Phases of a grasp in one word; the core's `grip.phases.MEANING` describes them."""
 
 
 class GripperPanel(RootPanel):
@@ -101,7 +100,7 @@ def _found(layout, scene, root, found):
     row.operator("screen.animation_play", text="Play", icon="PLAY")
     if on:
         phase, force = grasps.phase_at(found, scene)
-        box.label(text=f"{PHASES.get(phase, phase).capitalize()}: {force:.2f} N", icon="TIME")
+        box.label(text=f"{WORDS.get(phase, phase).capitalize()}: {force:.2f} N", icon="TIME")
 
 
 CLASSES = (MU_PT_gripper, MU_PT_grasp)

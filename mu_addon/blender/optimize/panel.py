@@ -128,11 +128,10 @@ def _freedoms(layout, root, props) -> None:
         column.prop(freedom, "how", text="")
         d = FREE[freedom.parameter]
         scale = scale_of(freedom)
-        shown = {"range": ("true_low", "true_high"), "values": ("values",), "fixed": ("true_value",)}
+        shown = {"range": ("true_low", "true_high"), "values": ("true_values",), "fixed": ("true_value",)}
         for name in shown[freedom.how]:
             title = freedom.bl_rna.properties[name].name
-            unit = f"{d.unit} at scale 1" if name == "values" and scale != 1.0 else d.unit
-            column.prop(freedom, name, text=f"{title} ({unit})" if unit else title)
+            column.prop(freedom, name, text=f"{title} ({d.unit})" if d.unit else title)
         words = f"now {scale * present(root, freedom.parameter):.4g} {d.unit}".rstrip()
         # Below the fields, which have their own labels beside them.
         below = column.split(factor=LABELS)

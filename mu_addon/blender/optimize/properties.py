@@ -211,6 +211,32 @@ def _true(name: str, title: str):
     )
 
 
+def _scaled(values: str, factor: float, digits: int) -> str:
+    """Numbers between commas times a factor; other parts stay, for the core to refuse."""
+
+    def scaled(part: str) -> str:
+        try:
+            return f"{float(part) * factor:.{digits}g}"
+        except ValueError:
+            return part.strip()
+
+    return ", ".join(scaled(part) for part in values.split(","))
+
+
+def _true_values():
+    """The list of values of a freedom at the unit's scale."""
+
+    def read(freedom) -> str:
+        return _scaled(freedom.values, scale_of(freedom), 9)
+
+    def write(freedom, values: str) -> None:
+        # More digits than are read, so that what was typed is what is shown.
+        freedom.values = _scaled(values, 1.0 / scale_of(freedom), 15)
+
+    words = "The values, at the unit's scale, as 0.7, 0.9, 1.1"
+    return StringProperty(name="Values", description=words, get=read, set=write, options={"SKIP_SAVE"})
+
+
 class MU_PG_freedom(bpy.types.PropertyGroup):
     """One parameter that may change, and its range."""
 
@@ -240,6 +266,7 @@ class MU_PG_freedom(bpy.types.PropertyGroup):
         name="Value", description="In the parameter's unit at scale 1", default=0.9, precision=3
     )
     true_value: _true("value", "Value")
+    true_values: _true_values()
     true_low: _true("low", "From")
     true_high: _true("high", "To")
     low: FloatProperty(

@@ -58,16 +58,16 @@ def _gates(layout, root, solid) -> None:
     box = layout.box()
     if not unit_object.solid_is_current(root):
         wrapped(box, "Built from earlier parameters: build it again", "ERROR")
-    g = json.loads(solid["mu_gates"])
+    g, column = json.loads(solid["mu_gates"]), box.column(align=True)
     for text in (
         f"Lattice whole: its {g['lattice_genus']} loops are there",
         f"{g['components']} body, {g['bad_edges_after_stl']} open edges in its STL",
-        f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm3",
-        f"{g['volume_mm3'] / 1000:.2f} cm3 of resin, {g['triangles']} triangles",
+        f"{g['inner_shells']} cavity of {g['inner_volume_mm3'] / 1000:.2f} cm³",
+        f"{g['volume_mm3'] / 1000:.2f} cm³ of resin, {g['triangles']} triangles",
     ):
-        box.label(text=text, icon="CHECKMARK")
+        column.label(text=text, icon="CHECKMARK")
     if solid["mu_path"]:
-        box.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
+        column.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
 
 
 class _OfPrint(UnitPanel):
@@ -171,7 +171,7 @@ def _directions(layout, settings, found) -> None:
         return
     chosen = [build for build in builds if _is_up(build, settings)]
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
-    wrapped(body, "None of these is better than another in every figure", "INFO")
+    wrapped(body, "None is better than another in every figure, on a coarser grid than above", "INFO")
     for build in choice + [build for build in chosen if build not in choice]:
         box = body.box()
         row = box.split(factor=0.66)
@@ -179,13 +179,22 @@ def _directions(layout, settings, found) -> None:
         same = build in chosen
         button = row.operator("mu.print_up", text="Chosen" if same else "Use", depress=same)
         button.direction = build["direction"]
-        box.label(text=f"{build['islands']} islands, cups of {build['cup_ml']:.2g} ml")
-        box.label(text=f"{build['support_mm2']:.0f} mm2 to support, {build['inner_mm2']:.0f} in chambers")
+        column = box.column(align=True)
+        column.label(text=f"{build['islands']} islands, cups of {_ml(build['cup_ml'])}")
+        column.label(text=f"{build['support_mm2']:.0f} mm² to support, {build['inner_mm2']:.0f} in chambers")
+
+
+def _ml(volume: float) -> str:
+    """A volume in ml in words; one too small to matter has no digits."""
+    return f"{volume:.2g} ml" if volume >= 0.01 else "below 0.01 ml"
 
 
 def direction_words(direction) -> str:
-    """A build direction in words, of a unit vector (3,) in the unit's frame: "tilted 35° to +x +y"."""
-    x, y, z = direction
+    """A build direction (3,) in the unit's frame in words: "tilted 35° to +x +y"."""
+    length = math.hypot(*direction)
+    if not length:
+        return "none is set"
+    x, y, z = (value / length for value in direction)
     angle = math.degrees(math.acos(max(-1.0, min(1.0, z))))
     if angle < 1.0 or angle > 179.0:
         return "upright" if z > 0.0 else "upside down"
@@ -255,8 +264,8 @@ class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
         found = layer.facts(shown)
         column = layout.column(align=True)
         column.label(text=f"{found['height_mm']:.1f} of {found['whole_mm']:.1f} mm")
-        column.label(text=f"Material (yellow): {found['area_mm2']:.0f} mm2")
-        column.label(text=f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm2")
+        column.label(text=f"Material (yellow): {found['area_mm2']:.0f} mm²")
+        column.label(text=f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm²")
 
 
 class MU_PT_print_files(_OfPrint, bpy.types.Panel):
@@ -280,8 +289,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             wrapped(layout, "Beams and STEP keep their nominal size", "INFO")
         layout.prop(settings, "vents")
         if settings.vents:
-            along = " ".join(f"{round(x, 2):g}" for x in settings.up)
-            wrapped(layout, f"For a build along Up, {along}", "INFO")
+            wrapped(layout, f"For the build direction Up: {direction_words(settings.up)}", "INFO")
             if settings.formats & {"3mf-beams", "step"}:
                 wrapped(layout, "Beams and STEP have no vents", "INFO")
         path = root.mu_unit.path
@@ -334,8 +342,8 @@ def _written(layout, found) -> None:
             vented["trapped_before_ml"],
             vented["trapped_after_ml"],
         )
-        words = f"{count} vent(s): {before:.2g} ml trapped before, {after:.2g} after"
-        wrapped(column, words if count else f"No vent is needed: {before:.2g} ml are trapped at most", "INFO")
+        words = f"{count} vent(s): {_ml(before)} trapped before, {_ml(after)} after"
+        wrapped(column, words if count else f"No vent is needed: {_ml(before)} trapped at most", "INFO")
     for entry in found.manifest["refused"]:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
 

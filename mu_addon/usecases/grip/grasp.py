@@ -32,7 +32,7 @@ from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
 from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
-from .phases import Phases
+from .phases import WORDS, Phases
 from .settings import BEYOND, DENSITY
 
 Array = np.ndarray[Any, Any]
@@ -335,7 +335,8 @@ class _Hand:
             )
         )
         self.at.append(self.obstacle.pose.shift)
-        words = f"{self.phase[number]}, {self.pressure[number]:g} kPa"
+        phase = self.phase[number]
+        words = f"{WORDS.get(phase, phase)}, {self.pressure[number]:g} kPa"
         self.on_instant((number + 1) / len(self.time), words + (", touching" if contact.area_mm2 else ""))
         last_of_hold = max(i for i, name in enumerate(self.phase) if name == "iii")
         if number == last_of_hold:

@@ -243,6 +243,19 @@ def test_a_file_is_searched_from_this_unit_or_from_its_own(tmp_path):
     assert "line 8" in refused(bpy.ops.mu.optimize)
 
 
+def test_values_to_choose_from_are_lengths_at_the_units_scale():
+    root = add(preset="mu-0.75x")
+    neck = free(root, "chambers.neck_diameter_mm", how="values")
+    neck.true_values = "9, 9.4,10.5"
+    assert optimization.freedom_table(neck)["values"] == pytest.approx([12.0, 9.4 / 0.75, 14.0])
+    assert neck.true_values == "9, 9.4, 10.5"
+    neck.true_values = "9, wide"
+    assert optimization.freedom_table(neck)["values"] == [12, "wide"], "for the core to refuse"
+    cells = free(root, "lattice.cells_x", how="values")
+    cells.true_values = "3, 5"
+    assert optimization.freedom_table(cells)["values"] == [3, 5]
+
+
 def test_a_proposed_unit_is_applied_undone_and_added_beside(tmp_path):
     bpy.context.preferences.edit.use_global_undo = True
     root = add()

@@ -305,12 +305,13 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     root = short()
     settings = root.mu_print
     settings.formats, settings.quality = {"stl"}, "interactive"
-    assert "For a build along Up" not in drawn()
+    assert "For the build direction Up" not in drawn()
     settings.vents = True
     settings.up = (0.0, 0.0, 0.0)
+    assert "Up: none is set" in drawn().replace("  ", " ")
     assert "Up is not a direction" in refused(bpy.ops.mu.print_export)
     settings.up = (0.0, 0.0, -1.0)
-    assert "For a build along Up, 0 0 -1" in drawn()
+    assert "For the build direction Up: upside down" in drawn().replace("  ", " ")
     assert "have no vents" not in drawn()
     settings.formats = {"stl", "step"}
     assert "STEP have no vents" in drawn()
@@ -478,7 +479,7 @@ def test_layers_follow_the_slider_the_direction_and_the_solid():
     areas = np.array([p.area for p in shown.data.polygons])
     assert areas[faces == 1].sum() == pytest.approx(found["enclosed_mm2"], rel=1e-3)
     assert areas[faces == 0].sum() == pytest.approx(found["area_mm2"], rel=1e-3)
-    assert f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm2" in drawn()
+    assert f"Enclosed (blue): {found['enclosed_mm2']:.0f} mm²" in drawn()
     # Along another direction the layer stands square to that.
     root.mu_print.up = (1.0, 0.0, 0.0)
     assert np.ptp(heights(0)) < 0.01
