@@ -19,7 +19,7 @@ SCRIPTS = {
     "compare": ["compare.py"],
     "accuracy": ["accuracy.py"],
     "breakdown": ["breakdown.py"],
-    "scale": ["scale.py", "--iterative", "two levels"],
+    "scale": ["scale.py"],
     "sweep": ["sweep.py"],
     "solvers": ["solvers.py"],
     "convergence": ["convergence.py", "angle"],

@@ -1,11 +1,9 @@
-"""Seconds and memory from 20k to 500k unknowns, and where an iterative solver would take over.
+"""Seconds and memory from 20k to 500k unknowns.
 
-    python benchmarks/scale.py [--body unit chamber] [--size 1.24 0.6]
-        [--iterative "two levels" "smoothed aggregation"] [--keep DIR]
+    python benchmarks/scale.py [--body unit chamber] [--size 1.24 0.6] [--keep DIR]
 
 Each size runs alone in a child process, whose peak memory is told; meshes are made beforehand, and kept in
-a folder with --keep. "step" is one equilibrium from rest to 1 kPa. --iterative adds conjugate gradients to
-1e-8 on the same tangent, by the package's two levels or by PyAMG (in the extra `benchmarks`).
+a folder with --keep. "step" is one equilibrium from rest to 1 kPa.
 """
 
 from __future__ import annotations
@@ -22,7 +20,6 @@ from pathlib import Path
 import numpy as np
 from circumstances import circumstances
 from compare import unit_problem
-from multigrid import KINDS, measure
 from peers.chamber import chamber
 from peers.problem import Problem
 
@@ -57,7 +54,7 @@ def timed(call):
     return time.perf_counter() - start, answer
 
 
-def child(path, kinds):
+def child(path):
     """Everything measured at one size, as JSON on the last line."""
     problem = Problem.load(path)
     materials = Materials.neo_hooke(problem.modulus_MPa, problem.poisson)
@@ -78,7 +75,6 @@ def child(path, kinds):
         "seconds": [model_s, analyse_s, factor_s, solve_s, tangent_s, residual_s, step_s],
         "cost": [states[-1].factorisations, states[-1].iterations],
         "peak": peak,
-        "iterative": {kind: measure(kind, model, values, b) for kind in kinds},
     }
     print(json.dumps(figures))
 
@@ -89,7 +85,7 @@ def exponents(unknowns, columns):
     return [np.polyfit(x, np.log(column), 1)[0] for column in columns]
 
 
-def scan(body, chosen, folder, iterative):
+def scan(body, chosen, folder):
     make, sizes = BODIES[body]
     print(f"\n{body}, order 2\n\n| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|", flush=True)
     found = []
@@ -97,7 +93,7 @@ def scan(body, chosen, folder, iterative):
         path = folder / f"{body}_{size:g}.npz"
         if not path.exists():
             make(size).save(path)
-        command = [sys.executable, __file__, "--child", str(path), *iterative]
+        command = [sys.executable, __file__, "--child", str(path)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             sys.exit(f"{body} {size:g}:\n{done.stderr[-3000:]}")
@@ -112,25 +108,15 @@ def scan(body, chosen, folder, iterative):
         slope_of_peak = exponents(unknowns, [[one["peak"] for one in found]])[0]
         cells = ["exponent", "", *(f"{s:.2f}" for s in slopes), "", f"{slope_of_peak:.2f}"]
         print("| " + " | ".join(cells) + " |")
-    if iterative:
-        print("\nSeconds to analyse, prepare and solve once to 1e-8, and iterations.\n")
-        head = ("unknowns", "Cholesky", *iterative)
-        print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
-        for one in found:
-            cells = [one["unknowns"], "{:.3g}, {:.3g}, {:.3g}".format(*one["seconds"][1:4])]
-            for *seconds, iterations in one["iterative"].values():
-                cells.append(", ".join([*(f"{s:.3g}" for s in seconds), str(iterations or "not converged")]))
-            print("| " + " | ".join(map(str, cells)) + " |")
 
 
 def main():
     if sys.argv[1:2] == ["--child"]:
-        child(sys.argv[2], sys.argv[3:])
+        child(sys.argv[2])
         return
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--body", nargs="+", choices=BODIES, default=list(BODIES))
     options.add_argument("--size", nargs="+", type=float, help="refinements of the unit, mm of the chamber")
-    options.add_argument("--iterative", nargs="*", choices=KINDS, default=())
     options.add_argument("--keep", type=Path)
     given = options.parse_args()
     print(circumstances())
@@ -138,7 +124,7 @@ def main():
         folder = given.keep or Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
         for body in given.body:
-            scan(body, given.size, folder, given.iterative)
+            scan(body, given.size, folder)
 
 
 if __name__ == "__main__":

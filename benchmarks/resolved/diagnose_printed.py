@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.circumstances import circumstances
+from benchmarks.evidence.second_code.judging import verdict_on
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
-from benchmarks.evidence.second_code.whole_unit import small_unit, verdict_on
+from benchmarks.evidence.second_code.whole_unit import small_unit
 from mu_addon.design.parameters import to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
-from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
@@ -113,8 +113,7 @@ def main() -> None:
             write(data, trials(name, rng, bent, given.low))
         began, used = time.time(), _processor_s()
         base = "homogenised" if given.homogenised else "printed"
-        settings = UnitSettings() if given.homogenised else None
-        found = verdict_on(data, unit, given.folder / f"diagnosis-{base}", settings)
+        found = verdict_on(data, unit, given.folder / f"diagnosis-{base}", given.homogenised)
         write_text(given.folder / f"{data.name}-{base}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")

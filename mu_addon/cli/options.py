@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..design.parameters import Unit
     from ..design.quantity import Description
-    from ..fem.linear_solver import SolverChoice
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
@@ -118,21 +117,11 @@ def add_resin(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_solver(command: argparse.ArgumentParser) -> None:
-    """--solver and --device."""
-    from ..fem.linear_solver import DEVICE, SOLVER
+def add_device(command: argparse.ArgumentParser) -> None:
+    """--device."""
+    from ..fem.device import DEVICE
 
-    add_setting(command, SOLVER)
-    add_setting(command, DEVICE, "auto|cpu|cuda:0")
-
-
-def solver_of(options: argparse.Namespace) -> SolverChoice:
-    """The choice of --solver and --device; raises InputError, also for a missing device."""
-    from ..fem.linear_solver import SolverChoice
-
-    found = SolverChoice(options.solver, options.device)
-    found.require_device()
-    return found
+    add_setting(command, DEVICE, "cpu|cuda:0")
 
 
 def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> None:
@@ -227,7 +216,7 @@ def add_simulation(command: argparse.ArgumentParser) -> None:
     add_struts(command)
     add_setting(command, SELF_FRICTION, "MU")
     add_setting(command, TIMES, "K")
-    add_solver(command)
+    add_device(command)
 
 
 def require_out(options: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_solver, help_of, require_out
+from .options import add_device, add_report, help_of, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -32,17 +32,19 @@ def add(commands: Commands[Any]) -> None:
     )
     command.add_argument("--workers", type=int, metavar="N", help=help_of(WORKERS, "that of the command"))
     add_report(command)
-    add_solver(command)
+    add_device(command)
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Run a folder's inputs, taking finished stages from the cache."""
-    from ..fem.linear_solver import SolverChoice
+    from ..fem.device import DEVICE, require_device
     from ..usecases.resume import resume
-    from .options import solver_of
 
     require_out(options)
-    solver = solver_of(options)
+    require_device(options.device)
     # The folder's own value, if the command gives none.
-    given = {"workers": options.workers, "solver": None if solver == SolverChoice() else solver}
+    given = {
+        "workers": options.workers,
+        "device": None if options.device == DEVICE.default else options.device,
+    }
     resume(Path(options.out), context, {name: value for name, value in given.items() if value is not None})

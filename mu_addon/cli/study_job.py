@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import modelled, solver_of, unit_of
+from .options import modelled, unit_of
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,6 +22,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     """Study job from the options; raises InputError."""
+    from ..fem.device import require_device
     from ..meshing.settings import MeshSettings, printed
     from ..placement.graph import Limits
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
@@ -30,6 +31,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     if "simulate" not in options.stages:
         unit = unit_of(options)
     else:
+        require_device(options.device)
         unit, effects = modelled(options, context)
         extra = {
             "effects": effects,
@@ -37,7 +39,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "self_contact": options.self_contact,
             "self_friction": options.self_friction,
             "times": options.times,
-            "solver": solver_of(options),
+            "device": options.device,
         }
     if "place" in options.stages:
         extra |= {

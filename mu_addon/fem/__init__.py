@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from .laws import OgdenRoxburgh as OgdenRoxburgh
     from .laws import Prony as Prony
     from .laws import Yeoh as Yeoh
-    from .linear_solver import SolverChoice as SolverChoice
     from .materials import Layer as Layer
     from .materials import Materials as Materials
     from .model import Model as Model

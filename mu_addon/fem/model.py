@@ -22,7 +22,6 @@ from .carried_nodes import Carried, Folding
 from .conjugate_gradients import ConjugateGradients
 from .elements import Reference, triangle_shapes
 from .factor import Cholesky, SuperLU, make_factor
-from .iterative import TwoLevel
 from .laws import NeoHooke
 from .laws.tensors import mat33
 from .materials import Layer, Materials
@@ -139,8 +138,6 @@ class Model:
         self.threads = threads
         self.mean_dilatation = mean_dilatation
         self._takes_means = mesh.resolved if mean_dilatation is None else mean_dilatation
-        # Or "two levels" (iterative.TwoLevel): for quadratic meshes whose factor does not fit into memory; up
-        # to 436k unknowns a load step is faster with the factor (docs/engineering/performance.md).
         self.solver = "factorisation" if device == "cpu" else "conjugate gradients"
         self.load: Array | None = None
         self.obstacles: tuple[Obstacle, ...] = ()
@@ -348,7 +345,7 @@ class Model:
         return found
 
     @cached_property
-    def factor(self) -> Cholesky | SuperLU | ConjugateGradients | TwoLevel:
+    def factor(self) -> Cholesky | SuperLU | ConjugateGradients:
         """The solver for tangents of this pattern, analysed once; it holds one tangent at a time.
 
         A factorisation on the CPU, conjugate gradients on another device, unless `solver` was set.
@@ -356,9 +353,6 @@ class Model:
         indptr, indices, order = self.pattern.indptr, self.pattern.indices, self.pattern.order
         if self.solver == "conjugate gradients":
             return ConjugateGradients(indptr, indices, order, self.device)
-        if self.solver == "two levels":
-            # Newton's tolerance of 1e-9 is relative to all forces, this one to the rest of them.
-            return TwoLevel(indptr, indices, self.mesh, self.free, self.threads)
         return make_factor(indptr, indices, order)
 
     def parameters(self, materials: Materials) -> MaterialData:

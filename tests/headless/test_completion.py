@@ -27,8 +27,8 @@ def completed(*words):
     [
         (["run.py", "fit"], ["fit-material"]),
         (["python", "headless/run.py", "pl"], ["place"]),
-        (["./headless/run.py", "simulate", "--sol"], ["--solid-struts", "--solver"]),
-        (["run.py", "simulate", "--solver", "it"], ["iterative"]),
+        (["./headless/run.py", "simulate", "--sol"], ["--solid-struts"]),
+        (["run.py", "place", "--paths", "gr"], ["graph"]),
         (["python3", "headless/run.py", "place", "--preset", "mu-1.5"], ["mu-1.5x"]),
         (["run.py", "grip", "--preset", ""], ["gripper"]),
         (["run.py", "simulate", "--unit", ""], []),

@@ -23,7 +23,7 @@ def test_one_version(capsys):
 
 @pytest.mark.parametrize(
     ("line", "meant"),
-    [(["simulat"], "'simulate'"), (["simulate", "--solver", "dirct", "--out", "x"], "'direct'")],
+    [(["simulat"], "'simulate'"), (["place", "--paths", "grph", "--out", "x"], "'graph'")],
 )
 def test_a_wrong_name_is_told_with_the_nearest(line, meant, capsys):
     with pytest.raises(SystemExit) as ended:

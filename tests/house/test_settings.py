@@ -13,7 +13,7 @@ from mu_addon.chain import settings as chain
 from mu_addon.cli.main import parser
 from mu_addon.design import settings as design
 from mu_addon.design.quantity import Description
-from mu_addon.fem import linear_solver
+from mu_addon.fem import device
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
 from mu_addon.placement import settings as path
@@ -31,7 +31,7 @@ ROOT = Path(mu_addon.__file__).parent
 # Modules with settings.
 STATED = [
     *(p for p in ROOT.rglob("*settings.py") if "blender" not in p.parts),
-    ROOT / "fem" / "linear_solver.py",
+    ROOT / "fem" / "device.py",
 ]
 # The same word for something else, or a zero that is none's default.
 OTHERWISE = {
@@ -139,10 +139,7 @@ def options(command):
     [
         *(("place", d) for d in (mesh.REFINE, study.TIMES, study.STATIONS)),
         *(("place", d) for d in (study.WORKERS, study.CHECKS, study.PATHS)),
-        *(
-            ("place", d)
-            for d in (path.SHORTEST, path.LONGEST, path.BEND, linear_solver.SOLVER, linear_solver.DEVICE)
-        ),
+        *(("place", d) for d in (path.SHORTEST, path.LONGEST, path.BEND, device.DEVICE)),
         *(("homogenize", d) for d in (lattice.CELLS, lattice.FRICTION, lattice.STRAIN, lattice.REFINE)),
         *(("sweep", d) for d in (sweep.WORKERS, sweep.ADD)),
         ("optimize", search.WORKERS),

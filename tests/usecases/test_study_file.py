@@ -9,7 +9,6 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.fem.linear_solver import SolverChoice
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
@@ -136,16 +135,11 @@ def test_what_is_composed_is_parsed(tmp_path):
     assert parse(compose(tables), tmp_path) == tables
 
 
-def test_the_solver_is_no_part_of_a_studys_inputs():
+def test_the_device_is_no_part_of_a_studys_inputs():
     plain = Job(unit=load_preset("mu-1.0x"), protocol=grasp())
-    chosen = attrs.evolve(plain, solver=SolverChoice("direct", "cpu"))
-    assert chosen.text() == plain.text()
-    with pytest.raises(InputError, match="one factor"):
-        attrs.evolve(plain, solver=SolverChoice("iterative"))
-    motion = attrs.evolve(plain, stages=("design", "simulate"))
-    assert attrs.evolve(motion, solver=SolverChoice("iterative")).text() == motion.text()
-    with pytest.raises(InputError, match="quadratic elements"):
-        attrs.evolve(motion, mesh=MeshSettings(order=1), solver=SolverChoice("iterative"))
+    assert attrs.evolve(plain, device="cuda:0").text() == plain.text()
+    with pytest.raises(InputError, match="no device 'gpu'"):
+        attrs.evolve(plain, device="gpu")
 
 
 def test_the_inputs_of_a_study_are_made_without_the_solver():

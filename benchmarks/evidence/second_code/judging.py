@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -10,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mu_addon.design.parameters import read_unit
 from mu_addon.errors import MuError
 from mu_addon.evidence.diagnosis import diagnose
 from mu_addon.evidence.effect import Parameter
@@ -19,8 +22,13 @@ from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.evidence.verdict import Verdict
 from mu_addon.measured import Experiment, read_folder
+from mu_addon.run.context import run_to_end
+from mu_addon.run.progress import Progress, terminal
+from mu_addon.usecases.diagnose.job import Job
+from mu_addon.usecases.diagnose.run import USE_CASE
 
 from .recording import write
 from .sets import Order, made, noise_of
@@ -155,3 +163,16 @@ def outcome(truth: Sequence[str], verdict: Verdict) -> str:
     if verdict.kind == "named":
         return "partly" if hidden and names <= hidden else "wrong"
     return "partly" if hidden & every else "wrong_set"
+
+
+def verdict_on(folder: Path, unit: Path, out: Path, homogenised: bool = False) -> dict[str, Any]:
+    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there.
+
+    homogenised: the unit is simulated so, in place of the printed body.
+    """
+    settings = UnitSettings() if homogenised else None
+    with run_to_end(Progress([terminal(sys.stderr)])) as context:
+        USE_CASE.start(Job(read_folder(folder), read_unit(unit), settings), out, context)
+    if context.status:
+        raise SystemExit(context.status)
+    return dict(json.loads((out / "verdict.json").read_text()))

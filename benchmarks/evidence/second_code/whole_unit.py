@@ -10,27 +10,19 @@ that the judge's simulations serve them all. Needs `pip install -e '.[benchmarks
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
 
-from mu_addon.design.parameters import Unit, load_preset, read_unit, to_toml
-from mu_addon.evidence.unit_fem import UnitSettings
+from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.files import write_text
-from mu_addon.measured import read_folder
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import AXES, LATTICE, Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.run.context import run_to_end
-from mu_addon.run.progress import Progress, terminal
-from mu_addon.usecases.diagnose.job import Job
-from mu_addon.usecases.diagnose.run import USE_CASE
 
+from .judging import verdict_on
 from .recording import Trial, instrument, read, write
 from .units import _softened
 
@@ -222,18 +214,6 @@ def _stuck(angle: Array) -> Array:
     return np.array(held)
 
 
-def verdict_on(folder: Path, unit: Path, out: Path, settings: UnitSettings | None = None) -> dict[str, Any]:
-    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there.
-
-    settings: of the unit's simulation; None: the printed body.
-    """
-    with run_to_end(Progress([terminal(sys.stderr)])) as context:
-        USE_CASE.start(Job(read_folder(folder), read_unit(unit), settings), out, context)
-    if context.status:
-        raise SystemExit(context.status)
-    return dict(json.loads((out / "verdict.json").read_text()))
-
-
 def main() -> None:
     """Make every set, have it diagnosed, and print a row each."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[2])
@@ -253,7 +233,7 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(folder, trials(name, rng, angles))
         began = time.time()
-        found = verdict_on(folder, described, given.out / "diagnosis", UnitSettings())
+        found = verdict_on(folder, described, given.out / "diagnosis", homogenised=True)
         causes = ", ".join(c["effect"] for c in found["causes"])
         hidden = ", ".join(SETS[name]) or ("a mount that sticks" if name == "sticks" else "nothing")
         row = (name, hidden, str(found["verdict"]), causes, f"{time.time() - began:.0f}")

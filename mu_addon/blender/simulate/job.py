@@ -65,7 +65,6 @@ def job_of(root: Any) -> Job:
     """Study job from a unit's properties; raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
-        from ...fem.linear_solver import SolverChoice
         from ...meshing.settings import RESOLVED, MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
@@ -92,6 +91,6 @@ def job_of(root: Any) -> Job:
         stages=stages,
         mesh=MeshSettings(refine=exact(settings.refine), fidelity=RESOLVED),
         self_contact=settings.self_contact,
-        solver=SolverChoice(settings.solver, settings.device),
+        device=settings.device,
         **extra,
     )

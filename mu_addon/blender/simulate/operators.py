@@ -40,7 +40,7 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
         from ...usecases.simulate_and_place.job import write_study
 
         folder, job = unit_runs.place_of(studies.assign_folder(root), job)
-        options = ["--solver", study.solver, "--device", study.device]
+        options = ["--device", study.device]
         SIMULATION.start(root, folder, lambda folder: write_study(job, folder), options)
         viewports.redraw()
 

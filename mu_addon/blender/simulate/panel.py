@@ -50,7 +50,6 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         header, body = layout.panel("MU_computing", default_closed=True)
         header.label(text="Solver and Folder")
         if body:
-            body.prop(study, "solver")
             body.prop(study, "device")
             body.prop(study, "folder")
 

@@ -21,7 +21,7 @@ from bpy.props import (
 
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
-from ...fem.linear_solver import DEVICE, SOLVER
+from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
 from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
 from ..shared.registration import property_group_factory
@@ -84,23 +84,12 @@ class MU_PG_study(bpy.types.PropertyGroup):
     refine: blender_property(REFINE._replace(default=0.5), name="Refinement", precision=2, step=5)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
-    solver: EnumProperty(
-        name="Solver",
-        description="Solver of the linear systems; results agree within its tolerance",
-        items=[
-            ("auto", "Automatic", "Factorisation, unless a motion's factor does not fit into memory"),
-            ("direct", "Factorisation", "The fastest as long as it fits into memory"),
-            ("iterative", "Iterative", "Little memory, slow: for the motion of very fine meshes"),
-        ],
-        default=SOLVER.default,
-    )
     device: EnumProperty(
         name="Device",
         description="Device that computes the finite elements",
         items=[
-            ("auto", "Automatic", "A CUDA device from 200 000 unknowns on, where there is one"),
-            ("cpu", "CPU", "The processor"),
-            ("cuda:0", "CUDA", "The first CUDA device"),
+            ("cpu", "CPU", "The processor, by factorisation"),
+            ("cuda:0", "CUDA", "The first CUDA device, by conjugate gradients"),
         ],
         default=DEVICE.default,
     )

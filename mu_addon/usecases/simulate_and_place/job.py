@@ -18,7 +18,7 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.rigid_body import RigidBody, mirrored, read_rigid_bodies, require_beside, to_obj
 from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
-from ...fem.linear_solver import SolverChoice
+from ...fem.device import device_field, require_device
 from ...fem.newton_settings import (
     CONTACT_NEWTON,
     RESOLVED_CONTACT_NEWTON,
@@ -77,8 +77,8 @@ class Job:
     # Self-contact of a resolved unit's walls and struts, at several times the cost.
     self_contact: bool = SELF_CONTACT._replace(default=False).field()
     self_friction: float = SELF_FRICTION.field()
-    # Linear solver: within its tolerance it decides nothing.
-    solver: SolverChoice = attrs.field(factory=SolverChoice)
+    # Of the finite elements: within the solver's tolerance it decides nothing.
+    device: str = device_field()
     # Stages to run: the first, the first two or all.
     stages: tuple[str, ...] = STAGES
     # Name of a path along which the unit with a waveguide is built, too; decides no figure.
@@ -97,7 +97,7 @@ class Job:
         """Pairs of settings that exclude each other: whether they are given, what, where and what to do."""
         places, simulates = "place" in self.stages, "simulate" in self.stages
         without, one = "the search of the whole lattice does not support", "leave one of them out"
-        graph, two_levels = places and self.paths == "graph", self.solver.method == "iterative"
+        graph = places and self.paths == "graph"
         resolved = simulates and self.mesh.resolved
         yield (
             resolved and self.mesh.order == 1,
@@ -130,18 +130,6 @@ class Job:
         clogged = graph and bool(self.effects.clogged)
         yield clogged, f"{without} a clogged chamber", "clogged_chamber, paths", one
         yield (
-            two_levels and places and self.solver.device in ("auto", "cpu"),
-            "on the CPU all paths share one factorisation, which the iterative solver does not have",
-            "--solver",
-            "give --solver direct or auto, or a CUDA device with --device",
-        )
-        yield (
-            two_levels and simulates and self.mesh.order == 1,
-            "the iterative solver needs quadratic elements",
-            "--solver, mesh.order",
-            "choose order 2, or --solver direct",
-        )
-        yield (
             not self.samples[1].any(),
             f"none of the {self.times} samples of the protocol has a pressure other than 0",
             "times",
@@ -173,7 +161,7 @@ class Job:
     def tables(self) -> Tables:
         """All inputs that decide the results, a table for each stage, as in study.toml.
 
-        Not `workers` and `solver`, which do not.
+        Not `workers` and `device`, which do not.
         """
         simulate: dict[str, Any] = {"times": self.times, "mesher": self.mesher}
         if self.self_contact:
@@ -220,9 +208,8 @@ class Job:
 
     def model(self, mesh: Mesh, threads: int = 2) -> Model:
         """Model of the unit's mesh: pressure, weight, obstacles. Raises InputError."""
-        device, solver = self.solver.resolved(mesh, needs_factor="place" in self.stages)
-        model = self.effects.model(self.unit, mesh, threads, device)
-        model.solver = solver
+        require_device(self.device)
+        model = self.effects.model(self.unit, mesh, threads, self.device)
         if self.obstacles:
             from .contact_history import obstacles_of
 
