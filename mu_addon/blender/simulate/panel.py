@@ -48,7 +48,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
             wrapped(layout, f"{len(others)} other job(s) running", "INFO")
         folded_place(layout, root, "simulate", "Material")
         header, body = layout.panel("MU_computing", default_closed=True)
-        header.label(text="Solver and Folder")
+        header.label(text="Device and Folder")
         if body:
             body.prop(study, "device")
             body.prop(study, "folder")
