@@ -84,11 +84,10 @@ def _pedigree(name: str, version: str, purl: str, change: Slimmed) -> dict[str, 
         "purl": purl,
         "hashes": [{"alg": "SHA-256", "content": change.sha256}],
     }
-    replaced = "".join(f"{file} {CHANGES[file]}; " for file in change.replaced)
-    notes = (
-        f"{change.files} files, {change.bytes} bytes, left out: {', '.join(change.patterns)}; "
-        f"{replaced}all others unchanged but RECORD and the build tag in WHEEL"
-    )
+    done = [f"{change.files} files, {change.bytes} bytes, left out: {', '.join(change.patterns)}"]
+    done = done if change.patterns else ["compressed anew"]
+    done += [f"{file} {CHANGES[file]}" for file in change.replaced]
+    notes = "; ".join([*done, "all others unchanged but RECORD and the build tag in WHEEL"])
     return {"ancestors": [ancestor], "notes": notes}
 
 

@@ -92,7 +92,7 @@ def _found(layout, scene, root, found):
         column.label(text=f"{f['angle_at_hold_deg']:.1f}°, {f['normal_at_hold_N']:.2f} N a finger at hold")
         held, icon = ("Held", "CHECKMARK") if f["held"] else ("Slips", "ERROR")
         wrapped(column, f"{held}: friction carries {f['margin']:.2g} times the weight", icon)
-        column.label(text=f"Gap error {f['gap_error_mm']:.3f} mm")
+        column.label(text=f"Overlap in contact {f['gap_error_mm']:.3f} mm")
     on = bool(timeline.parts(root))
     row = box.row(align=True)
     text = "Hide Grasp" if on else "Show Grasp"

@@ -19,6 +19,17 @@ def start_button(layout, child, operator: str, icon: str, **settings) -> None:
         large_button(layout, operator, icon, **settings)
 
 
+def rounded(seconds: float) -> str:
+    """A duration to about a tenth: "40 s", "9 min", "3 h 30 min"."""
+    if seconds < 90.0:
+        return f"{max(10 * round(seconds / 10.0), 10)} s"
+    minutes = round(seconds / 60.0)
+    if minutes >= 20:
+        minutes = 5 * round(minutes / 5.0)
+    hours = f"{minutes // 60} h " if minutes >= 60 else ""
+    return f"{hours}{minutes % 60} min".removesuffix(" 0 min")
+
+
 def job_state(layout, child, where: str, prefix: str = "") -> None:
     """Draw the progress of a job's child while it runs, and its end; nothing without a child.
 

@@ -7,7 +7,7 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
-from ..jobs.panel import job_state, start_button
+from ..jobs.panel import job_state, rounded, start_button
 from ..results import thumbnails
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
@@ -48,11 +48,21 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
         if root.mu_unit.study.effects:
             wrapped(layout, "With the named effects that the panel Simulate lists", "LIGHT")
         child = optimization.OPTIMIZATION.child(root)
-        start_button(layout, child, "mu.optimize", "CON_TRACKTO")
+        start_button(layout, child, "mu.optimize", "CON_TRACKTO", text=start_words(root))
         job_state(layout, child, "see below", JOB)
         found = optimization.findings(root)
         if found is not None and found.outcome:
             _results(layout, found)
+
+
+def start_words(root) -> str:
+    """Label of the button: the job, and its expected duration; a file's search has a length of its own."""
+    if root.mu_optimize.source == "file" or not root.mu_optimize.freedoms:
+        return "Optimize"
+    found = optimization.findings(root)
+    measured = found is not None and "search" in found.seconds
+    seconds = sum(seconds for _, seconds in optimization.plan_of(root))
+    return f"Optimize, {'about' if measured else 'perhaps'} {rounded(seconds)}"
 
 
 def _more(layout, props) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..jobs import start_child
-from ..jobs.panel import job_state, start_button
+from ..jobs.panel import job_state, rounded, start_button
 from ..shared.panels import UnitPanel, folded_place, wrapped
 from . import effects
 from .job import SIMULATION, announced
@@ -58,17 +58,6 @@ def start_words(root) -> str:
     """Label of the button: the job, and its expected duration from measurements on this machine."""
     seconds, measured = announced(root)
     return f"Simulate, {'about' if measured else 'perhaps'} {rounded(seconds)}"
-
-
-def rounded(seconds: float) -> str:
-    """A duration to about a tenth: "40 s", "9 min", "3 h 30 min"."""
-    if seconds < 90.0:
-        return f"{max(10 * round(seconds / 10.0), 10)} s"
-    minutes = round(seconds / 60.0)
-    if minutes >= 20:
-        minutes = 5 * round(minutes / 5.0)
-    hours = f"{minutes // 60} h " if minutes >= 60 else ""
-    return f"{hours}{minutes % 60} min".removesuffix(" 0 min")
 
 
 def _effects(layout, root) -> None:

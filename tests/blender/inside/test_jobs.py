@@ -7,9 +7,10 @@ from unittest.mock import MagicMock
 import bpy
 
 from mu_addon.blender.jobs import header, preferences, start_child
+from mu_addon.blender.jobs.panel import rounded
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
-from mu_addon.blender.simulate.panel import rounded, start_words
+from mu_addon.blender.simulate.panel import start_words
 from mu_addon.run.child import Child
 
 from .acting import add, refused

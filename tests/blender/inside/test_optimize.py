@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
+from mu_addon.blender.jobs.panel import rounded
 from mu_addon.blender.optimize import panel as panels
 from mu_addon.blender.optimize import state as optimization
 from mu_addon.blender.optimize.properties import FREE, KINDS
@@ -106,6 +107,8 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     root.mu_optimize.evaluations = 7
     root.mu_optimize.robust = root.mu_optimize.has_gravity = True
 
+    expected = sum(seconds for _, seconds in optimization.plan_of(root))
+    assert f"Optimize, perhaps {rounded(expected)}" in drawn()
     optimization.write_inputs(root, tmp_path / "run")
     design = read_job(tmp_path / "run").design
     unit = to_unit(root.mu_unit)
