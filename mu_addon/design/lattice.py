@@ -97,10 +97,14 @@ class Lattice(Graph):
         return graded(law, t, self.factors[struts[:, :1]], self.factors[struts[:, 1:]], self.growth)
 
     @property
+    def node_factors(self) -> NDArray[np.float64]:
+        """Factors (N,) of the grading at the nodes; 1 where there is none."""
+        return np.ones(len(self.grid)) if self.factors is None else self.factors
+
+    @property
     def node_radii(self) -> NDArray[np.float64]:
         """Radii (N,) in mm of the struts at their nodes."""
-        law = np.full(len(self.grid), float(self.radius(0.0)))
-        return law if self.factors is None else (law - self.growth) * self.factors + self.growth
+        return (float(self.radius(0.0)) - self.growth) * self.node_factors + self.growth
 
 
 def graded(law: ArrayLike, t: ArrayLike, first: ArrayLike, last: ArrayLike, growth: float) -> Any:

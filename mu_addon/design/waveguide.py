@@ -169,6 +169,7 @@ def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = 
     nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
     numbers = _numbers(lattice, nodes, isinstance(path, Window))
     _check_path(d, nodes)
+    numbers = _passed(lattice, numbers)
     met = np.isin(lattice.struts, numbers)
     steps = {tuple(sorted(pair)) for pair in pairwise(numbers)}
     replaced = np.array([tuple(sorted(strut)) in steps for strut in lattice.struts.tolist()], bool)
@@ -292,6 +293,19 @@ def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
                 "take a path of this unit, from the paths.csv of `place --paths graph` at the same scale",
             )
         found.append(int(gap.argmin()))
+    return found
+
+
+def _passed(lattice: Lattice, numbers: list[int]) -> list[int]:
+    """Numbers of all nodes that a chain of nodes passes through: of some kinds also between its own."""
+    nodes, found = lattice.nodes, numbers[:1]
+    for first, last in pairwise(numbers):
+        way = nodes[last] - nodes[first]
+        off = nodes - nodes[first]
+        t = off @ way / (way @ way)
+        on = (np.linalg.norm(off - t[:, None] * way, axis=1) < 1e-9 * lattice.cell) & (t > 1e-9)
+        between = np.flatnonzero(on & (t < 1.0 - 1e-9))
+        found = [*found, *between[np.argsort(t[between])].tolist(), last]
     return found
 
 

@@ -9,25 +9,23 @@ stay solid, and so do the joints that they end in.
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import attrs
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..design.lattice import Lattice
-from ..fem.elements import even_points, shape_functions
-from ..meshing.mesh import LATTICE, Array, Mesh
+from ..fem.elements import even_points, reference_gradients, shape_functions
+from ..meshing.mesh import LATTICE, Array, Mesh, part
 from .beams import free_joints, integrals, rotation_nodes, whole_and_clear
+from .graph_axes import Axes
 from .joints import Zones
 from .lattice import FLOOR, LEAST_SUPPORT, support
 
-# Stations of axes, a layer, among which an element's strut is sought, and how many of them.
-_STATIONS, _NEAR = 2, 24
 # Steps along each edge of the points that tell which part of an element lies in which layer.
 _STEPS = 4
 # Part of a layer that a rigid zone may take.
 _BEYOND = 0.8
-# Share of the largest volume of such a layer that one has which is whole.
-_WHOLE = 0.98
 
 
 class GraphLayers:
@@ -39,51 +37,30 @@ class GraphLayers:
     def __init__(self, mesh: Mesh, lattice: Lattice, layers: int) -> None:
         self.lattice, self.count = lattice, layers
         self.elements = np.flatnonzero(mesh.region == LATTICE)
-        self.start = lattice.nodes[lattice.struts[:, 0]]
-        self.way = lattice.nodes[lattice.struts[:, 1]] - self.start
+        self.axes = Axes(lattice)
         corners = mesh.nodes[mesh.tets[self.elements, :4]]
-        self.strut = self._nearest(corners.mean(axis=1))
+        self.strut = self.axes.nearest(corners.mean(axis=1))
         shape = shape_functions(even_points(_STEPS), 1)
-        self.inside = np.empty((len(corners), len(shape)), np.int64)
+        self.inside = np.empty((len(corners), len(shape)), np.int8)
         for p, weights in enumerate(shape):
-            at = self._distances(weights @ corners, self.strut)[1]
+            at = self.axes.distances(weights @ corners, self.strut)[1]
             self.inside[:, p] = np.clip((layers * at).astype(int), 0, layers - 1)
-        self.volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+        self.volumes = reference_gradients(mesh.nodes, mesh.tets[self.elements]).volumes
         self.halved = ("x" in mesh.symmetry) & (lattice.nodes[lattice.struts][:, :, 0] == 0.0).all(axis=1)
-
-    def _nearest(self, points: Array) -> Array:
-        """Strut (p,) nearest to points (p, 3) in its radii."""
-        t = (np.arange(_STATIONS * self.count) + 0.5) / (_STATIONS * self.count)
-        stations = (self.start[:, None] + t[:, None] * self.way[:, None]).reshape(-1, 3)
-        near = cKDTree(stations).query(points, min(_NEAR, len(stations)))[1] // len(t)
-        best = self._distances(points[:, None], near)[0].argmin(axis=1)
-        return np.asarray(near[np.arange(len(points)), best])
-
-    def _distances(self, points: Array, struts: Array) -> tuple[Array, Array]:
-        """Distances in radii, and fractions of the length, of points (..., 3) in mm from struts (...)."""
-        way = self.way[struts]
-        off = points - self.start[struts]
-        t = np.clip((off * way).sum(axis=-1) / (way**2).sum(axis=-1), 0.0, 1.0)
-        radius = self.lattice.radii(t.reshape(-1, 1), struts.ravel()).reshape(t.shape)
-        return np.linalg.norm(off - t[..., None] * way, axis=-1) / radius, t
 
     def whole(self, mesh: Mesh, clear: Array, reach_mm: float) -> Array:
         """Mask (struts, layers) of the layers that can be a beam."""
-        lattice, kind = self.lattice, self.lattice.kind
-        volume, spoilt = np.zeros((2, len(lattice.struts), self.count))
+        lattice = self.lattice
+        there, spoilt = np.zeros((2, len(lattice.struts), self.count), bool)
+        there[self.strut[:, None], self.inside] = True
         bad = ~whole_and_clear(mesh, self.elements, clear, reach_mm)
-        for layer in self.inside.T:
-            np.add.at(volume, (self.strut, layer), self.volume)
-            np.add.at(spoilt, (self.strut, layer), bad)
-        # Struts that begin at the same place of a cell and run the same way are alike.
-        first, last = (lattice.grid[lattice.struts[:, k]] for k in (0, 1))
-        place = (first - lattice.cells[0]) % kind.divisions
-        alike = np.ravel(np.unique(np.hstack([place, last - first]), axis=0, return_inverse=True)[1])
-        most = np.zeros((alike.max() + 1, self.count))
-        np.maximum.at(most, alike, volume)
-        wanted = _WHOLE * most[alike] * np.where(self.halved, 0.5, 1.0)[:, None]
-        found = (volume > 0.0) & (volume >= wanted) & (spoilt == 0)
-        return free_joints(found, (volume > 0.0).any(axis=1), lattice.struts, len(lattice.nodes))
+        spoilt[self.strut[bad, None], self.inside[bad]] = True
+        # The box cuts struts in its faces in half.
+        ends = lattice.nodes[lattice.struts]
+        faces = lattice.nodes.min(axis=0), lattice.nodes.max(axis=0)
+        cut = np.any([(ends == face).all(axis=1).any(axis=1) for face in faces], axis=0)
+        found = there & ~spoilt & ~cut[:, None]
+        return free_joints(found, there.any(axis=1), lattice.struts, len(lattice.nodes))
 
     def replaced(self, mesh: Mesh, whole: Array, zones: Zones) -> Mesh:
         """The mesh with beams in place of the whole layers (struts, layers)."""
@@ -109,12 +86,12 @@ class GraphLayers:
         stay as nodes, so that numbers do not change.
         """
         before = self._whole_in(mesh)
-        spoilt = np.zeros(before.shape)
-        for layer in self.inside.T:
-            np.add.at(spoilt, (self.strut, layer), solid[self.elements])
+        spoilt = np.zeros(before.shape, bool)
+        reached = solid[self.elements]
+        spoilt[self.strut[reached, None], self.inside[reached]] = True
         present = np.zeros(len(before), bool)
         present[self.strut] = True
-        whole = before & (spoilt == 0)
+        whole = before & ~spoilt
         whole = free_joints(whole, present, self.lattice.struts, len(self.lattice.nodes))
         keep = whole[np.nonzero(before)]
         return self._fitted(mesh, whole, mesh.beams[keep], mesh.flexible[keep])
@@ -122,9 +99,9 @@ class GraphLayers:
     def _whole_in(self, mesh: Mesh) -> Array:
         """Mask (struts, layers) of the beams of a mesh of `replaced`, which are in the order of its rows."""
         ends = mesh.nodes[mesh.beams[:, 0::2]]
-        strut = self._nearest(ends.mean(axis=1))
-        at = self._distances(ends.mean(axis=1), strut)[1]
-        found = np.zeros((len(self.way), self.count), bool)
+        strut = self.axes.nearest(ends.mean(axis=1))
+        at = self.axes.distances(ends.mean(axis=1), strut)[1]
+        found = np.zeros((len(self.axes.way), self.count), bool)
         found[strut, (self.count * at).astype(int)] = True
         return found
 
@@ -157,13 +134,13 @@ class GraphLayers:
         strut, layer (e,): of each beam. Struts that meet have one section at their joint.
         """
         count, joints = self.count, len(self.lattice.nodes)
-        every = np.empty((len(self.way), count + 1), np.int64)
+        every = np.empty((len(self.axes.way), count + 1), np.int64)
         every[:, 0], every[:, -1] = self.lattice.struts.T
-        every[:, 1:-1] = joints + np.arange(len(self.way) * (count - 1)).reshape(len(self.way), -1)
+        every[:, 1:-1] = joints + np.arange(len(self.axes.way) * (count - 1)).reshape(len(self.axes.way), -1)
         used = np.unique(np.concatenate([every[strut, layer], every[strut, layer + 1]]))
         number = np.full(every.max() + 1, -1)
         number[used] = np.arange(len(used))
-        at = self.start[:, None] + np.linspace(0.0, 1.0, count + 1)[:, None] * self.way[:, None]
+        at = self.axes.start[:, None] + np.linspace(0.0, 1.0, count + 1)[:, None] * self.axes.way[:, None]
         places = np.empty((len(number), 3))
         places[every] = at
         places[:joints] = self.lattice.nodes
@@ -178,7 +155,7 @@ class GraphLayers:
         reached = np.flatnonzero(whole[self.strut[:, None], self.inside].any(axis=1))
         of = mesh.tets[self.elements[reached]]
         pairs = np.unique(np.column_stack([of.ravel(), np.repeat(self.strut[reached], of.shape[1])]), axis=0)
-        away, t = self._distances(mesh.nodes[pairs[:, 0]], pairs[:, 1])
+        away, t = self.axes.distances(mesh.nodes[pairs[:, 0]], pairs[:, 1])
         # Of the struts whose elements a node is part of, the one whose axis is nearest carries it.
         order = np.lexsort((away, pairs[:, 0]))
         rows = order[np.unique(pairs[order, 0], return_index=True)[1]]
@@ -189,8 +166,9 @@ class GraphLayers:
             for end, level in ((0, 0.0), (1, float(self.count))):
                 at[on & (self.lattice.nodes[self.lattice.struts[strut, end], 0] == 0.0)] = level
         layer = np.clip(at.astype(int), 0, self.count - 1)
-        solid = attrs.evolve(mesh, filled=np.where(mesh.solid[:, None], mesh.resisting, 0.0))
-        keep = whole[strut, layer] | (support(solid)[carried] < LEAST_SUPPORT)
+        solid = np.where(mesh.solid[:, None], mesh.resisting, 0.0)[self.elements]
+        struts = attrs.evolve(part(mesh, self.elements), filled=solid)
+        keep = whole[strut, layer] | (support(struts, self.volumes)[carried] < LEAST_SUPPORT)
         carried, strut, at, layer = carried[keep], strut[keep], at[keep], layer[keep]
         # A node beyond the last beam of its strut moves with that beam's end.
         gap = np.abs(np.arange(self.count) - layer[:, None]) + np.where(whole[strut], 0, 2 * self.count)
@@ -207,15 +185,22 @@ class GraphLayers:
         return np.asarray(found * np.where(self.halved[strut], 2.0, 1.0)[:, None])
 
 
+# Layers of meshes that are still in use: all candidates of a unit ask for the same.
+_LAYERS: WeakKeyDictionary[Mesh, GraphLayers] = WeakKeyDictionary()
+
+
 def graph_layers_of(mesh: Mesh, lattice: Lattice) -> GraphLayers:
-    """The layers of a mesh that `with_graph_beams` made, of struts of this lattice."""
-    ends = mesh.nodes[mesh.beams[0, 0::2]]
-    joints = lattice.nodes[lattice.struts]
-    # A beam is part of the one strut that is no longer by way of its ends.
-    length = np.linalg.norm(joints[:, 1] - joints[:, 0], axis=1)
-    by_way = np.linalg.norm(joints - ends.mean(axis=0), axis=2).sum(axis=1)
-    strut = (by_way / length).argmin()
-    return GraphLayers(mesh, lattice, round(float(length[strut] / np.linalg.norm(ends[1] - ends[0]))))
+    """The layers of a mesh that `with_graph_beams` made, of struts of this lattice; kept with the mesh."""
+    if mesh not in _LAYERS:
+        ends = mesh.nodes[mesh.beams[0, 0::2]]
+        joints = lattice.nodes[lattice.struts]
+        # A beam is part of the one strut that is no longer by way of its ends.
+        length = np.linalg.norm(joints[:, 1] - joints[:, 0], axis=1)
+        by_way = np.linalg.norm(joints - ends.mean(axis=0), axis=2).sum(axis=1)
+        strut = (by_way / length).argmin()
+        layers = round(float(length[strut] / np.linalg.norm(ends[1] - ends[0])))
+        _LAYERS[mesh] = GraphLayers(mesh, lattice, layers)
+    return _LAYERS[mesh]
 
 
 def with_graph_beams(

@@ -18,12 +18,12 @@ from ..design.parameters import Unit
 from ..design.profile import outer_polygon, outer_radius, outer_slope
 from ..design.solid import QUALITY, lattice_solid
 from ..design.strut_cell import StrutCell
-from ..errors import InputError
 from ..fem.elements import even_points, reference_gradients, shape_functions, shape_gradients
 from ..homogenize.cell_mesh import CellMeshSettings, mesh_cell
 from ..meshing.mesh import FLIPPED_TET, TET_FACES, Array, Mesh, mirror
 from ..meshing.surface import Surface, winding_number
 from ..meshing.tiling import tiled
+from .graph_axes import graded_about_axes
 from .octants import graded_nodes
 from .strut import is_half_diagonal, strut_mesh
 
@@ -54,12 +54,6 @@ def struts(
     that cuts the lattice in place of its box. The mesh has `filled`, and no element that is all cut away.
     """
     d = covering(d, body)
-    if d.grading is not None and not is_half_diagonal(d):
-        raise InputError(
-            f"graded struts of lattice {d.kind.name!r} are not meshed: only swept half diagonals can be",
-            "[lattice] kind, [grading]",
-            "choose body-centred or body-centred-straight, or leave the grading out",
-        )
     if is_half_diagonal(d):
         octant = strut_mesh(d, rings, layers)
     else:
@@ -78,7 +72,10 @@ def struts(
     if full:
         mesh = mirror(mesh, "x")
     if d.grading is not None:
-        mesh = attrs.evolve(mesh, nodes=graded_nodes(d, mesh.nodes))
+        if is_half_diagonal(d):
+            mesh = attrs.evolve(mesh, nodes=graded_nodes(d, mesh.nodes))
+        else:
+            mesh = graded_about_axes(d, mesh)
     return filled_outside(mesh, cuts(d, body))
 
 
@@ -184,9 +181,13 @@ def without_loose_parts(mesh: Mesh, held: Array) -> Mesh:
     return mesh if firm.all() else _with_elements(mesh, firm[part])
 
 
-def support(mesh: Mesh) -> Array:
-    """Share (n,) of the elements' volume around each node that is filled."""
-    volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
+def support(mesh: Mesh, volumes: Array | None = None) -> Array:
+    """Share (n,) of the elements' volume around each node that is filled.
+
+    volumes (m, q): of the elements at their quadrature points, where they are known.
+    """
+    if volumes is None:
+        volumes = reference_gradients(mesh.nodes, mesh.tets).volumes
     per = mesh.tets.shape[1]
     whole, solid = (
         np.bincount(mesh.tets.ravel(), np.repeat(v.sum(axis=1), per), len(mesh.nodes))

@@ -128,7 +128,8 @@ class PrintedMorph:
         if self._swept is not None:
             return self._swept.of(other)
         own, sizes = self._lattice, ("junction_radius", "midspan_radius", "growth")
-        if other.factors is not None or any(getattr(own, name) != getattr(other, name) for name in sizes):
+        alike = all(getattr(own, name) == getattr(other, name) for name in sizes)
+        if not alike or not np.array_equal(own.node_factors, other.node_factors):
             raise InputError(
                 f"the mesh of struts of lattice {d.kind.name!r} cannot be moved to other diameters",
                 "[lattice] kind",

@@ -12,7 +12,8 @@ from ..design.lattice import Lattice, graded, lattice_of
 from ..design.waveguide import Bar, strut_radii
 from ..errors import InputError
 from ..meshing.mesh import Array
-from .strut import Radius, ends, placed, places_of, radius_of, thickened
+from .graph_axes import Axes
+from .strut import Radius, ends, is_half_diagonal, placed, places_of, radius_of, thickened
 
 _STATIONS = np.linspace(0.0, 1.0, 33)
 # In halves of a cell, within which a node lies in a plane between octants.
@@ -131,10 +132,7 @@ class SweptNodes:
         sizes = [(x.junction_radius, x.midspan_radius, x.growth) for x in (own, other)]
         if sizes[0] != sizes[1]:
             return np.ones(len(own.struts), bool)
-        if own.factors is None and other.factors is None:
-            return np.zeros(len(own.struts), bool)
-        first, second = (np.ones(len(x.grid)) if x.factors is None else x.factors for x in (own, other))
-        return np.asarray((first != second)[own.struts].any(axis=1))
+        return np.asarray((own.node_factors != other.node_factors)[own.struts].any(axis=1))
 
     def _law(self, lattice: Lattice, rows: Array) -> Radius:
         """Radius of the strut of each row, from its cell's corner to the centre."""
@@ -183,9 +181,20 @@ def _thicker(one: Lattice, met: Array, half: float) -> Radius:
 
 
 def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
-    """Return a mask (n,) of points (n, 3) in mm in the octant of a strut that the waveguide replaces."""
+    """Return a mask (n,) of points (n, 3) in mm in the octant of a strut that the waveguide replaces.
+
+    Of other kinds than half diagonals: of points that such a strut is nearest to.
+    """
     lattice = lattice_of(d)
     found = np.zeros(len(points), bool)
+    if not is_half_diagonal(d):
+        at = lattice.nodes[lattice.struts[bar.replaced]].reshape(-1, 3)
+        if len(at):
+            reach = float(lattice.radii(_STATIONS).max())
+            around = (points > at.min(axis=0) - reach) & (points < at.max(axis=0) + reach)
+            rows = np.flatnonzero(around.all(axis=1))
+            found[rows] = bar.replaced[Axes(lattice).nearest(points[rows])]
+        return found
     for strut in np.flatnonzero(bar.replaced).tolist():
         found[_octant(lattice, strut, points)[0]] = True
     return found

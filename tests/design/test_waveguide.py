@@ -280,6 +280,9 @@ def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
     bar = waveguide(unit, path)
     assert bar.replaced.sum() == 4
     assert bar.loops == 0
+    past_nodes = waveguide(unit, p[:3])
+    assert (past_nodes.replaced == bar.replaced).all()
+    assert past_nodes.loops == 0
     assert [well.centre[2] - p[0, 2] for well in bar.wells] == pytest.approx(
         [3.125, 6.25, 9.375, 15.625, 18.75, 21.875]
     )

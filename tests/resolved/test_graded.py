@@ -6,7 +6,7 @@ import pytest
 
 from mu_addon.design.anchors import windows
 from mu_addon.design.grading import Grading
-from mu_addon.design.lattice_kinds import LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.mesh import LATTICE, boundary_faces
@@ -91,12 +91,32 @@ def test_a_printed_waveguide_stands_in_graded_struts():
     assert (sensed.nodes[: len(mesh.nodes)] == mesh.nodes).all(), "struts wider than the bar stay"
 
 
-def test_what_cannot_be_swept_is_refused():
+@pytest.fixture(scope="module")
+def cross():
     faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
-    cross = LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant)
-    d = attrs.evolve(with_grading(Grading(tip=0.9)).printed, kind=cross)
-    with pytest.raises(InputError, match="swept half diagonals"):
-        struts(d, 1, 5)
+    return LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant)
+
+
+def test_struts_of_another_kind_are_graded_about_their_axes(cross, tmp_path):
+    """As wide as drawn at each place: their volume grows by as much, and none leaves the box's faces."""
+    register(cross)
+    factors = Grading(), Grading(base=0.9, tip=1.3, minus_y=0.9, plus_y=1.3, cells="1 0 1: 1.3")
+    plain, graded = (with_grading(g).evolve(kind=cross.name, seats=False) for g in factors)
+    before, after = (struts(unit.printed, 1, 5, cache=tmp_path) for unit in (plain, graded))
+    volumes = [(element_volumes(mesh) * mesh.filled.mean(axis=1)).sum() for mesh in (before, after)]
+    wanted = strut_volume_mm3(graded) / strut_volume_mm3(plain)
+    assert abs(wanted - 1.0) > 0.02
+    assert volumes[1] / volumes[0] == pytest.approx(wanted, rel=2e-3)
+    assert (element_volumes(after) > 0).all()
+    low, high = np.array(graded.printed.bounds).T
+    assert after.nodes.min(axis=0) == pytest.approx([0.0, *low[1:]], abs=0.0)
+    assert after.nodes.max(axis=0) == pytest.approx(high, abs=0.0)
+
+
+def test_struts_that_fill_their_cell_are_refused(cross):
     thick = attrs.evolve(with_grading(Grading(tip=1.9)).printed, midspan_diameter=3.0)
     with pytest.raises(InputError, match="fill their cell"):
         graded_nodes(thick, np.zeros((1, 3)))
+    wide = attrs.evolve(with_grading(Grading(tip=1.9)).printed, kind=cross, midspan_diameter=5.0)
+    with pytest.raises(InputError, match="close the openings"):
+        struts(wide, 1, 5)

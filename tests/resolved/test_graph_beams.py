@@ -6,9 +6,11 @@ import math
 import attrs
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from mu_addon.design.lattice import filled
+from mu_addon.design.grading import Grading
+from mu_addon.design.lattice import filled, lattice_of
 from mu_addon.design.lattice_kinds import BODY_CENTRED, LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
@@ -23,7 +25,7 @@ from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
 from mu_addon.meshing.tiling import tiled
 from mu_addon.resolved.beams import Layers, integrals
 from mu_addon.resolved.frame import frame_tensor, frame_zones
-from mu_addon.resolved.graph_beams import with_graph_beams
+from mu_addon.resolved.graph_beams import graph_layers_of, with_graph_beams
 from mu_addon.resolved.joints import POISSON, Zones, zones_of
 from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.strut import strut_mesh
@@ -170,6 +172,47 @@ def test_a_unit_bends_as_its_solid_struts_do_and_half_of_it_as_the_whole(unit, m
     # What the waveguide changes is the same.
     by_beams, by_solids = (bent(unit, sensed[name])[0] for name in ("half", "solid"))
     assert by_beams / half == pytest.approx(by_solids / solid, rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def graded(unit):
+    factors = Grading(base=0.8, tip=1.3, minus_y=0.75, plus_y=1.2, beside_x=0.9)
+    return attrs.evolve(unit, grading=factors)
+
+
+def test_graded_struts_are_beams_of_their_own_sections(graded, folder):
+    mesh = mesh_printed(graded, MeshSettings(refine=0.5), cache=folder)
+    ends = mesh.nodes[mesh.beams[:, 0::2]]
+    lattice = lattice_of(graded.printed)
+    # Beams between joints, where no rigid zone takes a part.
+    away = cKDTree(lattice.nodes).query(ends.reshape(-1, 3))[0].reshape(-1, 2).min(axis=1)
+    inner = away > 1e-6
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    area = length[inner] / mesh.flexible[inner, 0]
+    area /= np.where((ends[inner, :, 0] == 0.0).all(axis=1), 0.5, 1.0)
+    wanted = math.pi * (0.5 * graded.printed.midspan_diameter) ** 2
+    factor = np.sqrt(area / wanted)
+    field = graded.printed.grading.at(ends[inner].mean(axis=1))
+    assert np.ptp(field) > 0.4
+    assert factor == pytest.approx(field, rel=0.05), "the field is sampled at joints"
+
+
+@pytest.mark.nightly("test_graded_struts_are_beams_of_their_own_sections")
+def test_a_graded_unit_bends_as_its_solid_struts_do(graded, folder):
+    angles = [
+        bent(graded, mesh_printed(graded, MeshSettings(fidelity=f, refine=0.5), cache=folder))[0]
+        for f in (RESOLVED, SOLID)
+    ]
+    assert angles[0] == pytest.approx(angles[1], rel=0.03)
+
+
+def test_candidates_share_the_layers_of_their_mesh(unit, meshes, sensed):
+    lattice = lattice_of(unit.printed)
+    mesh = meshes("half")
+    assert graph_layers_of(mesh, lattice) is graph_layers_of(mesh, lattice)
+    path = np.array([[0.0, 25.0, 12.5 * (k + 0.5)] for k in range(3)])
+    anew = with_waveguide(attrs.evolve(mesh), bar_of(unit, path), unit)
+    assert anew.hash() == sensed["half"].hash()
 
 
 def test_a_rigid_motion_strains_no_beam_and_carries_its_nodes(meshes):
