@@ -168,16 +168,18 @@ def with_waveguide(
 ) -> Any:
     """The lattice united with its waveguide, before wells and pockets are cut, as a Manifold in mm.
 
-    Struts that the bar replaces are left out of `bare`, the lattice's solid; those that meet it are thickened
-    (`strut_radii`). offset (3,): outward move of all surfaces along x, y and z in mm.
+    Struts that the bar replaces, and nodes that no other struts meet at, are left out of `bare`, the
+    lattice's solid; struts that meet it are thickened (`strut_radii`). offset (3,): outward move of all surfaces along x, y and z in mm.
     """
     from manifold3d import Manifold, OpType
 
     t = np.linspace(0.0, 1.0, facets.along_strut + 1)
     radii = strut_radii(lattice, bar.met, bar.half, t)
     raised = (radii > lattice.radii(t) + 1e-9).any(axis=1) & ~bar.replaced
+    standing = np.zeros(len(lattice.grid), bool)
+    standing[lattice.struts[~bar.replaced]] = True
     if (bar.replaced | raised).any():
-        bare = lattice_solid(d, lattice, facets, offset, bar.replaced | raised)
+        bare = lattice_solid(d, lattice, facets, offset, bar.replaced | raised, ~standing)
     parts = [bare, bar.solid(offset)]
     if raised.any():
         thicker = [
@@ -186,7 +188,7 @@ def with_waveguide(
         ]
         ball = shapes.ball(bar.half, facets.around_strut, offset)
         met = np.unique(lattice.struts[bar.met])
-        thicker += [ball.translate(node.tolist()) for node in lattice.nodes[met]]
+        thicker += [ball.translate(node.tolist()) for node in lattice.nodes[met[standing[met]]]]
         parts.append(Manifold.batch_boolean(thicker, OpType.Add) ^ _envelope(d, offset))
     united = Manifold.batch_boolean(parts, OpType.Add)
     united.num_tri()  # manifold3d evaluates lazily; without this each use would unite it again
@@ -204,15 +206,18 @@ def lattice_solid(
     facets: Facets,
     offset: NDArray[np.float64] | None = None,
     without: NDArray[np.bool_] | None = None,
+    gone: NDArray[np.bool_] | None = None,
 ) -> Any:
     """Bare lattice as a Manifold in mm: a ball at each node, a strut along each edge, cut to the envelope.
 
-    offset (3,): outward move of its surfaces along x, y and z in mm; without (E,): marks struts to leave out.
+    offset (3,): outward move of its surfaces along x, y and z in mm; without (E,) and gone (N,): mark struts
+    and nodes to leave out.
     """
     from manifold3d import Manifold, OpType
 
+    gone = np.zeros(len(lattice.grid), bool) if gone is None else gone
     if lattice.factors is not None:
-        return _graded_solid(d, lattice, facets, offset, without)
+        return _graded_solid(d, lattice, facets, offset, without, gone)
     kind, step = lattice.kind, d.cell / lattice.kind.divisions
     radii = lattice.radius(np.linspace(0.0, 1.0, facets.along_strut + 1))
     ball = shapes.ball(float(radii[0]), facets.around_strut, offset)
@@ -230,7 +235,8 @@ def lattice_solid(
     balls = [placed(ball, node) for node in kind.grid[kind.inside]]
     whole = [*balls, *(placed(strut(ends), ends[0]) for ends in inner)]
     cell = Manifold.batch_boolean(whole, OpType.Add) if whole else None
-    nodes = lattice.grid[~lattice.inside]
+    nodes = lattice.grid[~lattice.inside & ~gone]
+    bare = {tuple(node) for node in lattice.grid[gone].tolist()}
     faces = lattice.grid[lattice.struts[lattice.on_face]]
     faces = faces[[_ends(ends) not in left_out for ends in faces]] if left_out else faces
     low, top = lattice.cells[0, 2], lattice.cells[0, 2] + d.count * up
@@ -242,7 +248,9 @@ def lattice_solid(
             if len(kept) == len(inner):
                 found.append(placed(cell, at))
             else:
-                parts = [*balls, *(placed(strut(ends), ends[0]) for ends in kept)]
+                own = kind.grid[kind.inside]
+                parts = [placed(ball, node) for node in own if tuple((at + node).tolist()) not in bare]
+                parts += [placed(strut(ends), ends[0]) for ends in kept]
                 found.append(placed(Manifold.batch_boolean(parts, OpType.Add), at))
         found += [placed(ball, node) for node in nodes if floor <= node[2] < floor + up]
         found += [placed(strut(ends), ends[0]) for ends in faces if floor <= ends[:, 2].min() < floor + up]
@@ -266,6 +274,7 @@ def _graded_solid(
     facets: Facets,
     offset: NDArray[np.float64] | None,
     without: NDArray[np.bool_] | None,
+    gone: NDArray[np.bool_],
 ) -> Any:
     """`lattice_solid` of graded struts: a half, strut by strut, and its mirror image across x = 0."""
     from manifold3d import Manifold, OpType
@@ -284,7 +293,7 @@ def _graded_solid(
         (low[n, 2], shapes.spindle(way[n], radii, facets.around_strut, offset).translate(low[n].tolist()))
         for n, radii in enumerate(lattice.radii(t, chosen))
     ]
-    at = nodes[:, 0] > -slack if half else np.ones(len(nodes), bool)
+    at = ~gone & (nodes[:, 0] > -slack if half else True)
     parts += [
         (node[2], shapes.ball(float(radius), facets.around_strut, offset).translate(node.tolist()))
         for node, radius in zip(nodes[at], lattice.node_radii[at], strict=True)

@@ -283,6 +283,8 @@ def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
     past_nodes = waveguide(unit, p[:3])
     assert (past_nodes.replaced == bar.replaced).all()
     assert past_nodes.loops == 0
+    # Balls of the struts that it replaces are wider than the bar: they go with them, or wells would cut them.
+    assert solids.build_solid(unit.evolve(count=3), windows(3)[0]).bar is not None
     assert [well.centre[2] - p[0, 2] for well in bar.wells] == pytest.approx(
         [3.125, 6.25, 9.375, 15.625, 18.75, 21.875]
     )

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import Unit
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
@@ -53,6 +54,20 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
     assert not warm.step(), "nothing more was asked for"
     above, _ = answered(warm, 3, thicker, 12.0)
     assert max(above) == 12.0, "beyond the protocol's pressures"
+
+
+def test_a_lattice_of_another_kind_bends_too(tmp_path):
+    """Its cell is meshed once: a thicker wall moves the mesh."""
+    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
+    register(LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant))
+    bending, unit = LiveBending(tmp_path), UNIT.evolve(kind="cross", seats=False)
+    first, motion = answered(bending, 1, unit, 10.0)
+    assert len(motion.mesh.beams) > 0
+    cells = sorted((tmp_path / requests.CELLS).iterdir())
+    second, moved = answered(bending, 2, unit.evolve(wall_mm=1.1), 10.0)
+    assert 0.0 < second[10.0] < first[10.0]
+    assert (moved.mesh.tets == motion.mesh.tets).all()
+    assert sorted((tmp_path / requests.CELLS).iterdir()) == cells != []
 
 
 @pytest.mark.nightly("test_a_wall_from_the_design_before_bends_as_one_meshed_anew")

@@ -15,7 +15,6 @@ import attrs
 from ...errors import InputError
 from ...files import write_json
 from ...meshing.settings import RESOLVED, MeshSettings
-from ...resolved.strut import is_half_diagonal
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs
 from ...toml_writer import toml_text
@@ -23,8 +22,10 @@ from ..simulate_and_place.job import Job as Study
 from ..simulate_and_place.job import write_study
 
 REQUEST, BENT, ASKED = "request.json", "bent.json", "asked"
+CELLS = "cells"
+"""Meshes of lattice cells that are not swept, kept from design to design."""
 LAYOUT = FolderLayout(
-    "live.toml", "# Shapes of a unit while it is designed.", (REQUEST, BENT, ASKED, "shape-*")
+    "live.toml", "# Shapes of a unit while it is designed.", (REQUEST, BENT, ASKED, CELLS, "shape-*")
 )
 LEVELS = ((0.35, 0.09), (0.5, 0.03), (1.0, 0.0))
 """Refinements in their order, and the error of each level's angle as a share of that at a refinement of 1, of
@@ -52,8 +53,6 @@ def trouble_of(study: Study) -> str:
         return "beside obstacles a unit is bent by Simulate only"
     if study.in_time:
         return "a wall with memory is bent by Simulate only"
-    if not is_half_diagonal(study.unit.printed):
-        return "live bending supports body-centred lattices only"
     return ""
 
 

@@ -37,7 +37,7 @@ from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study
 from ..simulate_and_place.job import read_job as read_study
 from ..simulate_and_place.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
-from .requests import ASKED, BENT, LAYOUT, LEVELS, REQUEST, Job, read_job
+from .requests import ASKED, BENT, CELLS, LAYOUT, LEVELS, REQUEST, Job, read_job
 
 Array = np.ndarray[Any, Any]
 
@@ -199,7 +199,8 @@ class LiveBending:
                     model = relocated(drawn.model, mesh)
                     model.load = study.effects.load(unit, mesh, model.device)
                     return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
-        mesh = mesh_of(study.unit, study.mesh_settings(study.mesh), body=study.body)
+        settings = study.mesh_settings(study.mesh)
+        mesh = mesh_of(study.unit, settings, cache=self.folder / CELLS, body=study.body)
         self._look()
         model = study.model(mesh)
         model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]
