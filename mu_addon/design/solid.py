@@ -168,8 +168,9 @@ def with_waveguide(
 ) -> Any:
     """The lattice united with its waveguide, before wells and pockets are cut, as a Manifold in mm.
 
-    Struts that the bar replaces, and nodes that no other struts meet at, are left out of `bare`, the
-    lattice's solid; struts that meet it are thickened (`strut_radii`). offset (3,): outward move of all surfaces along x, y and z in mm.
+    Struts that the bar replaces, and nodes where no others meet, are left out of `bare`, the lattice's solid;
+    those that meet it are thickened (`strut_radii`). offset (3,): outward move of all surfaces along x, y and
+    z in mm.
     """
     from manifold3d import Manifold, OpType
 

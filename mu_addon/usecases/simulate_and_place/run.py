@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...design.anchors import window
+from ...design.anchors import window, windows
+from ...errors import InputError
+from ...resolved.waveguide import bar_of
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .expected import BEST, plan_of
@@ -28,10 +30,13 @@ def simulate_and_place(job: Job, folder: Path, context: RunContext) -> Study:
 def run_stages(study: Study) -> None:
     """Every stage of a study's job, in the order they need each other."""
     job = study.job
-    # An unknown path, or an empty search of the lattice, is found before an hour's work, not after.
+    # What cannot be placed is found before an hour's work, not after.
     path = window(job.unit, job.path) if job.path else None
-    if job.paths == "graph" and "place" in job.stages:
-        chains_within(job)
+    if "place" in job.stages:
+        if job.paths == "graph":
+            chains_within(job)
+        else:
+            _require_a_waveguide(job)
     study.design()
     if path is not None:
         study.design(path)
@@ -55,6 +60,18 @@ def run_stages(study: Study) -> None:
         if job.paths == "graph":
             search_graph(study)
         study.design(window(job.unit, chosen), BEST)
+
+
+def _require_a_waveguide(job: Job) -> None:
+    """Raise the InputError of the first window of anchors if no window fits a waveguide."""
+    refused: list[InputError] = []
+    for one in windows(job.unit.chambers.count):
+        try:
+            bar_of(job.unit, one, job.body)
+            return
+        except InputError as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
