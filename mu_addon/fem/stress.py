@@ -13,6 +13,7 @@ from ..meshing.mesh import TET_EDGES
 from .elements import ReferenceGradients, reference_gradients, shape_functions, tet_quadrature
 from .lattice_law import deformation_gradients, stretches
 from .law_at_points import stress
+from .rotations import rotation
 
 if TYPE_CHECKING:
     from ..meshing.mesh import Mesh
@@ -23,6 +24,10 @@ Array = np.ndarray[Any, Any]
 _CUT_AWAY = 1e-6
 # Poisson's ratio of struts where their resin is not known.
 _INCOMPRESSIBLE = 0.5
+# Share of a quadrature point's volume beyond which it lies in a beam.
+_MOST = 0.5
+# Beams among which the one that a place belongs to is sought.
+_NEAR = 16
 
 
 def cauchy(
@@ -41,7 +46,7 @@ def cauchy(
     everywhere = np.arange(len(mesh.tets))
     F, _ = deformation_gradients(mesh, u, everywhere, reference)
     if len(mesh.beams):
-        F = narrowed(mesh, F, everywhere, materials.small_strain(len(mesh.tets))[1])
+        F = of_sections(mesh, u, F, everywhere, materials.small_strain(len(mesh.tets))[1])
     P = np.zeros_like(F)
     points = F.shape[1]
     remembered = iter(history)
@@ -61,22 +66,65 @@ def cauchy(
     return P @ np.swapaxes(F, -1, -2) / np.linalg.det(F)[..., None, None], F
 
 
-def narrowed(mesh: Mesh, F: Array, elements: Array, poisson: Array) -> Array:
-    """F (e, q, 3, 3) of elements (e,) with the lateral strain that beams' sections leave out.
+def of_sections(mesh: Mesh, u: Array, F: Array, elements: Array, poisson: Array) -> Array:
+    """F (e, q, 3, 3) of elements (e,) under displacements u (n, 3) in mm, with that of beams' sections.
 
-    Sections of beams keep their drawn width; a strut stretched by l along its axis narrows by l^-nu. poisson
-    (e,): nu.
+    Sections keep their drawn width; a strut stretched by l along its axis narrows by l^-nu. Elements that are
+    not swept along a strut have nodes beyond a beam's ends: at points within it F is that of its sections.
+    poisson (e,): nu.
     """
-    rows = np.flatnonzero(~mesh.solid[elements])
+    inside = np.repeat(~mesh.solid[elements][:, None], F.shape[1], axis=1)
+    if mesh.in_beams.size:
+        inside |= mesh.in_beams[elements] > _MOST
+    rows, points = np.nonzero(inside)
     if not len(rows):
         return F
-    ends = mesh.nodes[mesh.beams[mesh.beam_of[elements[rows]]][:, [0, 2]]]
+    found = F.copy()
+    if mesh.in_beams.size:
+        shape = shape_functions(tet_quadrature(mesh.order)[0], mesh.order)[points]
+        places = np.einsum("kn,kni->ki", shape, mesh.nodes[mesh.tets[elements[rows]]])
+        beam = _beam_at(mesh, places)
+        found[rows, points] = _between_sections(mesh, u, beam, places)
+    else:
+        beam = mesh.beam_of[elements[rows]]
+    ends = mesh.nodes[mesh.beams[beam][:, [0, 2]]]
     axis = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
     along = axis[:, :, None] * axis[:, None, :]
-    stretch = np.linalg.norm(np.einsum("eqij,ej->eqi", F[rows], axis), axis=2)
-    lateral = stretch[..., None, None] ** -poisson[rows, None, None, None]
-    found = F.copy()
-    found[rows] = F[rows] @ (along[:, None] + lateral * (np.eye(3) - along)[:, None])
+    stretch = np.linalg.norm(np.einsum("kij,kj->ki", found[rows, points], axis), axis=1)
+    lateral = stretch[:, None, None] ** -poisson[rows, None, None]
+    found[rows, points] = found[rows, points] @ (along + lateral * (np.eye(3) - along))
+    return found
+
+
+def _beam_at(mesh: Mesh, places: Array) -> Array:
+    """Beam (k,) nearest to places (k, 3) in mm."""
+    from scipy.spatial import cKDTree
+
+    ends = mesh.nodes[mesh.beams[:, 0::2]]
+    near = cKDTree(ends.mean(axis=1)).query(places, min(_NEAR, len(ends)))[1].reshape(len(places), -1)
+    start, way = ends[near, 0], ends[near, 1] - ends[near, 0]
+    off = places[:, None] - start
+    t = np.clip((off * way).sum(axis=2) / (way**2).sum(axis=2), 0.0, 1.0)
+    away = np.linalg.norm(off - t[..., None] * way, axis=2)
+    return np.asarray(near[np.arange(len(near)), away.argmin(axis=1)])
+
+
+def _between_sections(mesh: Mesh, u: Array, beam: Array, places: Array) -> Array:
+    """F (k, 3, 3) at places (k, 3) in mm of beams (k,): of the motion that `Carried` gives to nodes there."""
+    nodes = mesh.beams[beam]
+    ends, moved = mesh.nodes[nodes[:, 0::2]], u[nodes[:, 0::2]]
+    turned = rotation(u[nodes[:, 1::2]]) - np.eye(3)
+    way = ends[:, 1] - ends[:, 0]
+    slope = way / (way**2).sum(axis=1)[:, None]
+    t = np.clip(((places - ends[:, 0]) * slope).sum(axis=1), 0.0, 1.0)[:, None]
+    # Arms are shorter by half the other section's share of the way to it.
+    by_place = np.eye(3) - 0.5 * way[:, :, None] * slope[:, None, :]
+    found = np.broadcast_to(np.eye(3), (len(beam), 3, 3)).copy()
+    for end, share, sign in ((0, 1.0 - t, -1.0), (1, t, 1.0)):
+        arm = places - ends[:, end] + 0.5 * (1.0 - share) * sign * way
+        found += share[..., None] * (turned[:, end] @ by_place)
+        at = np.einsum("kij,kj->ki", turned[:, end], arm) + moved[:, end]
+        found += sign * at[:, :, None] * slope[:, None, :]
     return found
 
 
@@ -113,7 +161,7 @@ def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
     elements = np.flatnonzero(mesh.region == region)
     F, volumes = deformation_gradients(mesh, u, elements)
     if len(mesh.beams):
-        F = narrowed(mesh, F, elements, np.full(len(elements), _INCOMPRESSIBLE))
+        F = of_sections(mesh, u, F, elements, np.full(len(elements), _INCOMPRESSIBLE))
     largest = stretches(F)[..., 2]
     if mesh.resolved:
         share = mesh.filled[elements]
