@@ -89,6 +89,14 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
         else:
             found = graph_layers_of(mesh, lattice_of(d)).without(found, touched)
         within[found.carried] = False
+        # Sections that no beam uses any more follow the bar or the struts: anchors may be among them.
+        unused = np.setdiff1d(mesh.beams[:, 0::2], np.union1d(found.beams, found.tets))
+        inside = away[unused] <= 0
+        within[unused[inside]] = True
+        unused = unused[~inside]
+        if len(unused):
+            follows = tie(unused, found.nodes[unused], part(found, struts))
+            wall_ties = joined([wall_ties, follows], len(found.nodes))
 
     actuator: list[Depth] = [lambda points: clearance(d, points)]
     own = bar_mesh(bar, half, actuator)

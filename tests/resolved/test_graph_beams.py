@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from mu_addon.design.anchors import anchor_points
 from mu_addon.design.grading import Grading
 from mu_addon.design.lattice import filled, lattice_of
 from mu_addon.design.lattice_kinds import BODY_CENTRED, LatticeKind, constant, register
@@ -287,7 +288,7 @@ def test_what_a_beam_takes_is_what_solids_no_longer_resist(unit, meshes):
     assert halved.any()
 
 
-def test_struts_that_a_waveguide_meets_are_solid_again(meshes, sensed):
+def test_struts_that_a_waveguide_meets_are_solid_again(unit, meshes, sensed):
     """Where bar and struts are as wide the joint is whole again: nothing is missing, nothing doubled."""
     plain, found, by_solids = meshes("half"), sensed["half"], sensed["solid"]
     assert 0 < len(found.beams) < len(plain.beams)
@@ -298,3 +299,10 @@ def test_struts_that_a_waveguide_meets_are_solid_again(meshes, sensed):
     assert (found.resisting[:own][apart] == by_solids.filled[:own][apart]).all()
     assert (found.filled[:own] == by_solids.filled[:own]).all()
     assert not np.isin(found.tied, found.carried).any()
+    # Sections without beams follow what lies around them: anchors are among them.
+    unused = np.setdiff1d(plain.beams[:, 0::2], found.beams)
+    assert cKDTree(found.nodes[unused]).query(anchor_points(unit))[0].max() < 1e-9
+    moved = found.nodes @ np.random.default_rng(0).standard_normal((3, 3))
+    wanted = moved[unused].copy()
+    moved[unused] = 0.0
+    np.testing.assert_allclose(found.following(moved)[unused], wanted, atol=1e-9)
