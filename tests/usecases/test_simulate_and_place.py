@@ -13,7 +13,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
@@ -350,7 +350,8 @@ def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its
 
 def test_a_lattice_that_holds_no_waveguide_is_refused_before_anything_is_made(tmp_path):
     register(octet())
-    job = attrs.evolve(JOB, unit=JOB.unit.evolve(kind="octet", seats=False), mesh=MeshSettings(refine=0.5))
+    mesh = MeshSettings(refine=0.5, fidelity=RESOLVED)
+    job = attrs.evolve(JOB, unit=JOB.unit.evolve(kind="octet", seats=False), mesh=mesh)
     with run_to_end(Progress([])) as context, pytest.raises(InputError, match="no node at the cell's centre"):
         run_stages(Study.open(job, tmp_path, context))
     assert not (tmp_path / "unit.stl").exists()
