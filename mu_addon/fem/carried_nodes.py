@@ -61,8 +61,20 @@ class Carried:
 
     def _by_axis(self, u: Array) -> Array:
         """Slopes (k, 3, 3, 3) of each pair's three turned axes, its second index, by its rotation vector."""
-        by_axis = np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
-        return np.asarray(by_axis[self._of])
+        return np.asarray(self._by_turn(u)[self._of])
+
+    def _by_turn(self, u: Array) -> Array:
+        """Slopes (t, 3, 3, 3) of each turning section's axes, as `_by_axis` has them."""
+        return np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
+
+    def _moments(self, forces: Array) -> Array:
+        """Sums (t, 3, 3) in N mm, over what a section carries, of arms by axis times forces (n, 3) in N."""
+        acting = self._share[:, None] * forces[self.nodes[self._own]]
+        found = np.empty((len(self._turns), 3, 3))
+        for axis, i in np.ndindex(3, 3):
+            lever = self._arm[:, axis] * acting[:, i]
+            found[:, axis, i] = np.bincount(self._of, lever, len(self._turns))
+        return found
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array:
         """Derivative (n, 3) by all nodes' places of forces (n, 3) times what carried nodes are given.
@@ -88,11 +100,11 @@ class Carried:
 
     def fold(self, u: Array, forces: Array) -> Array:
         """Forces (n, 3) in N with those on carried nodes passed on to beams, in place; couples in N mm."""
-        acting = forces[self.nodes[self._own]]
-        couples = np.einsum("kji,kj->ki", self.slopes(u), acting)
-        for rows, values in ((self._node, self._share[:, None] * acting), (self._turn, couples)):
-            for axis in range(3):
-                forces[:, axis] += np.bincount(rows, values[:, axis], len(forces))
+        # Summed by section first: there are sixty times as many pairs.
+        forces[self._turns] += np.einsum("tiaj,tai->tj", self._by_turn(u), self._moments(forces))
+        acting = self._share[:, None] * forces[self.nodes[self._own]]
+        for axis in range(3):
+            forces[:, axis] += np.bincount(self._node, acting[:, axis], len(forces))
         forces[self.nodes] = 0.0
         return forces
 
@@ -103,12 +115,10 @@ class Carried:
         their arms rotate. convex: each without its negative eigenvalues, since contact on both sides of a
         strut otherwise turns it over, and on the way to equilibrium its forces are far larger than there.
         """
-        acting = self._share[:, None] * forces[self.nodes[self._own]]
+        moments = self._moments(forces)
         found = np.zeros((len(self._turns), 3, 3))
         for axis, arm in enumerate(self._axes()):
-            lever = self._arm[:, axis]
-            total = [np.bincount(self._of, acting[:, i] * lever, len(self._turns)) for i in range(3)]
-            found += turned_curvature(u[self._turns], arm, np.column_stack(total))
+            found += turned_curvature(u[self._turns], arm, moments[:, axis])
         if convex:
             values, axes = np.linalg.eigh(found)
             found = (axes * np.maximum(values, 0.0)[:, None, :]) @ axes.transpose(0, 2, 1)

@@ -183,7 +183,7 @@ class Equilibrium:
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
         touches = self.model.has_convex_tangent
-        factorisations, stale, definite, convex, added = 0, not factored, True, False, 0
+        factorisations, stale, definite, convex, added, steps = 0, not factored, True, False, 0, 0
         for iteration in range(s.max_iterations + 1):
             if search.converged:
                 exact = definite and not convex
@@ -207,12 +207,15 @@ class Equilibrium:
                 definite, added = self._factorise(search.u, pressure, convex, max(added - 1, 0))
                 factorisations += 1
                 search.forget()
+                steps = 0
             try:
                 shrunk = search.move(search.direction(self.factor.solve))
             except IndefiniteError:
                 # Iterative solvers may detect it only here.
                 raise ConvergenceError("the tangent is not definite") from None
-            stale = not definite or shrunk > s.keep_factor
+            steps += 1
+            slow = s.keep_factor if definite else 1.0
+            stale = shrunk > slow or (not definite and steps == s.indefinite_steps)
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")
 
     def reach(self, target: float, history: Sequence[State]) -> State:

@@ -19,6 +19,9 @@ class NewtonSettings:
     # A factor is kept while each step with it shrinks the residual by at least this much: at 50k unknowns
     # a factorisation costs as much as eight steps.
     keep_factor: float = 0.7
+    # Most steps with the factor of an indefinite tangent while the residual shrinks: the undeformed body's
+    # share in it makes them short, and a new factor would need that share again.
+    indefinite_steps: int = 1
     max_step_MPa: float = 0.01
     max_suction_step_MPa: float = float("inf")  # below 0 MPa besides, where a body closes and its walls touch
     min_step_MPa: float = 1e-4
@@ -58,7 +61,12 @@ RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step
 
 # A body that closes ends far from its prediction, and steps that touch cut short are many.
 SELF_CONTACT_NEWTON = NewtonSettings(
-    keep_factor=0.8, max_factorisations=80, max_iterations=200, max_backtracks=12, predictor_tolerance=3.0
+    keep_factor=0.8,
+    indefinite_steps=8,
+    max_factorisations=80,
+    max_iterations=200,
+    max_backtracks=12,
+    predictor_tolerance=3.0,
 )
 
 RESOLVED_CONTACT_NEWTON: NewtonSettings = attrs.evolve(
