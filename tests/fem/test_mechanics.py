@@ -179,7 +179,7 @@ def test_the_factor_of_an_indefinite_tangent_serves_several_steps():
     found = []
     for steps in (1, SELF_CONTACT_NEWTON.indefinite_steps):
         settings = attrs.evolve(SELF_CONTACT_NEWTON, indefinite_steps=steps)
-        equilibrium = Equilibrium(Model(mesh, threads=1), uniform(mesh, E, 0.3), settings, explains=False)
+        equilibrium = Equilibrium(Model(mesh, threads=1), uniform(mesh, E, 0.3), settings)
         found.append(equilibrium.newton(start, 0.0))
         assert np.abs(found[-1].u).max() < 1e-9
     assert 3 * found[1].factorisations < found[0].factorisations
