@@ -214,8 +214,7 @@ class Equilibrium:
                 # Iterative solvers may detect it only here.
                 raise ConvergenceError("the tangent is not definite") from None
             steps += 1
-            slow = s.keep_factor if definite else 1.0
-            stale = shrunk > slow or (not definite and steps == s.indefinite_steps)
+            stale = shrunk > s.keep_factor if definite else steps == s.indefinite_steps
         raise ConvergenceError(f"no convergence with {factorisations} factorisations")
 
     def reach(self, target: float, history: Sequence[State]) -> State:

@@ -19,8 +19,8 @@ class NewtonSettings:
     # A factor is kept while each step with it shrinks the residual by at least this much: at 50k unknowns
     # a factorisation costs as much as eight steps.
     keep_factor: float = 0.7
-    # Most steps with the factor of an indefinite tangent while the residual shrinks: the undeformed body's
-    # share in it makes them short, and a new factor would need that share again.
+    # Steps with the factor of an indefinite tangent: the undeformed body's share in it makes them short, and
+    # a new factor would need that share again.
     indefinite_steps: int = 1
     max_step_MPa: float = 0.01
     max_suction_step_MPa: float = float("inf")  # below 0 MPa besides, where a body closes and its walls touch
