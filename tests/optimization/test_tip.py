@@ -49,20 +49,23 @@ def solved(level):
     return body, asked, states, {q.name: q.value(body.structure, states) for q in asked}
 
 
+ALL_FREEDOMS = pytest.mark.nightly("test_slopes_are_those_of_full_solutions_on_morphed_meshes")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "level",
+    ("level", "free"),
     [
-        pytest.param(
-            False, marks=pytest.mark.nightly("test_slopes_are_those_of_full_solutions_on_morphed_meshes")
-        ),
-        True,
+        (True, FREE[:1]),
+        pytest.param(True, FREE[1:], marks=ALL_FREEDOMS),
+        pytest.param(False, FREE, marks=ALL_FREEDOMS),
     ],
+    ids=["wall with weight", "moduli and scale with weight", "without weight"],
 )
-def test_slopes_are_those_of_full_solutions_on_morphed_meshes(level):
+def test_slopes_are_those_of_full_solutions_on_morphed_meshes(level, free):
     body, asked, states, values = solved(level)
-    found = gradients(body.structure, states, asked, body.pairs(FREE))
-    for f, freedom in enumerate(FREE):
+    found = gradients(body.structure, states, asked, body.pairs(free))
+    for f, freedom in enumerate(free):
         value = freedom.value_of(UNIT)
         sides = []
         for end in (1.0005 * value, 0.9995 * value):
