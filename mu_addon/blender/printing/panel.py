@@ -180,7 +180,8 @@ def _directions(layout, settings, found) -> None:
         button = row.operator("mu.print_up", text="Chosen" if same else "Use", depress=same)
         button.direction = build["direction"]
         column = box.column(align=True)
-        column.label(text=f"{build['islands']} islands, cups of {_ml(build['cup_ml'])}")
+        cups = _ml(build["cup_ml"])
+        column.label(text=f"{build['islands']} islands, cups {cups if 'below' in cups else f'of {cups}'}")
         column.label(text=f"{build['support_mm2']:.0f} mm² to support, {build['inner_mm2']:.0f} in chambers")
 
 
@@ -289,7 +290,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             wrapped(layout, "Beams and STEP keep their nominal size", "INFO")
         layout.prop(settings, "vents")
         if settings.vents:
-            wrapped(layout, f"For the build direction Up: {direction_words(settings.up)}", "INFO")
+            wrapped(layout, f"Build direction: {direction_words(settings.up)}", "INFO")
             if settings.formats & {"3mf-beams", "step"}:
                 wrapped(layout, "Beams and STEP have no vents", "INFO")
         path = root.mu_unit.path

@@ -130,14 +130,17 @@ def parameter(column, root, section: str, d: Description) -> None:
     if value is not None:
         right = row.row(align=True)
         right.alert = False
+        # Half as wide as the field, so that the field's unit is not cut: "2.25 m" would be metres.
+        right.scale_x = 0.6
         fix_button(right, root, section, d.name, value, found.text, short=True)
 
 
 def fix_button(layout, root, section: str, name: str, value, why: str, short: bool = False) -> None:
-    """Draw a button that sets a parameter to a valid value: "Neck Ø 24 mm", or short "24 mm"."""
+    """Draw a button that sets a parameter to a valid value: "Neck Ø 24 mm", or "→ 24" beside its field."""
     d = description(section, name)
     shown = shown_value(getattr(root.mu_unit, section), d, value)
-    button = layout.operator("mu.fit", text=shown if short else f"{label(d)} {shown}")
+    text = f"→ {shown.removesuffix(' mm')}" if short else f"{label(d)} {shown}"
+    button = layout.operator("mu.fit", text=text)
     button.section, button.name, button.why = section, name, why
 
 

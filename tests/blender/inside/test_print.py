@@ -148,9 +148,10 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
             finding("thinnest solid", "error", places, 0.2, 0.4, "mm", remedy="thicken it"),
             finding("not examined", "info", value=float("nan")),
         ],
-        builds=[build],
+        builds=[build, {**build, "islands": 3, "cup_ml": 0.0004}],
     )
     texts = drawn()
+    assert "3 islands, cups below 0.01 ml" in texts
     assert texts.index("Thinnest solid  (2):  0.2 / 0.4 mm") < texts.index("Bridge:  21.4 / 21 mm")
     assert "1 error(s): export asks first" in texts
     assert "7 islands, cups of 0.25 ml" in texts
@@ -305,13 +306,13 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     root = short()
     settings = root.mu_print
     settings.formats, settings.quality = {"stl"}, "interactive"
-    assert "For the build direction Up" not in drawn()
+    assert "Build direction:" not in drawn()
     settings.vents = True
     settings.up = (0.0, 0.0, 0.0)
-    assert "Up: none is set" in drawn().replace("  ", " ")
+    assert "Build direction: none is set" in drawn().replace("  ", " ")
     assert "Up is not a direction" in refused(bpy.ops.mu.print_export)
     settings.up = (0.0, 0.0, -1.0)
-    assert "For the build direction Up: upside down" in drawn().replace("  ", " ")
+    assert "Build direction: upside down" in drawn().replace("  ", " ")
     assert "have no vents" not in drawn()
     settings.formats = {"stl", "step"}
     assert "STEP have no vents" in drawn()
