@@ -46,7 +46,32 @@ def cavity_radius(d: Dimensions, z: ArrayLike) -> Array:
     >>> cavity_radius(load_preset("mu-1.0x").dimensions, 6.25).round(6).tolist()
     11.6
     """
-    return _inner(d, _foot(d, np.asarray(z, dtype=float)))[0]
+    return under_profile(d, foot(d, z))[..., 0]
+
+
+def under_profile(d: Dimensions, s: Array, share: ArrayLike = 1.0) -> Array:
+    """Points (..., 2), (radius, z) in mm, a share of the wall below the outer profile, along its normal.
+
+    s (any shape): heights on the profile in mm; share (of its shape, or a number): 0 on the profile, 1 on the
+    cavity.
+    """
+    radius, slope, _ = _outer(d, s)
+    depth = np.asarray(share) * d.wall_at(s)[0] / np.hypot(1.0, slope)
+    return np.stack([radius - depth, s + depth * slope], axis=-1)
+
+
+def foot(d: Dimensions, z: ArrayLike) -> Array:
+    """Heights (any shape) in mm on the outer profile whose normals meet the cavity at heights z in mm.
+
+    By bisection: the cavity rises along the profile where the wall fits.
+    """
+    z = np.asarray(z, dtype=float)
+    low, high = z - d.thickest_wall, z + d.thickest_wall
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        beyond = under_profile(d, middle)[..., 1] > z
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.asarray((low + high) / 2.0)
 
 
 def outer_arcs(d: Dimensions) -> list[Array]:
@@ -103,12 +128,12 @@ def cavity_polygon(d: Dimensions, per_arc: int, offset: Array | None = None) -> 
     """
     low, high = d.base_cap, d.height - d.tip_cap
     if offset is None:
-        ends = _foot(d, np.array([low, high]))
+        ends = foot(d, np.array([low, high]))
         radius, z, _ = _inner(d, _samples(d, ends[0], ends[1], per_arc))
         z[[0, -1]] = low, high
         return _closed(np.stack([radius, z], axis=1))
     room = 3.0 * np.abs(offset).max()
-    ends = _foot(d, np.array([low - room, high + room]))
+    ends = foot(d, np.array([low - room, high + room]))
     s = _samples(d, ends[0], ends[1], per_arc)
     radius, z, _ = _inner(d, s)
     curve = np.stack([radius, z], axis=1) - _moves(d, s, offset)
@@ -132,7 +157,7 @@ def cavity_volume(d: Dimensions) -> float:
     >>> round(cavity_volume(load_preset("mu-1.0x").dimensions))
     16183
     """
-    ends = _foot(d, np.array([d.base_cap, d.height - d.tip_cap]))
+    ends = foot(d, np.array([d.base_cap, d.height - d.tip_cap]))
     knots = np.unique(np.clip(_knots(d), ends[0], ends[1]))
     x, weight = np.polynomial.legendre.leggauss(32)
     half = np.diff(knots)[:, None] / 2.0
@@ -170,12 +195,13 @@ def _outer(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
 
 def _inner(d: Dimensions, s: Array) -> tuple[Array, Array, Array]:
     """Offset point (radius, z) of the outer point at height s, and dz/ds."""
-    radius, slope, bend = _outer(d, s)
+    _, slope, bend = _outer(d, s)
     wall, change = d.wall_at(s)
-    length = np.sqrt(1.0 + slope**2)
+    length = np.hypot(1.0, slope)
     # 1 - wall * curvature, plus a term for a wall that changes along the profile.
     stretch = 1.0 + wall * bend / length**3 + change * slope / length
-    return radius - wall / length, s + wall * slope / length, stretch
+    point = under_profile(d, s)
+    return point[..., 0], point[..., 1], stretch
 
 
 def _inner_tangent(d: Dimensions, s: Array) -> Array:
@@ -187,16 +213,6 @@ def _inner_tangent(d: Dimensions, s: Array) -> Array:
     # A wall that does not change leaves the cavity parallel to the profile.
     leans = (slope * along - change / length) / (along + change * slope / length) if change.any() else slope
     return np.stack([leans, np.ones_like(leans)], axis=1)
-
-
-def _foot(d: Dimensions, z: Array) -> Array:
-    """Height s on the outer profile whose offset lies at z, by bisection: dz/ds > 0 where the wall fits."""
-    low, high = z - d.thickest_wall, z + d.thickest_wall
-    for _ in range(60):
-        middle = (low + high) / 2.0
-        beyond = _inner(d, middle)[1] > z
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return (low + high) / 2.0
 
 
 def _knots(d: Dimensions) -> Array:
@@ -264,7 +280,7 @@ def _splits(d: Dimensions) -> int:
         # Of chambers that are alike the other quarters are mirror images.
         first = np.array(arcs if d.wall_factors else arcs[: 2 * splits])
         points = _bezier(first, t)
-        s = _foot(d, points[..., 1])
+        s = foot(d, points[..., 1])
         off = np.abs(points[..., 0] - _inner(d, s)[0]) / np.sqrt(1.0 + _outer(d, s)[1] ** 2)
         rising = (np.diff(first[..., 1], axis=1) >= 0.0).all()  # else the arc folds, near the thickest wall
         if off.max() < OFFSET_TOLERANCE and rising:

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
-from ..design.profile import outer_radius, outer_slope
+from ..design.profile import foot, outer_radius, outer_slope, under_profile
 from ..errors import InputError, MeshingError
 from .mesh import Array, boundary_faces, edges_of, oriented
 from .settings import CELL_MM, MeshSettings
@@ -43,14 +43,14 @@ class Meridian:
     def of(cls, d: Dimensions) -> Meridian:
         """The meridian of a unit's dimensions; raises InputError where the caps leave no cavity."""
         top = d.height
-        cuts = _foot(d, d.base_cap), _foot(d, top - d.tip_cap)
-        if not 0 < cuts[0] < cuts[1] < top:
+        low, high = foot(d, [d.base_cap, top - d.tip_cap]).tolist()
+        if not 0 < low < high < top:
             raise InputError(
                 "the end caps leave no cavity",
                 f"base cap {d.base_cap:g} mm and tip cap {d.tip_cap:g} mm of {top:g} mm",
                 "make the caps thinner than a chamber and thicker than the wall is steep there",
             )
-        return cls(d, cuts)
+        return cls(d, (low, high))
 
     def point(self, p: Array, q: Array) -> Array:
         """Points (n, 2) of the solid, (radius, z) in mm, at coordinates p in mm and q, (n,) each."""
@@ -64,7 +64,7 @@ class Meridian:
             # The core's flank follows the profile, from the cavity's rim to about half a cap inside the
             # end's edge: a straight one would cross a neck's profile under a thick cap.
             edge = outer_radius(d, np.array([end, cut]))
-            rim = under_profile(d, np.array([cut]), np.array([1.0]))[0, 0]
+            rim = under_profile(d, np.array([cut]))[0, 0]
             wall = float(d.wall_at(end)[0])
             widths = min(max(wall, 0.5 * abs(cap)), 0.5 * edge[0]), edge[1] - rim
             width = widths[0] + share * (widths[1] - widths[0])
@@ -73,26 +73,6 @@ class Meridian:
             ring = profile + np.minimum(depth, 1.0) * (flank - profile)
             found[in_cap] = np.where(depth > 1.0, flank + (depth - 1.0) * (axis - flank), ring)
         return found
-
-
-def under_profile(d: Dimensions, p: Array, q: Array) -> Array:
-    """Points (n, 2), (radius, z) in mm, a share q of the wall below the profile along its normal at p.
-
-    p (n,): heights on the profile in mm; q (n,) or a number: 0 on the profile, 1 on the cavity.
-    """
-    slope = outer_slope(d, p)
-    depth = q * d.wall_at(p)[0] / np.hypot(1.0, slope)
-    return np.column_stack([outer_radius(d, p) - depth, p + depth * slope])
-
-
-def _foot(d: Dimensions, z: float) -> float:
-    """Height on the profile whose normal meets the cavity at height z, by bisection."""
-    low, high = z - d.thickest_wall, z + d.thickest_wall
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        below = under_profile(d, np.array([middle]), np.array([1.0]))[0, 1] < z
-        low, high = (middle, high) if below else (low, middle)
-    return 0.5 * (low + high)
 
 
 def stations(meridian: Meridian, edge_mm: float) -> Array:
