@@ -29,7 +29,7 @@ from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.homogenize.stress_strain_curve import modulus
 from mu_addon.materials.library import load_material
-from mu_addon.report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
+from mu_addon.report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 
 SCALES = (0.75, 1.0, 1.5)
 MEASURED_kPa = (21.70, 18.34, 16.38)

@@ -23,7 +23,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     """Study job from the options; raises InputError."""
     from ..fem.device import require_device
-    from ..meshing.settings import MeshSettings, printed
+    from ..meshing.settings import MeshSettings, fidelity_of
     from ..placement.graph import Limits
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
@@ -35,7 +35,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit, effects = modelled(options, context)
         extra = {
             "effects": effects,
-            "mesh": MeshSettings(refine=options.refine, fidelity=printed(options.solid_struts)),
+            "mesh": MeshSettings(refine=options.refine, fidelity=fidelity_of(options.solid_struts)),
             "self_contact": options.self_contact,
             "self_friction": options.self_friction,
             "times": options.times,

@@ -37,7 +37,7 @@ OF_CONTINUUM = ("material.lattice_modulus_kPa", "material.lattice_poisson")
 """Parameters of a unit that its printed struts do not have: theirs are the resin's."""
 
 
-def printed(solid_struts: bool) -> str:
+def fidelity_of(solid_struts: bool) -> str:
     """Fidelity of a printed body: its whole struts as beams, or all of them as solids."""
     return SOLID if solid_struts else RESOLVED
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .charts import label, signed
+from .plots import label, signed
 from .results import Picture
 
 

@@ -261,7 +261,7 @@ class _Shot:
         """Nearest of the faces `keep` that lie farther than `ceiling` and nearer than `floor`."""
         import warp as wp
 
-        from .raster import View, draw, surface
+        from .raster_kernels import View, draw, surface
 
         scene = self.scene
         shape = self.shape
@@ -329,7 +329,7 @@ class _Shot:
         """Light the colours of `layer`."""
         import warp as wp
 
-        from .raster import shade
+        from .raster_kernels import shade
 
         key = np.array([-0.45, 0.55, 0.70]) @ self.axes
         with wp.ScopedDevice("cpu"):
@@ -374,7 +374,7 @@ class _Sky:
         """The sky occluded by the opaque faces; it is brighter above and behind the viewer."""
         import warp as wp
 
-        from .raster import draw
+        from .raster_kernels import draw
 
         used = scene.vertices[np.unique(scene.faces[opaque])]
         center = 0.5 * (used.min(axis=0) + used.max(axis=0))

@@ -14,7 +14,7 @@ import numpy as np
 import warp as wp
 
 from .guide import Guide, Optics
-from .rays import ABSORBED, DETECTED, FATES, trace_rays
+from .ray_kernel import ABSORBED, DETECTED, FATES, trace_rays
 
 Array = np.ndarray[Any, Any]
 

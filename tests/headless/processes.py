@@ -48,7 +48,7 @@ def homogenised(**more):
     """
     with pytest.MonkeyPatch.context() as patch:
         for module in (settings, orders, grip_job):
-            patch.setattr(module, "printed", lambda solid_struts: HOMOGENISED)
+            patch.setattr(module, "fidelity_of", lambda solid_struts: HOMOGENISED)
         if more:
             patch.setattr(settings, "MeshSettings", lambda **given: MeshSettings(**(given | more)))
         yield

@@ -25,7 +25,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.candidates import Candidate, candidate_paths, roi, with_sensor
 from mu_addon.report.pc2 import read_pc2, write_pc2
 from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
 from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
 from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.motion_files import (

@@ -320,7 +320,7 @@ def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
 
 
 @pytest.mark.nightly(
-    "tests/usecases/test_candidate_states.py::test_where_a_path_leads_elsewhere_every_candidate_is_followed"
+    "tests/usecases/test_candidates_by_pressure.py::test_where_a_path_leads_elsewhere_every_candidate_is_followed"
 )
 def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its_way(tmp_path, monkeypatch):
     unit = load_preset("mu-1.0x")

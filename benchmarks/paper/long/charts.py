@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mu_addon.report.charts import INK, canvas, label, signed
+from mu_addon.report.plots import INK, canvas, label, signed
 from mu_addon.report.results import Path
 
 from ..table.charts import SCALE_STYLE, WIDE, panels

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mu_addon.report.charts import label, signed
 from mu_addon.report.html import figure, table
+from mu_addon.report.plots import label, signed
 
 from ..table.agreement import agreement
 from ..table.published import name_of

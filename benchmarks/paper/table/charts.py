@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mu_addon.report.charts import GRID, INK, QUIET, WIDTH, canvas, label
+from mu_addon.report.plots import GRID, INK, QUIET, WIDTH, canvas, label
 from mu_addon.report.results import Path
 
 from .published import Published

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mu_addon.files import write_text
-from mu_addon.report.charts import label, signed
 from mu_addon.report.html import cards, facts_table, figure, note, page, table
+from mu_addon.report.plots import label, signed
 from mu_addon.run.versions import package_versions
 
 from ..inclusion_rules import RULES

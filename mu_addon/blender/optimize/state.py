@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import bpy
 
-from ...design.nearest_valid import tied
 from ...design.parameters import SECTIONS, Unit, read_unit
 from ...design.quantity import describe
+from ...design.repairs import tied
 from ...errors import InputError, MuError
 from ...meshing.settings import RESOLVED, MeshSettings
 from ...reading import file_bytes, parse_json

@@ -6,9 +6,9 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ...design.nearest_valid import tied
 from ...design.parameters import SECTIONS
 from ...design.quantity import describe
+from ...design.repairs import tied
 from ...design.steps import STEPS, Step, downstream
 from ..shared import updates
 from ..shared.operators import UnitOperator

@@ -8,9 +8,9 @@ from typing import Any
 
 import attrs
 
-from ...design.nearest_valid import Repair, nearest_fit, repairs
 from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
+from ...design.repairs import Repair, nearest_fit, repairs
 from ...errors import InputError, MuError
 from ..shared.wording import in_panel
 from .fields import exact

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...design.nearest_valid import tied
 from ...design.quantity import Description, describe
+from ...design.repairs import tied
 from ..shared import updates
 
 UNITS = ("mm", "kPa", "s")

@@ -6,9 +6,9 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ...design.nearest_valid import tied
 from ...design.parameters import Unit
 from ...design.quantity import describe
+from ...design.repairs import tied
 from ...errors import InputError
 from ..scene import gestures, landing
 from ..shared import scene_units, updates, viewports

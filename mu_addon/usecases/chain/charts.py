@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...meshing.mesh import LATTICE, MEMBRANE
-from ...report import charts as plots
+from ...report import plots
 from ...report.render import Part, fit, png, render
 from ...report.results import Picture
 from ...report.shapes import ball

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...files import write_bytes, write_text
-from ...report.charts import signed
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
+from ...report.plots import signed
 from . import charts
 
 if TYPE_CHECKING:

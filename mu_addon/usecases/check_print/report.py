@@ -18,7 +18,7 @@ from ...design.printing.slices import Slice, even_heights, signed_area, slices
 from ...design.solid import chamber
 from ...design.surface import Triangles, Vertices
 from ...files import write_bytes, write_text
-from ...report import charts as plots
+from ...report import plots
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
 from ...report.render import Floats, Part, fit, png, render
 from ...report.results import Picture

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...evidence.gain_on_unseen import Errors
 from ...evidence.residuals import Dependence
-from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
+from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from .judged_data import Curve
 from .words import readable
 

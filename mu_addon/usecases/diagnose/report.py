@@ -18,8 +18,8 @@ from ...evidence.residuals import CONDITIONS, COVARIATES, FALSE_ALARM
 from ...evidence.scatter import noise_limit
 from ...evidence.sensitivity import best_seen
 from ...files import write_text
-from ...report.charts import CHOSEN, INK, signed
 from ...report.html import cards, facts_table, figure, note, page, table
+from ...report.plots import CHOSEN, INK, signed
 from ...run.context import RunContext
 from ...run.versions import package_versions
 from . import charts as pictures

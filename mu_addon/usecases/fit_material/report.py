@@ -11,8 +11,8 @@ import numpy as np
 
 from ...files import write_text
 from ...materials.fit import FLOOR, POISSON, TOLERANCE
-from ...report.charts import signed
 from ...report.html import cards, facts_table, figure, note, page, table
+from ...report.plots import signed
 from ...run.context import RunContext
 from ...run.versions import package_versions
 from .charts import TITLES, mode_chart, residual_chart

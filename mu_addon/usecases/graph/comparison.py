@@ -17,8 +17,8 @@ from ...files import write_csv
 from ...graph.evaluation import Finished
 from ...materials.library import load_material
 from ...reading import is_number
-from ...report.charts import BY_LENGTH, BY_START, QUIET, canvas
 from ...report.html import figure, number, table
+from ...report.plots import BY_LENGTH, BY_START, QUIET, canvas
 from ..parameter_study.results import figures
 from .orders import Study
 from .parts import Design

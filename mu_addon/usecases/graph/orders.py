@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...measured import Measured
-from ...meshing.settings import MeshSettings, printed
+from ...meshing.settings import MeshSettings, fidelity_of
 from ..check_print.job import Job as CheckJob
 from ..check_print.run import USE_CASE as CHECK
 from ..diagnose.job import Job as DiagnoseJob
@@ -71,7 +71,7 @@ def _simulated(call: Call) -> Job:
     return Job(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
-        mesh=MeshSettings(refine=s["refine"], fidelity=printed(s["solid_struts"])),
+        mesh=MeshSettings(refine=s["refine"], fidelity=fidelity_of(s["solid_struts"])),
         times=s["times"],
         self_contact=s["self_contact"],
         self_friction=s["self_friction"],

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...design.gripper import ROOT, Gripper, GripperSolid
 from ...meshing.mesh import Mesh
-from ...report import charts as plots
+from ...report import plots
 from ...report.render import Camera, Cut, Part, fit, png, render
 from ...report.results import Picture
 from ...report.unit_pictures import COLORS, WHITE, skins_of, unit_parts

@@ -11,7 +11,7 @@ from ...design.gripper import Gripper, read_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
 from ...design.settings import QUALITY
 from ...errors import InputError
-from ...meshing.settings import SELF_CONTACT, MeshSettings, printed, require_self_contact_resolvable
+from ...meshing.settings import SELF_CONTACT, MeshSettings, fidelity_of, require_self_contact_resolvable
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.progress_estimate import Plan
@@ -56,7 +56,7 @@ class Detail:
 def detailed(coarse: bool, refine: float | None = None, solid_struts: bool = False) -> Detail:
     """Detail of a quick look, or of a whole run; refine: replaces its refinement."""
     own = COARSE_REFINE if coarse else REFINE.default
-    mesh = MeshSettings(refine=own if refine is None else refine, fidelity=printed(solid_struts))
+    mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity_of(solid_struts))
     return Detail(mesh, 1.0 if coarse else 0.5)
 
 

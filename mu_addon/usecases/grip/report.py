@@ -10,8 +10,8 @@ import numpy as np
 from ...design.gripper import SECTIONS, GripperSolid
 from ...design.quantity import describe
 from ...files import write_bytes, write_text
-from ...report.charts import label, signed
 from ...report.html import cards, facts_table, figure, note, page, picture_figure, table
+from ...report.plots import label, signed
 from ...report.results import Picture
 from ...run.versions import package_versions
 from . import charts as pictures

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...lab_files.proposal import Proposal
-from ...report import charts
+from ...report import plots
 from ...report.html import facts_table, figure, note, page, table
 from .understood import Understood
 
@@ -110,7 +110,7 @@ def _picture(p: Proposal) -> str:
     pairs = list(dict.fromkeys(pairs))
     if not pairs:
         return ""
-    with charts.canvas(8.8, 2.8) as (drawing, svg):
+    with plots.canvas(8.8, 2.8) as (drawing, svg):
         for i, (x, y) in enumerate(pairs, 1):
             axes = drawing.add_subplot(1, len(pairs), i)
             step = max(1, len(p.columns[x]) // _MOST_POINTS)

@@ -16,7 +16,7 @@ from ...design.parameters import Unit
 from ...design.profile import cavity_polygon, outer_polygon
 from ...design.section_picture import struts_beside_section
 from ...files import write_bytes
-from ...report.charts import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
+from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
 
 if TYPE_CHECKING:
     from .run import Optimised

@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ...files import write_text
-from ...report.charts import CHOSEN, INK, QUIET, canvas
 from ...report.html import cards, facts_table, figure, note, number, page, table
+from ...report.plots import CHOSEN, INK, QUIET, canvas
 from ...run.progress import Progress
 from ...run.versions import package_versions
 from .main_effects import Effect, main_effect, pareto_front

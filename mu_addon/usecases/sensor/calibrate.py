@@ -17,8 +17,8 @@ from ...errors import InputError
 from ...files import write_csv, write_text
 from ...measured import read_folder
 from ...reading import require_rows
-from ...report.charts import canvas
 from ...report.html import cards, figure, note, page, table
+from ...report.plots import canvas
 from ...run.context import RunContext
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured

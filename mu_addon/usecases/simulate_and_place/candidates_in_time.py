@@ -35,7 +35,7 @@ def evaluations(
 
     It compares the instants until the first that a candidate does not reach; also says which those are.
 
-    None of the shortcuts of `candidate_states` holds where a state depends on those before it:
+    None of the shortcuts of `candidates_by_pressure` holds where a state depends on those before it:
     every candidate is solved through all instants, and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ...fem.trajectory import Trajectory
-    from .candidate_states import CandidateSolver
+    from .candidates_by_pressure import CandidateSolver
     from .job import Job
 
 Array = np.ndarray[Any, Any]

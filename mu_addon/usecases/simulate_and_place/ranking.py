@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,15 +13,8 @@ from ...errors import ConvergenceError
 from ...files import write_csv, write_npz
 from ...placement.candidates import Candidate, Evaluation
 from ...placement.deviation import rank
-from ...run.progress import within
-from .candidate_states import CandidateSolver
-from .candidates_in_time import evaluations
-from .path_motion import keep_motion
 
 if TYPE_CHECKING:
-    from ...fem.trajectory import Trajectory
-    from ...meshing.mesh import Mesh
-    from ...run.cache import Cache
     from .job import Job
 
 Array = np.ndarray[Any, Any]
@@ -88,43 +80,6 @@ class Ranking:
             "mesh_uncertainty_mm": self.uncertainty_mm,
             "tied_with_chosen": self.tied,
         }
-
-
-def solve_candidates(
-    job: Job,
-    cache: Cache,
-    mesh: Mesh,
-    trajectory: Trajectory,
-    candidates: Sequence[Candidate],
-    on_progress: Callable[[float], None],
-    solving: float = 1.0,
-    under_way: CandidateSolver | None = None,
-    verify: bool = False,
-    shown: tuple[Path, Mesh] | None = None,
-) -> tuple[list[Evaluation], dict[str, Any]]:
-    """Evaluation of every candidate on a mesh against its Model A, and the summary's figures on it.
-
-    under_way: a solver that was given Model A's states as they were found; verify: see
-    `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
-    study, which is the same or the half of it, which takes what `solving`, a share, leaves. Raises
-    ConvergenceError.
-    """
-    if job.in_time:
-        found, not_reached = evaluations(job, cache, mesh, trajectory, candidates, on_progress)
-        return found, {"along_paths": True, "not_reached": not_reached}
-    pressures = trajectory.pressure_kPa
-    solver = under_way or CandidateSolver(job, cache, mesh, candidates, pressures, shown is not None)
-    with closing(solver):
-        found = solver.evaluations(trajectory, within(on_progress, 0.0, solving), verify)
-        if shown:
-            keep_motion(job, *shown, mesh, trajectory, solver, candidates, within(on_progress, solving, 1.0))
-    return found, {
-        "pressures_solved_kPa": solver.solved_kPa,
-        "relative_error_between": solver.error,
-        "path_difference_mm": solver.path_difference_mm,
-        "independent_of_path": solver.independent_of_path,
-        "not_reached": solver.not_reached,
-    }
 
 
 def mesh_change_mm(

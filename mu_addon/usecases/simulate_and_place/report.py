@@ -12,9 +12,9 @@ from pathlib import Path as File
 import numpy as np
 
 from ...files import write_text
-from ...report import charts as plots
-from ...report.charts import label, signed
+from ...report import plots
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
+from ...report.plots import label, signed
 from ...report.results import PaintedStates, RankingResult, ReportData, nearest_to_break
 from ...run.progress import spell
 from .charts import front_chart, response_chart

@@ -32,14 +32,14 @@ from ...run.folder import begin, keep_inputs, require_space
 from ...run.progress import Progress, within
 from ...run.versions import package_versions
 from .analysis_mesh import analysis_mesh
-from .candidate_states import CandidateSolver
+from .candidates_by_pressure import CandidateSolver, solve_candidates
 from .expected import SOLVING, expected_bytes, expected_nodes
 from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_files import write_model_a
 from .motion_tables import Row, in_order, write_motion, write_self_contact, write_stretch
-from .ranking import Ranking, extremes, mesh_change_mm, solve_candidates
+from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
 
@@ -304,7 +304,7 @@ class Study:
         to_look_at: bool = False,
         done: float = 0.0,
     ) -> list[Evaluation]:
-        """Evaluation of every candidate on a mesh against its Model A; see `ranking`.
+        """Evaluation of every candidate on a mesh against its Model A; see `candidates_by_pressure`.
 
         to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's. done: share of
         the stage that is done before.

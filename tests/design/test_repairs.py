@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design.nearest_valid import nearest_fit, repairs, tied
 from mu_addon.design.parameters import SECTIONS, Unit
 from mu_addon.design.quantity import describe
+from mu_addon.design.repairs import nearest_fit, repairs, tied
 from mu_addon.errors import InputError
 
 

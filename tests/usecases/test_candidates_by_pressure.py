@@ -20,7 +20,7 @@ from mu_addon.placement.candidates import Evaluation, candidate_paths
 from mu_addon.placement.deviation import centreline_deviation, deviation_of
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidate_pool import Evaluator
-from mu_addon.usecases.simulate_and_place.candidate_states import CandidateSolver
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
 from mu_addon.usecases.simulate_and_place.candidates_in_time import evaluations
 from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.ranking import Ranking, mesh_change_mm
@@ -61,7 +61,7 @@ def test_one_candidate_is_followed_along_its_whole_path(model_a, tmp_path):
 
 def test_where_a_path_leads_elsewhere_every_candidate_is_followed(model_a, tmp_path, monkeypatch):
     _, together = swept(model_a, tmp_path / "together")
-    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidate_states.PATH_DIFFERENCE_MM", 0.0)
+    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidates_by_pressure.PATH_DIFFERENCE_MM", 0.0)
     sweep, along = swept(model_a, tmp_path / "along")
     assert sweep.solved_kPa == pytest.approx([-10, 10, 20])
     solved = [0, 1, 2, 4]
@@ -128,7 +128,7 @@ def test_a_pressure_that_a_path_does_not_reach_is_compared_for_none(model_a, tmp
 
 def test_a_path_that_ends_on_its_way_from_rest_ends_the_comparison_there(model_a, tmp_path, monkeypatch):
     alone = Evaluator.alone
-    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidate_states.PATH_DIFFERENCE_MM", 0.0)
+    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidates_by_pressure.PATH_DIFFERENCE_MM", 0.0)
 
     def ended(self, job, pressures_MPa):
         return alone(self, job, pressures_MPa[pressures_MPa < 0.015] if job == 2 else pressures_MPa)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import closing, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -24,8 +25,10 @@ from ...placement.sampling import between, relative_error, solution_order
 from ...run.cache import Cache, key
 from ...run.progress import within
 from .candidate_pool import CandidatePool, CandidateProblem, Moved
+from .candidates_in_time import evaluations
 from .expected import work
 from .job import Job
+from .path_motion import keep_motion
 
 Array = np.ndarray[Any, Any]
 
@@ -124,7 +127,7 @@ class CandidateSolver:
     def _keep_done(self, way: Sequence[State], part: int, done: Future[list[Moved]]) -> None:
         """Keep a process's result, if it has one; its error is raised where the result is needed."""
         if not done.cancelled() and done.exception() is None:
-            with contextlib.suppress(MuError):
+            with suppress(MuError):
                 self._keep(way, part, done.result())
 
     def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
@@ -358,3 +361,40 @@ def _outward(distinct: Array, target: float) -> Array:
     between = (distinct * np.sign(target) > 0) & (np.abs(distinct) <= np.abs(target) * (1 + 1e-12))
     numbers = np.flatnonzero(between)
     return numbers[np.argsort(np.abs(distinct[numbers]))]
+
+
+def solve_candidates(
+    job: Job,
+    cache: Cache,
+    mesh: Mesh,
+    trajectory: Trajectory,
+    candidates: Sequence[Candidate],
+    on_progress: Callable[[float], None],
+    solving: float = 1.0,
+    under_way: CandidateSolver | None = None,
+    verify: bool = False,
+    shown: tuple[Path, Mesh] | None = None,
+) -> tuple[list[Evaluation], dict[str, Any]]:
+    """Evaluation of every candidate on a mesh against its Model A, and the summary's figures on it.
+
+    under_way: a solver that was given Model A's states as they were found; verify: see
+    `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
+    study, which is the same or the half of it, which takes what `solving`, a share, leaves. Raises
+    ConvergenceError.
+    """
+    if job.in_time:
+        found, not_reached = evaluations(job, cache, mesh, trajectory, candidates, on_progress)
+        return found, {"along_paths": True, "not_reached": not_reached}
+    pressures = trajectory.pressure_kPa
+    solver = under_way or CandidateSolver(job, cache, mesh, candidates, pressures, shown is not None)
+    with closing(solver):
+        found = solver.evaluations(trajectory, within(on_progress, 0.0, solving), verify)
+        if shown:
+            keep_motion(job, *shown, mesh, trajectory, solver, candidates, within(on_progress, solving, 1.0))
+    return found, {
+        "pressures_solved_kPa": solver.solved_kPa,
+        "relative_error_between": solver.error,
+        "path_difference_mm": solver.path_difference_mm,
+        "independent_of_path": solver.independent_of_path,
+        "not_reached": solver.not_reached,
+    }

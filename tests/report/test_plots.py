@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from mu_addon.report import charts as plots
+from mu_addon.report import plots
 from mu_addon.report.results import Path
 
 from .report_data import PATHS, results
