@@ -91,6 +91,8 @@ def each(
 
 def _start(start: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     end_with_parent()
+    # Blocked since this process was made (`ctrl_c_held_back`), but a library may unblock it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if start is not None:
         start(*arguments)
 

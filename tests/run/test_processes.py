@@ -5,10 +5,12 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import closing
 
 import pytest
 
 from mu_addon.run import processes
+from mu_addon.run.pool import Pool
 from mu_addon.run.processes import ctrl_c_held_back, slowed_so_far
 
 WORK = "import sys, time; print('ready', flush=True); time.sleep(3600)"
@@ -97,3 +99,15 @@ def test_a_process_that_hardly_ran_goes_by_the_load(monkeypatch):
     monkeypatch.setattr(processes, "RAN_NS", float("inf"))
     monkeypatch.setattr(processes, "slowed_by_load", lambda: 2.5)
     assert slowed_so_far() == 2.5
+
+
+def interrupted():
+    """Start of a process whose library unblocks Ctrl-C just as it comes."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows blocks no signals")
+def test_a_process_of_a_pool_leaves_ctrl_c_to_its_parent_whatever_a_library_unblocks():
+    with closing(Pool(1, "work", interrupted)) as pool:
+        assert pool.result(pool.submit(abs, -3)) == 3
