@@ -1,4 +1,4 @@
-"""Joints of struts, stiffer than beams, as rigid zones in stretch and in bending; the stretch in them.
+"""Joints of struts, stiffer than beams, as rigid zones in stretch and in bending; their strain concentration.
 
 In an infinite lattice of half diagonals under small strain, joints move with the mean strain and do not turn.
 Let k_a and k_t be the stiffness of a half diagonal along and across it, its ends not turning, and h half a
@@ -15,16 +15,14 @@ import attrs
 import numpy as np
 
 from ..design.dimensions import Dimensions
-from ..design.lattice import lattice_of
 from ..design.lattice_kinds import LatticeKind
 from ..fem.beams import SHEAR_FACTOR
 from ..fem.elements import reference_gradients
 from ..fem.materials import Materials
-from ..fem.model import Model
-from ..fem.stress import PeakStretch, exceeded
+from ..fem.stress import exceeded
 from ..homogenize.elasticity import Elasticity, strained
-from ..meshing.mesh import LATTICE, Array, Mesh
-from .strut import is_half_diagonal, radius_of, strut_mesh
+from ..meshing.mesh import Array, Mesh
+from .strut import radius_of, strut_mesh
 
 POISSON = 0.45
 # Of the solid octant: its moduli are then within 1 % of a mesh by pytetwild (docs/engineering/method.md).
@@ -32,8 +30,6 @@ RINGS, LAYERS = 3, 18
 # A free joint of fewer octants bends more easily: factors of the zone in bending where 4, 2 and 1 meet, which
 # give blocks of 2 to 8 cells the stiffness that solid ones have.
 FEWER = ((4, 0.704), (2, 0.362), (1, 0.0))
-# Distance from a joint in cells within which a beam's end is at it.
-_AT = 1e-6
 
 
 @attrs.frozen
@@ -177,36 +173,3 @@ def _octant(strut: _Strut) -> tuple[Mesh, Elasticity, Array]:
     count = len(mesh.tets)
     resin = Materials.neo_hooke(np.ones(count), np.full(count, POISSON))
     return mesh, *strained(mesh, resin, alike=True)
-
-
-def joint_stretch(model: Model, materials: Materials, d: Dimensions, u: Array) -> PeakStretch | None:
-    """The largest stretch in a joint under displacements u (n, 3) in mm; None where no beam ends in a joint.
-
-    None, too, for another kind than half diagonals. d: dimensions of the lattice's box. Of each strut's end,
-    of small strain: 1 + Ka N/(E A) + Kb M r/(E I) with its `concentration_factors`, where the strut leaves
-    the joint's rigid zone. exceeded: by 1 % of the ends.
-    """
-    from scipy.spatial import cKDTree
-
-    mesh, beams = model.mesh, model.beams_of(materials)
-    if beams is None or not is_half_diagonal(d):
-        return None
-    lattice, factors = lattice_of(d), concentration_factors(d)
-    ends = mesh.beams[:, 0::2]
-    away, joint = cKDTree(lattice.nodes).query(mesh.nodes[ends])
-    beam, side = np.nonzero(away < _AT * d.cell)
-    if not len(beam):
-        return None
-    axial, moments = beams.end_loads(model.unknowns_of_beams(u))
-    young = materials.small_strain(len(mesh.tets))[0][mesh.region == LATTICE].mean()
-    node = joint[beam, side]
-    radius = lattice.node_radii[node]
-    meeting = np.bincount(lattice.struts.ravel(), minlength=len(lattice.nodes))
-    zone = zones_of(d).lengths(2.0 * radius, meeting[node])[1] / beams.length[beam]
-    moment = (1.0 - zone)[:, None] * moments[beam, side] + zone[:, None] * moments[beam, 1 - side]
-    pulled = factors.stretched * np.maximum(axial[beam], 0.0)
-    bent = factors.bent * 4.0 * np.linalg.norm(moment, axis=1) / radius
-    local = 1.0 + (pulled + bent) / (np.pi * young * radius**2)
-    most = int(local.argmax())
-    place = mesh.nodes[ends[beam[most], side[most]]]
-    return PeakStretch(float(local[most]), place, float(np.quantile(local, 0.99)))

@@ -7,11 +7,14 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from mu_addon.design.lattice import lattice_of
+from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.joints import concentration_factors, joint_stretch
+from mu_addon.resolved.frame import joint_factors
+from mu_addon.resolved.joint_stretch import joint_stretch
+from mu_addon.resolved.joints import concentration_factors
 from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
@@ -71,3 +74,20 @@ def test_a_body_of_solid_struts_has_none():
     assert (
         joint_stretch(Model(mesh), materials_of(UNIT, mesh), UNIT.printed, np.zeros_like(mesh.nodes)) is None
     )
+
+
+@pytest.fixture(scope="module")
+def cross():
+    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
+    register(LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant))
+    return UNIT.evolve(kind="cross", seats=False)
+
+
+def test_factors_of_another_kind_are_by_the_joints_place(cross, tmp_path):
+    """Six struts meet in a cell's centre; in its faces two, end to end, which is hardly a joint."""
+    found = joint_factors(cross.printed, tmp_path)
+    assert len(found.places) == 4
+    centre = (found.places > 0).all(axis=1)
+    assert 1.2 < found.stretched[centre].item() < 1.4
+    assert found.stretched[~centre] == pytest.approx(1.1, abs=0.05)
+    assert (found.error < 0.25).all()

@@ -16,7 +16,7 @@ from ...files import write_csv
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
 from ...report.vtk import write_trajectory
-from ...resolved.joints import joint_stretch
+from ...resolved.joint_stretch import joint_stretch
 
 if TYPE_CHECKING:
     from ...fem.model import Model
@@ -76,10 +76,12 @@ def write_motion(folder: Path, job: Job, mesh: Mesh, states: Sequence[State]) ->
     return angles
 
 
-def write_stretch(folder: Path, job: Job, model: Model, states: Sequence[State]) -> list[Row]:
+def write_stretch(
+    folder: Path, job: Job, model: Model, states: Sequence[State], cache: Path | None = None
+) -> list[Row]:
     """Write the largest stretches of wall, struts and joints in every state, and where; return the rows.
 
-    A homogenised lattice has no share of the resin's elongation, nor joints.
+    A homogenised lattice has no share of the resin's elongation, nor joints. cache: as in `joint_stretch`.
     """
     mesh, elongation = model.mesh, job.unit.material.elongation_at_break
     d = covering(job.unit.printed, job.body)
@@ -87,7 +89,7 @@ def write_stretch(folder: Path, job: Job, model: Model, states: Sequence[State])
     for state in states:
         found = {"wall": peak_stretch(mesh, state.u, MEMBRANE)}
         found["struts" if mesh.resolved else "homogenised lattice"] = peak_stretch(mesh, state.u, LATTICE)
-        joints = joint_stretch(model, job.materials(mesh), d, state.u) if len(mesh.beams) else None
+        joints = joint_stretch(model, job.materials(mesh), d, state.u, cache) if len(mesh.beams) else None
         if joints is not None:
             found["joints"] = joints
         for part, peak in found.items():

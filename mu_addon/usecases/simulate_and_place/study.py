@@ -261,7 +261,7 @@ class Study:
         if self.contact is not None:
             write_csv(folder / "contact.csv", CONTACT_COLUMNS, self.contact.rows())
             summary["contact"] = self.contact.summary()
-        self.stretch = write_stretch(folder, job, model, states)
+        self.stretch = write_stretch(folder, job, model, states, self.cache.folder)
         summary["nearest_to_break"] = nearest_to_break(self.stretch)
         self.self_contact, touching_kPa = write_self_contact(folder, model, states)
         if job.self_friction and model.self_contact is not None:
