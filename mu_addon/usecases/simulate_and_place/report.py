@@ -124,10 +124,11 @@ def _ranking(r: ReportData) -> str:
         if found.uncertainty_mm is not None
         else ""
     )
-    html = (
+    words = (
         "<p>Ĵ is the mean distance between the unit with the sensor and the unit without it, over the line "
         f"of anchors and {over}. Smaller is better.</p>"
-    ) + figure(
+    )
+    bars = figure(
         plots.ranking(found, r.paths),
         f"Mean deviation of every path, best first.{tied}{whiskers}",
         f"Bar chart of the mean deviation; {found.chosen} is best.",
@@ -137,7 +138,8 @@ def _ranking(r: ReportData) -> str:
     for i, path in enumerate(r.paths):
         figures = found.rank[i], f"{found.j_hat[i]:.4f}", f"{found.j_cont[i]:.4f}"
         rows.append(([label(path.name), path.anchors, *figures], path.name == found.chosen))
-    return html + table("Every path. J cont: root mean square instead of mean.", head, rows)
+    every = table("Every path. J cont: root mean square instead of mean.", head, rows)
+    return f'{words}<div class="pair">{bars}<div>{every}</div></div>'
 
 
 def _search(r: ReportData) -> str:
