@@ -204,12 +204,13 @@ def test_a_graded_unit_bends_as_its_solid_struts_do(graded, folder):
     found = []
     for fidelity in (RESOLVED, SOLID):
         mesh = mesh_printed(graded, MeshSettings(fidelity=fidelity, refine=0.5), cache=folder)
-        solver = Equilibrium(Model(mesh, threads=1), materials_of(graded, mesh), explains=False)
+        solver = Equilibrium(Model(mesh, threads=1), materials_of(graded, mesh))
         u = solver.reach(0.005, [solver.at_zero_pressure()]).u
         found.append((bending_angle_deg(mesh, u), peak_stretch(mesh, u, LATTICE)))
     (angle, stretch), (by_solids, of_solids) = found
     assert angle == pytest.approx(by_solids, rel=0.03)
-    assert stretch.exceeded - 1.0 == pytest.approx(of_solids.exceeded - 1.0, rel=0.05)
+    # Beams leave the joints' concentration of strain to `joint_stretch`.
+    assert stretch.exceeded - 1.0 == pytest.approx(of_solids.exceeded - 1.0, rel=0.07)
     assert stretch.largest - 1.0 == pytest.approx(of_solids.largest - 1.0, rel=0.1)
 
 
