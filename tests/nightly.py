@@ -13,13 +13,11 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "engineering" / "nightly.md"
 HEAD = """# Tests that run at night
 
-`.venv/bin/python -m pytest` leaves these out: convergence studies, second codes, slicers and long batteries.
-Run them with `.venv/bin/python -m pytest -m nightly`; it writes the date of each that passed into this table.
-The test beside each runs by default and guards against the same fault. Where none stands, other parameters
-of the same test do.
+`.venv/bin/python -m pytest -m nightly` runs these, left out by default, and writes when each passed.
+The test beside each runs by day and guards against the same fault; without one, other parameters of it do.
 
-test | guarded by default by | last passed
---- | --- | ---
+test | guard by day | passed
+---|---|---
 """
 
 
