@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "engineering" / "nightly.md"
 HEAD = """# Tests that run at night
 
-`.venv/bin/python -m pytest -m nightly` runs these, left out by default, and writes when each passed.
-The test beside each runs by day and guards against the same fault; without one, other parameters of it do.
+`.venv/bin/python -m pytest -m nightly` runs these and dates those that pass. Beside each stands its guard by
+day; without one, its other parameters guard.
 
 test | guard by day | passed
 ---|---|---
