@@ -56,6 +56,15 @@ def windows(n: int) -> list[Window]:
     return [Window(f"alpha{number}", start, length) for number, (start, length) in enumerate(found, 1)]
 
 
+def farthest_window(n: int) -> Window:
+    """The shortest window of n anchors, 3 or more, that begins farthest from the inlet.
+
+    >>> farthest_window(6).name
+    'alpha4'
+    """
+    return [one for one in windows(n) if one.length == SHORTEST][-1]
+
+
 def window(unit: Unit, name: str) -> Window:
     """The window of this name, such as "alpha4", among those of the unit's anchors.
 

@@ -6,6 +6,7 @@ import attrs
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
+from ...design.anchors import farthest_window, windows
 from ...design.gripper import gripper_names, load_gripper
 from ..jobs import start_child
 from ..jobs.operators import job_operators
@@ -51,12 +52,12 @@ class MU_OT_gripper_add(bpy.types.Operator):
         found = load_gripper(self.preset)
         unit = active_root(context) if self.of_unit else None
         if unit is not None:
-            found = attrs.evolve(
-                found,
-                unit=to_unit(unit.mu_unit),
-                path=unit.mu_unit.path or found.path,
-                name=f"{unit.mu_unit.title[:72]} gripper",
-            )
+            own, path = to_unit(unit.mu_unit), unit.mu_unit.path
+            count = own.chambers.count
+            if path not in {one.name for one in windows(count)}:
+                # The plate covers where paths near the inlet end.
+                path = farthest_window(count).name
+            found = attrs.evolve(found, unit=own, path=path, name=f"{unit.mu_unit.title[:72]} gripper")
         if context.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         landing.land(context, gripper_object.create(context, found))

@@ -113,6 +113,16 @@ def test_two_fingers_face_each_other_over_the_plate():
     assert "Add > Mesh > Monolithic Gripper" in refused(bpy.ops.mu.gripper_delete)
 
 
+def test_fingers_of_few_chambers_have_a_path_of_their_own():
+    unit = add(preset="mu-1.0x")
+    bpy.ops.mu.path(name="alpha4")
+    # What was chosen for six chambers is none of three.
+    unit.mu_unit.chambers.count = 3
+    root = held(of_unit=True)
+    assert to_gripper(root.mu_gripper).path == "alpha1"
+    assert not root.mu_gripper.trouble
+
+
 def test_its_fingers_may_be_a_unit_of_ones_own(tmp_path):
     unit = add(preset="mu-0.75x")
     unit.mu_unit.chambers.wall_mm = 1.1
