@@ -83,8 +83,9 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
 def tell_crash(line: Sequence[str], crash: Crash) -> None:
     """Report how the process of a command line ended, its stage and what to do, also in its folder."""
     # Imported late: unless something fails, this process needs none of it.
-    from ..run.context import asked_to_stop, has_ended, last_stage, record_crash
+    from ..run.context import asked_to_stop
     from ..run.progress import Progress
+    from ..run.summary import has_ended, last_stage, record_crash
     from .main import parser, sink_of
 
     options = parser().parse_args(list(line))

@@ -12,9 +12,10 @@ import attrs
 from ..errors import InputError, MuError
 from ..files import make_folder
 from ..reading import file_bytes, parse_json
-from ..run.context import SUMMARY, run_to_end
+from ..run.context import run_to_end
 from ..run.folder import same_inputs
 from ..run.progress import Message, Progress, Sink
+from ..run.summary import SUMMARY
 from .evaluation import Finished, Order
 
 CACHE = "cache"

@@ -10,8 +10,9 @@ from typing import Any
 
 from ..files import write_text
 from ..reading import file_bytes, file_text, parse_json
-from ..run.context import STOPPED, SUMMARY
+from ..run.context import STOPPED
 from ..run.progress import spell
+from ..run.summary import SUMMARY
 from .html import facts_table, note, page, table
 
 REPORT = "report.html"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import errno
-import json
 import signal
 import sys
 import threading
 import time
 import traceback
 import weakref
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -18,23 +17,21 @@ from typing import Any
 
 import attrs
 
-from ..errors import InputError, MuError, OutputError
-from ..files import output_error, plain, write_json, write_text
-from ..reading import file_bytes, parse_json
+from ..errors import MuError
+from ..files import output_error
+from ..reading import file_bytes
 from .lock import FolderLock
 from .progress import Message, Progress, log_file
+from .summary import SUMMARY, ended_early, replace_summary, says_running, write_running
 from .supervisor import INTERRUPTED, TERMINATED
 
 DONE, UNEXPECTED = 0, 70
-SUMMARY = "summary.json"
 STOPPED = "<!-- of a run that stopped early -->"
 """Last line of a report written on a stop, which the run's next start therefore removes."""
 # Messages of libraries without memory, in other errors than MemoryError: Warp, the loader, C++.
 _REFUSED = ("Failed to allocate", "failed to map segment", "Cannot allocate memory", "bad_alloc")
 # Errors of a disk on writing.
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
-# Bytes reserved for the summary of a running run: room for its last one on a full disk.
-RESERVED = 1 << 14
 KEEP_EVERY_S = 2.0
 
 
@@ -95,7 +92,7 @@ class RunContext:
                 str(folder),
                 "do not start another run with the same folder",
             )
-        elif _says_running(folder / SUMMARY):
+        elif says_running(folder / SUMMARY):
             # Nobody holds the lock, so that run is gone, and could not report it.
             self.progress.warning(
                 "the last run in this folder was interrupted: it was killed, or the computer stopped",
@@ -135,9 +132,7 @@ class RunContext:
         return folder
 
     def _write_running(self) -> None:
-        found = {**self.summary, "status": "running"}
-        text = json.dumps(plain(found), ensure_ascii=False, allow_nan=False)
-        write_text(self.folder / SUMMARY, text.ljust(RESERVED) + "\n")  # type: ignore[operator]
+        write_running(self.folder / SUMMARY, self.summary)  # type: ignore[operator]
 
     def _keep_found(self, message: Message) -> None:
         """Write results to summary.json between stages and every few seconds, so that a kill loses none."""
@@ -150,70 +145,6 @@ class RunContext:
             if seconds:
                 self.summary["seconds"] = seconds
             self._write_running()
-
-
-def _says_running(path: Path) -> bool:
-    """Return True if a summary is that of a run which has not ended."""
-    return _read_summary(path).get("status") == "running"
-
-
-def _read_summary(path: Path) -> dict[str, Any]:
-    try:
-        found = parse_json(file_bytes(path), SUMMARY)
-    except (OSError, InputError):
-        return {}
-    return found if isinstance(found, dict) else {}
-
-
-def record_crash(folder: Path, error: MuError, stack: str = "") -> None:
-    """Record in a folder, in summary.json and log.ndjson, how its run ended whose process was lost.
-
-    Results of its stages stay in the summary. stack: Python's, at the crash. Nothing is written if no run of
-    the folder was in progress, or another one owns the folder.
-    """
-    found = _read_summary(folder / SUMMARY)
-    if found.get("status") != "running":
-        return
-    # Files that cannot be written, or belong to another run, are left: the error is reported all the same.
-    with suppress(MuError):
-        lock = FolderLock(folder)
-        try:
-            reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
-            state = _ended_early(error) | {"reason": reason}
-            _replace_summary(folder / SUMMARY, [found | state, state])
-            log = log_file(folder / "log.ndjson")
-            if stack:
-                log({"type": "traceback", "text": stack})
-            log({"type": "error", **reason, "status": error.status})
-        finally:
-            lock.release()
-
-
-def last_stage(folder: Path) -> tuple[str, list[str]]:
-    """Stage of the folder's unfinished run, and sizes from its stages, by its log; else empty."""
-    stage = ""
-    made: dict[str, str] = {}
-    if not _says_running(folder / SUMMARY):
-        return "", []
-    try:
-        lines = file_bytes(folder / "log.ndjson").splitlines()
-    except (OSError, InputError):
-        return "", []
-    for line in lines:
-        try:
-            message = parse_json(line, "log.ndjson")
-        except InputError:
-            continue
-        if not isinstance(message, dict):
-            continue
-        if message.get("type") in ("result", "error"):
-            stage, made = "", {}
-        if message.get("type") == "progress":
-            name = str(message.get("stage"))
-            stage = "" if message.get("state") == "end" else name
-            if message.get("state") == "end" and message.get("detail"):
-                made[name] = str(message["detail"])
-    return stage, list(made.values())
 
 
 @contextmanager
@@ -249,11 +180,6 @@ def asked_to_stop(number: int, folder: Path | None) -> MuError:
     if number == signal.SIGTERM:
         return _Terminated("cancelled", where, "run it again: it continues from there")
     return _Interrupted("stopped by Ctrl-C", where, "run it again: it continues from there" if folder else "")
-
-
-def has_ended(folder: Path) -> bool:
-    """Return True if the last run of a folder has recorded its end."""
-    return _read_summary(folder / SUMMARY).get("status", "running") != "running"
 
 
 def _failure(context: RunContext, error: Exception) -> MuError:
@@ -293,7 +219,7 @@ def _stop(context: RunContext, error: MuError) -> None:
     _set_signals(signal.SIG_IGN)
     context.status = error.status
     reason = {"what": error.what, "where": error.where, "what_to_do": error.remedy}
-    partial = _ended_early(error) | {"reason": reason}
+    partial = ended_early(error) | {"reason": reason}
     # The reason for stopping may be that writing is impossible.
     with suppress(MuError):
         _write_summary(context, partial)
@@ -322,10 +248,6 @@ def _stop(context: RunContext, error: MuError) -> None:
         context.progress.error(error)
 
 
-def _ended_early(error: MuError) -> dict[str, str]:
-    return {"status": "cancelled" if isinstance(error, _Terminated) else "partial"}
-
-
 def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
     seconds = {"seconds": {**context.summary.get("seconds", {}), **context.progress.seconds}}
     # Twice, so that the state is read first and yet overrides an older one.
@@ -334,26 +256,7 @@ def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
         return
     # Without room for all results, a stopped run at least states the reason.
     stopped = [state] if "reason" in state else []
-    _replace_summary(context.folder / SUMMARY, [context.summary, *stopped])
-
-
-def _replace_summary(path: Path, wanted: Sequence[dict[str, Any]]) -> None:
-    """Write the first summary that fits on the disk; raises OutputError if none does.
-
-    On a full disk the existing one is removed first: a folder without a summary does not pass for one with a
-    run in progress.
-    """
-    try:
-        write_json(path, wanted[0])
-        return
-    except OutputError:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
-    for summary in wanted[:-1]:
-        with suppress(OutputError):
-            write_json(path, summary)
-            return
-    write_json(path, wanted[-1])
+    replace_summary(context.folder / SUMMARY, [context.summary, *stopped])
 
 
 def _log_traceback(context: RunContext, error: Exception) -> None:

@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from .light_signal import Signal as Signal
     from .light_signal import signal_of_nodes as signal_of_nodes
     from .light_signal import signal_of_states as signal_of_states
+    from .reconnecting import Control as Control
     from .recording import Recorder as Recorder
     from .recording import Recording as Recording
     from .recording import read_recording as read_recording
     from .samples import Layout as Layout
     from .samples import Samples as Samples
-    from .session import Control as Control
     from .session import run_session as run_session
     from .sources import Replay as Replay
     from .sources import SerialLine as SerialLine

@@ -21,10 +21,11 @@ import numpy as np
 from ..errors import OutputError
 from ..files import plain
 from .decoder import Decoder
+from .reconnecting import Clock, Control, Failure, Piece, read_on
 from .recording import Recorder, columns_of
 from .ring_buffer import Ring
 from .samples import Samples
-from .sources import ConnectionLost, EndOfStream, Source
+from .sources import Source
 
 Array = np.ndarray[Any, Any]
 EventHandler = Callable[[str, dict[str, Any]], None]
@@ -48,25 +49,6 @@ LOSSES = {
 }
 """Counters of losses in a session's status, with their names."""
 _STATUS_S = 0.2
-_BACK_OFF_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
-
-
-@attrs.define
-class Control:
-    """Requests to a running session, from any thread: stop, pause, or leave a mark (a text)."""
-
-    stop: threading.Event = attrs.field(factory=threading.Event)
-    pause: threading.Event = attrs.field(factory=threading.Event)
-    """While set, the port is given back; the session goes on when it is cleared."""
-    marks: queue.SimpleQueue[str] = attrs.field(factory=queue.SimpleQueue)
-
-
-@attrs.frozen
-class _Piece:
-    at: float
-    data: bytes = b""
-    event: str = ""
-    detail: str = ""
 
 
 def run_session(
@@ -89,11 +71,11 @@ def run_session(
     OutputError.
     """
     control = control or Control()
-    clock = _Clock()
-    pieces: queue.SimpleQueue[_Piece] = queue.SimpleQueue()
+    clock = Clock()
+    pieces: queue.SimpleQueue[Piece] = queue.SimpleQueue()
     recorder = Recorder(folder, {**about, "started": time.strftime("%Y-%m-%dT%H:%M:%S%z")})
     view = _View(folder, recorder, clock.start, derive, keep_time, on_event)
-    reader = threading.Thread(target=_read, args=(source, pieces, control, clock), daemon=True)
+    reader = threading.Thread(target=read_on, args=(source, pieces, control, clock), daemon=True)
     reader.start()
     try:
         running = True
@@ -120,67 +102,14 @@ def run_session(
         view.close()
 
 
-class _Clock:
-    """Seconds since the epoch that never run backward, independent of changes of the computer's clock."""
-
-    def __init__(self) -> None:
-        self.start = time.time()
-        self._origin = time.perf_counter()
-
-    def now(self) -> float:
-        return self.start + time.perf_counter() - self._origin
-
-
-def _read(source: Source, pieces: queue.SimpleQueue[_Piece], control: Control, clock: _Clock) -> None:
-    """The reading thread: passes on bytes, and opens the line again when it is lost."""
-    connected, tries = False, 0
-    try:
-        while not control.stop.is_set():
-            if control.pause.is_set():
-                if connected:
-                    source.close()
-                    pieces.put(_Piece(clock.now(), event="paused"))
-                connected = False
-                time.sleep(0.02)
-                continue
-            try:
-                if not connected:
-                    words = source.open()
-                    connected, tries = True, 0
-                    pieces.put(_Piece(clock.now(), event="connected", detail=words))
-                data = source.read()
-            except ConnectionLost as gone:
-                source.close()
-                if connected or tries == 0:
-                    event = "disconnected" if connected else "waiting"
-                    pieces.put(_Piece(clock.now(), event=event, detail=str(gone)))
-                connected = False
-                control.stop.wait(_BACK_OFF_S[min(tries, len(_BACK_OFF_S) - 1)])
-                tries += 1
-                continue
-            if data:
-                pieces.put(_Piece(clock.now(), data))
-        source.close()
-    except EndOfStream:
-        pieces.put(_Piece(clock.now(), event="ended"))
-    # Any other error of the reading ends the session with its message.
-    except Exception as error:  # noqa: BLE001 - handed to the thread that can raise it
-        pieces.put(_Failure(clock.now(), error=error))
-
-
-@attrs.frozen
-class _Failure(_Piece):
-    error: Exception = attrs.field(kw_only=True)
-
-
-def _take(pieces: queue.SimpleQueue[_Piece], view: _View) -> bool:
+def _take(pieces: queue.SimpleQueue[Piece], view: _View) -> bool:
     """Decode, record and show new bytes, waiting a little; False at the end."""
     try:
         piece = pieces.get(timeout=0.05)
     except queue.Empty:
         return True
     while True:
-        if isinstance(piece, _Failure):
+        if isinstance(piece, Failure):
             raise piece.error
         if piece.event:
             if piece.event in ("disconnected", "paused"):

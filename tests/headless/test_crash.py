@@ -14,9 +14,10 @@ import pytest
 from mu_addon.cli.watched import tell_crash
 from mu_addon.design.parameters import load_preset, to_toml
 from mu_addon.run.child import FAILED, RUNNING, Child
-from mu_addon.run.context import RESERVED, record_crash, run_to_end
+from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.run.summary import RESERVED, record_crash
 from mu_addon.run.supervisor import CRASHED, Crash
 
 from .processes import PATIENCE_S, assert_clear_failure, command, run, worker_of

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from mu_addon.report import plots
+from mu_addon.report import heatmaps, plots
 from mu_addon.report.results import Path
 
 from .report_data import PATHS, results
@@ -17,8 +17,8 @@ CHARTS = {
     "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", RANKING.j_hat),
     "angle": lambda: plots.angle_against_pressure(DATA.pressure_kPa, DATA.angle_deg),
     "protocol": lambda: plots.protocol(DATA.protocol_s, DATA.protocol_kPa),
-    "heatmap": lambda: plots.heatmap(RANKING.delta[0], 1.0, True),
-    "bar": lambda: plots.color_bar(1.0),
+    "heatmap": lambda: heatmaps.heatmap(RANKING.delta[0], 1.0, True),
+    "bar": lambda: heatmaps.color_bar(1.0),
     "marginal": lambda: plots.marginal(RANKING.delta.mean(axis=1), PATHS, "alpha4", "length"),
     "ranking": lambda: plots.ranking(RANKING, PATHS),
     "seconds": lambda: plots.seconds(DATA.seconds),

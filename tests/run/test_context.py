@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mu_addon.files import write_text
-from mu_addon.run import context as context_module
+from mu_addon.run import summary as summary_module
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 
@@ -260,7 +260,7 @@ def test_a_run_that_fills_the_disk_does_not_pass_for_one_that_goes_on(tmp_path, 
 def test_where_not_even_the_reason_can_be_written_no_summary_stays(tmp_path, monkeypatch):
     with run_to_end(Progress()) as context:
         context.open_folder(tmp_path)
-        full_below(monkeypatch, tmp_path, reserved=-context_module.RESERVED)
+        full_below(monkeypatch, tmp_path, reserved=-summary_module.RESERVED)
         write_text(tmp_path / "mesh.txt", "too much")
     assert context.status == 5
     assert not (tmp_path / "summary.json").exists()

@@ -19,9 +19,10 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.sensing.framing import info_frame, sample_frame
+from mu_addon.sensing.reconnecting import Control
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.ring_buffer import Ring
-from mu_addon.sensing.session import Control, run_session
+from mu_addon.sensing.session import run_session
 from mu_addon.sensing.sources import ConnectionLost, EndOfStream, Port, Replay, SerialLine, find
 
 ROOT = Path(__file__).parents[2]

@@ -1,4 +1,7 @@
-"""Drift of an instrument's zero while it records: one mechanism, by four laws."""
+"""Drift of an instrument's zero while it records: one mechanism, by four laws.
+
+Relaxation is a rival of every drift: `evidence.rivals` fits both and compares them.
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from ...homogenize.elasticity import young_modulus
 from ...homogenize.stress_strain_curve import Curve
-from ...report.plots import BY_LENGTH, CHOSEN, INK, MAP, QUIET, WIDTH, canvas, signed
+from ...report.heatmaps import MAP
+from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from ...report.render import Camera, Floats, Image, Part, fit, png, render
 from ...report.results import Picture
 from ...report.unit_pictures import WHITE

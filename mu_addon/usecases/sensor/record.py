@@ -12,7 +12,8 @@ from ...run.context import RunContext
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.usecase import UseCase
-from ...sensing.session import Control, run_session
+from ...sensing.reconnecting import Control
+from ...sensing.session import run_session
 from ...sensing.settings import BAUD
 from ...toml_writer import toml_text
 from .stream import console_summary, ctrl_c_stops, require_samples, serial_source, simulated_source

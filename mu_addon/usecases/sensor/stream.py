@@ -16,8 +16,9 @@ from ...errors import InputError, MuError
 from ...run.context import RunContext
 from ...run.progress import Sink, printable
 from ...sensing.calibration import deriver, read_calibration
+from ...sensing.reconnecting import Control
 from ...sensing.recording import REJECTS
-from ...sensing.session import LOSSES, Control, run_session
+from ...sensing.session import LOSSES, run_session
 from ...sensing.sources import SerialLine, Simulated, Source, ports
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...files import write_bytes
-from ...report.plots import BY_LENGTH, CHOSEN, INK, MAP, QUIET, WIDTH, canvas, label, signed, styled
+from ...report.heatmaps import MAP
+from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, label, signed, styled
 from ...report.results import Floats, Signals
 from .motion_files import FOLDER
 

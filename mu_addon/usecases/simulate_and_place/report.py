@@ -12,7 +12,7 @@ from pathlib import Path as File
 import numpy as np
 
 from ...files import write_text
-from ...report import plots
+from ...report import heatmaps, plots
 from ...report.html import cards, facts_table, figure, note, number, page, picture_figure, table
 from ...report.plots import label, signed
 from ...report.results import PaintedStates, RankingResult, ReportData, nearest_to_break
@@ -298,7 +298,7 @@ def _stretch(r: ReportData) -> str:
 
 
 def _painted(states: PaintedStates, low: float, name: str) -> str:
-    bar = figure(plots.field_bar(low, states.top, name), "", f"Colour scale of the {name}.", "bar")
+    bar = figure(heatmaps.field_bar(low, states.top, name), "", f"Colour scale of the {name}.", "bar")
     shown = "".join(picture_figure(picture) for picture in states.pictures)
     return f"{bar}<div class='pair'>{shown}</div>"
 
@@ -373,14 +373,14 @@ def _heatmaps(r: ReportData) -> str:
     top = float(np.nanmax(found.delta))
     maps = "".join(
         figure(
-            plots.heatmap(found.delta[i], top, path.name == found.chosen),
+            heatmaps.heatmap(found.delta[i], top, path.name == found.chosen),
             f"{_name(path.name)}: {found.j_hat[i]:.3f} mm",
             f"Deviation of {path.name} over length and time, at most {np.nanmax(found.delta[i]):.2f} mm.",
             "best" if path.name == found.chosen else "",
         )
         for i, path in enumerate(r.paths)
     )
-    bar = figure(plots.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
+    bar = figure(heatmaps.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
     return (
         "<p>One map per path. Horizontal: length [%], from inlet to tip. Vertical: time [%] of the pressure "
         "cycle. All maps share one colour scale, in the square root of Δ; the chosen path is framed."

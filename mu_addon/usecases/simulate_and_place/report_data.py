@@ -272,7 +272,7 @@ def _painted(study: Study, field: str, low: float, least: float, word: str) -> P
 
     least: by how much the scale exceeds `low` at least; word: what the field is called.
     """
-    from ...report.plots import field_colors
+    from ...report.heatmaps import field_colors
     from ...report.unit_pictures import motion
 
     if study.trajectory is None or study.context.hurried:

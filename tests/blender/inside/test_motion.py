@@ -53,7 +53,7 @@ def moved(part):
 def test_colours_are_those_of_reports():
     import matplotlib
 
-    from mu_addon.report.plots import MAP
+    from mu_addon.report.heatmaps import MAP
 
     table = matplotlib.colormaps[MAP](np.linspace(0.0, 1.0, len(fields.STOPS)))
     assert np.abs(table[:, :3] - fields.STOPS).max() < 1e-3
