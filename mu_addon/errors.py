@@ -38,7 +38,7 @@ class MeshingError(MuError):
 
 
 class ConvergenceError(MuError):
-    """An equilibrium that could not be found; nothing computed from it may be reported."""
+    """An equilibrium was not found; no result that depends on it may be reported."""
 
     status = 4
 

@@ -1,4 +1,4 @@
-"""Files that are complete or absent: written beside their place, flushed to disk, then renamed into it."""
+"""Files that are complete or absent: written under another name, flushed to disk, then renamed."""
 
 from __future__ import annotations
 
@@ -58,8 +58,7 @@ def make_folder(path: Path) -> Path:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Context with a path beside `path`, of the same suffix, to be written by the body; it then replaces
-    `path`.
+    """Context with a temporary path of the same suffix for the body to write; it then replaces `path`.
 
     Missing folders are made. If the body fails, `path` stays as it was. An OSError becomes an OutputError.
     """
@@ -145,8 +144,8 @@ _MOST_UNPACKED = 1 << 32
 def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | None:
     """Arrays by name of an NPZ file, or None where there is none that can be read completely.
 
-    No code in the file is run. No memory is allocated for an array before the archive is known to hold as
-    many bytes as its header claims, at most `most_bytes` in all and in proportion to its size.
+    No code in the file is run. Memory for an array is allocated only after checking that the archive holds as
+    many bytes as its header claims. The limits are `most_bytes` in all and a ratio to the archive's size.
     """
     try:
         # A pipe would be waited for.
@@ -177,7 +176,7 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
             raise ValueError("a header that is never written here")
         shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
         if dtype.hasobject or math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
-            raise ValueError("the header claims what the archive does not hold")
+            raise ValueError("the header claims more than the archive holds")
 
 
 def write_npz(path: Path, arrays: Mapping[str, Any], packed: bool = True) -> None:

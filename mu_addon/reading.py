@@ -102,7 +102,7 @@ def _require_length(text: str | bytes, most: int, origin: str, remedy: str) -> N
 
 
 def unreadable(error: OSError | UnicodeDecodeError) -> str:
-    """Reason why a file could not be read as text, in words without its name."""
+    """Reason why a file could not be read as text, without its name."""
     return str(error.strerror or error) if isinstance(error, OSError) else "it is not UTF-8 text"
 
 

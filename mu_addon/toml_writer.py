@@ -1,6 +1,7 @@
 """TOML text from plain data and comments: the library writes keys and values, the layout is made here.
 
-A table in a table becomes `[outer.inner]`, one inside a list stands on its line. None values are left out.
+A table in a table becomes `[outer.inner]`; one inside a list is written on one line. None values are left
+out.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ def add(commands: Commands[Any]) -> None:
 
     command = commands.add_parser(
         "chain",
-        help="Simulate units in series, each with a pressure of its own, under gravity and a load at the "
-        "tip; or find the pressures that bring the tip to a point.",
+        help="Simulate units in series, one pressure each, under gravity and a tip load, or find the "
+        "pressures that bring the tip to a point.",
         epilog="example: run.py chain assets/examples/trunk/chain.toml --out out/trunk",
     )
     command.add_argument(

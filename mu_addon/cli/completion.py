@@ -36,7 +36,7 @@ complete -o bashdefault -o default -F _mu_addon run.py python python3
 
 
 def script(parser: argparse.ArgumentParser) -> str:
-    """The script for bash; it completes file names wherever no choices are known."""
+    """The script for bash; it completes file names where there are no fixed choices."""
     from ..design.gripper import gripper_names
     from ..design.parameters import preset_names
 

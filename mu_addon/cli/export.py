@@ -48,8 +48,8 @@ def add(commands: Commands[Any]) -> None:
         nargs="?",
         const="unit",
         metavar="CSV",
-        help="Compensate the print offset: subtract it from the nominal geometry. Without a value it is the "
-        "[print] offset of the unit (or of --model); with a CSV file, the offset measured on the "
+        help="Compensate the print offset: subtract it from the nominal geometry. Without a value: the "
+        "[print] offset of the unit or of --model. With a CSV file: the offset measured on the "
         "calibration coupon of `specimens`.",
     )
     command.add_argument(

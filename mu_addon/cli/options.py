@@ -138,7 +138,7 @@ def add_solid(command: argparse.ArgumentParser) -> None:
 
 
 def add_body(command: argparse.ArgumentParser) -> None:
-    """The user's own body around the chambers."""
+    """Options of a user-defined body."""
     command.add_argument(
         "--body",
         metavar="FILE",
@@ -181,7 +181,7 @@ class _Friction(argparse.Action):
 
     def __call__(self, parser: Any, namespace: Any, value: Any, option: Any = None) -> None:
         if not namespace.obstacles or namespace.obstacles[-1][1] is not None:
-            parser.error("--friction belongs after its --obstacle")
+            parser.error("write --friction after its --obstacle")
         *before, (path, _) = namespace.obstacles
         namespace.obstacles = [*before, (path, value)]
 

@@ -47,7 +47,7 @@ def run_watched(line: Sequence[str], work: Callable[[], int], ends_with_input: b
 def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
     """Listener to a command's worker process; shows that the worker is alive while it is silent.
 
-    Loaded once there is something to hear: the worker starts first, and says which package is missing.
+    Loaded with the first message: the worker starts first and names a missing package.
     """
 
     @cache
@@ -141,7 +141,7 @@ def _how(crash: Crash) -> str:
 
 
 def _limit() -> str:
-    """Limits by the system on this process's memory, in words."""
+    """The system's limits on this process's memory, as text."""
     try:
         import resource
     except ImportError:

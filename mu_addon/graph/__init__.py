@@ -1,6 +1,6 @@
 """Node trees: nodes, trees and their files, faults, and evaluation.
 
-Nothing here knows a unit or a simulation: the definitions of nodes come from `usecases.graph`.
+This package is independent of units and simulations: `usecases.graph` defines the nodes.
 """
 
 from typing import TYPE_CHECKING

@@ -13,7 +13,7 @@ from .tree import Node, NodeTree, Source
 
 @attrs.frozen
 class Fault:
-    """A fault at a node: what, what to do, and the input and source of a refused link."""
+    """A fault at a node: what is wrong, what to do, and the input and source of a refused link."""
 
     node: str
     what: str
@@ -106,7 +106,7 @@ def _of_link(
 
 
 def _offer(taken: Input, definitions: Definitions) -> str:
-    """Nodes with an output that an input accepts, in words."""
+    """Nodes with an output that an input accepts, as text."""
     kinds = [
         d.label for d in definitions.values() if any(taken.refusal(output) == "" for output in d.outputs)
     ]

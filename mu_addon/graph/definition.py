@@ -73,7 +73,7 @@ class Input:
     many: bool = False
 
     def refusal(self, output: Output) -> str:
-        """Reason why an output cannot be linked here, in words; "" if it can."""
+        """Reason why an output cannot be linked here; "" if it can."""
         if output.type not in self.types:
             return f"{self.name} takes a {' or '.join(self.types)}, not a {output.type}"
         if self.only and output.name not in self.only:
@@ -110,11 +110,10 @@ Outputs = Mapping[str, Any]
 class Definition:
     """One kind of node.
 
-    make: outputs by name, for a node that takes milliseconds; order: a run (`evaluation.Order`) for one that
-    takes longer, and read: its outputs, from the call and the finished run. muting: effect of muting in
-    words, "" if it cannot be muted; mute: outputs of the muted node, without it nothing behind it is
-    evaluated. remark: a few words on its outputs; named: outputs contain the node's name, as the cause of an
-    error.
+    make: outputs by name, for a node that takes milliseconds. order: a run (`evaluation.Order`) for a slower
+    node; read: its outputs, from the call and the finished run. muting: describes the effect of muting, "" if
+    the node cannot be muted; mute: outputs of the muted node, without which no node after it is evaluated.
+    remark: a short description of its outputs. named: outputs contain the node's name, for errors.
     """
 
     kind: str

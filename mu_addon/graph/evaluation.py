@@ -46,8 +46,8 @@ class NodeError(MuError):
 class Order:
     """A run that a node needs: its use case and its job.
 
-    after: folder of a run that this one continues, whose cache it reuses; decides no result. answers: a
-    verdict in its summary is its answer, even if it ends with an error because of that.
+    after: folder of a run whose cache is reused, without effect on results. answers: a verdict in its summary
+    is a result, even if the run ends with an error because of it.
     """
 
     use_case: UseCase[Any]
@@ -93,7 +93,7 @@ class Runs(Protocol):
 
 @attrs.frozen
 class Record:
-    """Record of an evaluated node: words on its outputs, those that are numbers, folder of its run.
+    """Record of an evaluated node: a remark on its outputs, its numeric outputs, folder of its run.
 
     cost_s: seconds it took to compute.
     """
@@ -106,10 +106,10 @@ class Record:
 
 @attrs.frozen
 class State:
-    """State of a node after evaluation: its seconds, its key and a few words on its outputs.
+    """State of a node after evaluation: its seconds, its key and a remark on its outputs.
 
     cost_s: seconds when it was computed, now or before; folder: of its run; error: why it failed; because:
-    the node that it waits for, or that failed.
+    the node that failed or that it waits for.
     """
 
     state: str
@@ -305,7 +305,7 @@ class Evaluation:
         return None
 
     def _settings(self, node: Node, definition: Definition) -> dict[str, Any]:
-        """Every setting of a node, its own or by a link. Raises InputError."""
+        """Every setting of a node, with linked values in place of its own. Raises InputError."""
         found: dict[str, Any] = {}
         for s in definition.settings:
             source = next(iter(node.links.get(s.name, ())), None)
@@ -317,7 +317,7 @@ class Evaluation:
         return found
 
     def _number(self, source: Source) -> Any:
-        """A number from another node; None where a refresh does not know it."""
+        """A number from another node; None where a refresh cannot determine it."""
         if source.node in self.outputs:
             return self.outputs[source.node][source.output]
         record = self.records.get(self.states[source.node].key)

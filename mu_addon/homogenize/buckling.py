@@ -1,8 +1,8 @@
-"""Buckling of a compressed specimen into a shape that is not its own mirror image.
+"""Buckling of a compressed specimen into a shape without mirror symmetry.
 
-A small motion of a body with three mirror planes is a sum of eight parts, each kept or turned into its
-negative by each mirror, and no force couples them. So an eighth with other supports on its mirror planes
-shows what the symmetric eighth hides.
+A small motion of a body with three mirror planes is a sum of eight uncoupled parts, each even or odd under
+each mirror. An eighth with other supports on its mirror planes therefore shows the modes that the symmetric
+eighth excludes.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ class SymmetryBreakingModes:
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:
-        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm; None if there is none."""
+        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm; None if there is no such
+        mode.
+        """
         values = self.model.tangent(u, 0.0, self.parameters)
         for signs in self._order:
             try:

@@ -29,8 +29,8 @@ _TRIES = (1.0, 0.8, 0.6, 0.4)
 class CellMeshSettings:
     """Element sizes of a cell's mesh; raises InputError for a value out of bounds.
 
-    order of the elements; per_diameter: elements to a diameter of the thinnest printed strut; facets of the
-    surface that is meshed, and tolerance, as a share of an element, of the mesh's distance from it.
+    order: of the elements; per_diameter: elements across the thinnest printed strut; facets: of the surface
+    to mesh; tolerance: of the mesh's distance from it, as a share of an element.
     """
 
     order: int = 2

@@ -32,8 +32,8 @@ _PROBE = 1e-5
 class Compressed:
     """A converged equilibrium: nominal strain, compression positive, and displacement of the eighth.
 
-    u (n, 3) in mm. force_N and energy_mJ: of the plates on the whole block, compression positive, and stored
-    in it. residual: over the root sum of squares of all element forces; factorisations: those it took.
+    u (n, 3) in mm. force_N: of the plates on the whole block, compression positive; energy_mJ: stored in it.
+    residual: over the root sum of squares of all element forces; factorisations: their number.
     """
 
     strain: float
@@ -48,8 +48,8 @@ class Compressed:
 class Compression:
     """States of a specimen in ascending strain, the first at rest, and the limits of their validity.
 
-    touch: first contact of struts, which the model leaves out. loss: first buckling out of the block's
-    symmetry, which is not followed. ended: why the path ends before the last strain asked for, or "".
+    touch: first contact of struts, which the model neglects. loss: first buckling out of the block's
+    symmetry, which is not followed. ended: why the path ends before the last requested strain, or "".
     """
 
     specimen: Specimen
@@ -117,11 +117,11 @@ def compress(
     """Equilibria at nominal strains in ascending order, compression positive, of a specimen between plates.
 
     friction: faces slide on the plates ("slide") or stick to them ("stick"), the bounds of real plates;
-    neither lifts off. `load` gives a state of an earlier run at a strain, if it kept one with `store`; a
-    resumed run finds the same states to the last digit. Equilibria keep the mirror planes of the block;
-    `stability` asks where others branch off, for about as many factorisations again. A path that cannot be
-    followed further ends, with the reason. Raises InputError for strains not ascending between 0 and 1 or an
-    unknown friction, and ConvergenceError where there is no first state.
+    neither lifts off. `load` gives the state at a strain that an earlier run kept with `store`; a resumed run
+    finds identical states. Equilibria keep the mirror planes of the block; `stability` asks where others
+    branch off, for about as many factorisations again. A path that cannot be followed further ends, with the
+    reason. Raises InputError for strains not ascending between 0 and 1 or an unknown friction, and
+    ConvergenceError where there is no first state.
     """
     strains = [float(s) for s in strains]
     if not strains or not (np.diff([0.0, *strains, 1.0]) > 0).all():

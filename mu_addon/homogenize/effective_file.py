@@ -46,9 +46,9 @@ class Effective:
 
     cell: kind and geometry, with the print's offset; resin; provenance: software, version and hash of the
     inputs, all three tables of text and numbers. relative_density: solid share of the volume; C11, C12, C44
-    in kPa, of cubic symmetry. parameters (6,) as Foam names them, shear_MPa of CubicShear and diagonal_MPa of
-    DiagonalStretch act in parallel; stretch is the range they were fitted in. Raises InputError for moduli
-    that are not positive definite, and a law that is not admissible or not stable.
+    in kPa, of cubic symmetry. parameters (6,) of Foam, shear_MPa of CubicShear and diagonal_MPa of
+    DiagonalStretch act in parallel; stretch is the range of the fit. Raises InputError for moduli that are
+    not positive definite, and a law that is not admissible or not stable.
     """
 
     cell: Mapping[str, str | float]
@@ -211,8 +211,8 @@ def read_effective(path: str | Path) -> Effective:
 def parse_effective(text: str, origin: str = "effective.toml") -> Effective:
     """A homogenized lattice from the text of effective.toml.
 
-    Raises InputError that names file and key where the format is unknown, a key is missing, strange or no
-    number, or the law is not admissible or not stable.
+    Raises InputError with file and key if the format is unknown, a key is missing, unknown or not a number,
+    or the law is inadmissible or unstable.
     """
     document = parse_toml(text, origin)
     found = document.get("format")

@@ -33,8 +33,8 @@ class Elasticity:
     """Effective elasticity of a lattice with three mirror planes: C (6, 6) in MPa, in Voigt's notation.
 
     Order xx, yy, zz, yz, xz, xy with engineering shears; entries that vanish by symmetry are 0.
-    relative_density: share of the volume that is solid. C11, C12, C44 and what follows from them are those
-    of the nearest cubic material, means over the axes; `cubic_error` says how near it is.
+    relative_density: share of the volume that is solid. C11, C12, C44 and what follows from them are those of
+    the nearest cubic material, means over the axes; `cubic_error` is its relative distance.
     """
 
     C: Array = attrs.field(converter=_tensor)
@@ -138,8 +138,8 @@ def young_modulus(C: Array, directions: ArrayLike) -> Array:
 def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Elasticity:
     """Effective elasticity, at small strain, of the periodic body of which a mesh is one eighth, [0, box] mm.
 
-    The mesh's mirror images in its six sides must make up the body (`octant.Octant`). box (3,) in mm: by
-    default the mesh's own. Energies are those of exact small-strain solutions on the mesh, so never below the
+    The mesh and its mirror images in its six sides make up the body (`octant.Octant`). box (3,) in mm: by
+    default the mesh's. Energies are those of exact small-strain solutions on the mesh, so never below the
     true ones of the meshed shape. Raises MeshingError where a piece is loose, or where the result is
     indefinite or above the Hashin-Shtrikman bound, which no right mesh can give.
     """
@@ -151,8 +151,8 @@ def strained(
 ) -> tuple[Elasticity, Array]:
     """`effective_tensor`, and the displacements (6, n, 3) in mm under unit mean strains that give it.
 
-    In Voigt's order, of engineering shears. alike: mesh and materials are the same along the three axes, so
-    that one shear is solved for all and four displacements come back. Raises MeshingError as that does.
+    In Voigt's order, of engineering shears. alike: mesh and materials have cubic symmetry, so that one shear
+    stands for all three and four displacements are returned. Raises MeshingError as that does.
     """
     octant = Octant(mesh, materials, box)
     C = np.zeros((6, 6))

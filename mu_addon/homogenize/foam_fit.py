@@ -114,11 +114,12 @@ def lattice_law(
 def fit_foam(curve: Curve, C11_MPa: float, C12_MPa: float, C44_MPa: float) -> FoamFit:
     """Foam with cubic shear that follows a cell's curve along an axis, of free sides, and its tensor.
 
-    C11_MPa, C12_MPa, C44_MPa: of the cell at small strain. Least squares of stress, each side of 1 by its own
-    largest, and of lateral strain, from several starts. What couples the axes is either the cell's C12 as
-    diagonal stretch, the foam itself having none, or the foam's own volumetric part, fitted too: the one that
-    leaves less. The cubic shear supplies what the foam lacks of C44; where the foam has more, C44 is not met.
-    Raises InputError for a curve that leaves a side of 1 undetermined, and where the law found is not stable.
+    C11_MPa, C12_MPa, C44_MPa: of the cell at small strain. Least squares of stress, scaled by its largest
+    value in tension and in compression, and of lateral strain, from several starts. The axes are coupled
+    either by the cell's C12 as diagonal stretch, without coupling in the foam, or by the foam's own fitted
+    volumetric part: the one with the smaller residual. The cubic shear adds the C44 that the foam lacks; if
+    the foam's C44 is larger, C44 is not matched. Raises InputError for a curve that leaves a side of 1
+    undetermined, and where the law found is not stable.
     """
     _sides(curve)
     fits = {
@@ -215,7 +216,7 @@ class _Form:
         return np.array([np.exp(x[0]), x[1], np.exp(compression), x[2], volume, gamma])
 
     def residuals(self, x: Array) -> Array:
-        """Residuals of stress and lateral strain; both sides of 1 count alike."""
+        """Residuals of stress and lateral strain; tension and compression have equal weight."""
         axial = self.C12_MPa if self.diagonal else 0.0
         stress, lateral = _residuals(self.curve, self.parameters(x), axial)
         side = self.curve.stretch > 1, self.curve.stretch < 1
@@ -245,9 +246,10 @@ class _Form:
 def require_stable(law: LatticeLaw) -> None:
     """Raise InputError where a law of foam, cubic shear and diagonal stretch is not stable within its range.
 
-    Along an axis with free sides the force must grow with the stretch, and the law be strongly elliptic; it
-    must also be so near rest in any direction. It need not be under larger shear or compression from all
-    sides, where slender struts buckle: `stable_shear` and `stable_pressed` say how far it is.
+    Along an axis with free sides the force must grow with the stretch and the law must be strongly elliptic.
+    Near rest it must be strongly elliptic in every direction. It need not be under larger shear or
+    compression from all sides, where slender struts buckle: `stable_shear` and `stable_pressed` are the
+    limits.
     """
     low, high = law.stretch
     along = np.linspace(low, high, 81)

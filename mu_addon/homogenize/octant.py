@@ -1,9 +1,9 @@
 """An eighth of a periodic cell with three mirror planes: conditions on its six sides, and its tangent.
 
-Under normal strains the lattice is its own mirror image, so the sides stay plane and free of shear. Under a
-shear of x against y it is turned into its negative by the mirrors across x and y and kept by that across z:
-on the sides across x the displacement in the plane is that of the mean shear, and so on the sides across y;
-on those across z only the normal one is. So the eighth carries the periodic problem exactly.
+Under normal strains the lattice is its own mirror image, so the sides stay plane and free of shear. A shear
+of x against y changes sign under the mirrors across x and y, and is unchanged by the mirror across z. On the
+sides across x and across y the displacement in the plane is that of the mean shear; on the sides across z
+only the normal displacement is. So the eighth carries the periodic problem exactly.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Part:
 
 
 def part(pattern: Pattern, free: Array) -> Part:
-    """The unknowns numbered `free` (f,), ascending, of a tangent's pattern; not yet factorised."""
+    """A solver of the unknowns `free` (f,), ascending, of a tangent's pattern; not factorised so far."""
     count = len(pattern.indptr) - 1
     number = np.full(count, -1)
     number[free] = np.arange(len(free))
@@ -72,9 +72,9 @@ def part(pattern: Pattern, free: Array) -> Part:
 class Octant:
     """An eighth [0, box] of a periodic cell as a model without supports, and its materials.
 
-    box: (3,) mm, the mesh's own if not given. Laws must be their own mirror images across x, y and z, as
-    isotropic ones are. Raises InputError for a mesh that leaves its box or is clamped, MeshingError for one
-    that does not reach its sides or of which a piece touches none.
+    box: (3,) mm, by default the mesh's. Laws must be symmetric under mirrors across x, y and z, as isotropic
+    ones are. Raises InputError for a mesh that leaves its box or is clamped, MeshingError if it does not
+    reach its sides or a piece of it touches no side.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class Octant:
             raise MeshingError(
                 "a piece of a cell's mesh is not connected",
                 f"near {place} mm",
-                "let its struts meet, or refine it",
+                "connect its struts, or refine it",
             )
         self.model = Model(mesh, threads=threads)
         self.materials = materials
@@ -144,12 +144,11 @@ class Octant:
         return values, self.model.matrix(values)
 
     def buckling(self, u: Array) -> str:
-        """A way in which the body may buckle from the equilibrium u (n, 3) in mm, in words; "" if it is
-        stable.
+        """A buckling mode of the body at the equilibrium u (n, 3) in mm, as text; "" if it is stable.
 
         Covers motions that repeat after one or two cells along each axis, and homogeneous shears. Such
-        motions are sums of those that each mirror keeps or negates, each side by itself. Does not cover
-        homogeneous stretches and waves longer than two cells.
+        motions are sums of motions that are even or odd under each side's mirror. Does not cover homogeneous
+        stretches and waves longer than two cells.
         """
         values, K = self.tangent(u)
         for turned in itertools.product((False, True), repeat=6):
@@ -195,7 +194,7 @@ def pieces(mesh: Mesh) -> Array:
 
 
 def _wave(odd: Array) -> str:
-    """A motion odd (2, 3) or even under each side's mirror, in words."""
+    """A motion odd (2, 3) or even under each side's mirror, as text."""
     double = [AXES[k] for k in range(3) if odd[0, k] != odd[1, k]]
     if not double:
         return "a motion that repeats in every cell"
@@ -213,5 +212,5 @@ def require_factor(part: Part, values: Array) -> None:
         raise MeshingError(
             "the undeformed cell is not stable",
             "periodic cell",
-            "correct its material, or let its struts meet",
+            "correct its material, or connect its struts",
         ) from None

@@ -1,7 +1,8 @@
 """A lattice's modulus at every scale and print offset, from one scale's virtual tests.
 
-A printed offset is the only length that does not grow with the scale. So a lattice of scale s with offset o
-is that of scale 1 with offset o/s, enlarged; its modulus is the resin's times a function of o/s alone.
+A printed offset is the only length that does not grow with the scale. A lattice of scale s with offset o is
+therefore the enlarged lattice of scale 1 with offset o/s, and its modulus over the resin's depends on o/s
+alone.
 """
 
 from __future__ import annotations

@@ -32,8 +32,8 @@ class Specimen:
 def block_specimen(octant: Mesh, cells: int, materials: Materials, axis: str = "z") -> Specimen:
     """One eighth of a block of cells^3 cells, for `compress`, made of copies of an eighth of one cell.
 
-    octant: mesh of [0, U/2]^3 mm with a corner of the cell at the origin, and materials its own. The
-    block's outer faces are faces of cells, cut flat. axis: that of the cell which the plates compress; the
+    octant: mesh of [0, U/2]^3 mm with a corner of the cell at the origin, and materials: those of the octant.
+    The block's outer faces are faces of cells, cut flat. axis: axis of the cell that the plates compress; the
     specimen is turned so that it becomes z. Laws must be isotropic, since copies are mirror images. Raises
     InputError for less than one cell, an unknown axis or an octant that is not cubic.
     """

@@ -1,4 +1,4 @@
-"""Curve of a virtual test, and moduli read from it by procedures that differ for it is not straight."""
+"""Curve of a virtual test, and moduli by procedures that differ because the curve is not straight."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ _RAMP = 401
 def modulus(curve: Curve, procedure: str = DEFAULT) -> float:
     """Modulus in MPa of the compressed side of a curve, by one of PROCEDURES.
 
-    "initial tangent": slope at rest of the polynomial through it and the next three points. "slope a-b %":
-    of the least-squares line, free to miss the origin, through the curve sampled evenly in strain, as a
-    test at constant rate samples it; the curve is a piecewise cubic without overshoot through its points.
-    "secant at b %": stress over strain. Raises InputError for an unknown procedure or too short a curve.
+    "initial tangent": slope at rest of the polynomial through it and the next three points. "slope a-b %": of
+    the least-squares line with an intercept, through the curve sampled evenly in strain as in a test at
+    constant rate; the curve is a piecewise cubic without overshoot. "secant at b %": stress over strain.
+    Raises InputError for an unknown procedure or too short a curve.
     """
     if procedure not in PROCEDURES:
         raise InputError(

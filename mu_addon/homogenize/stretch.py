@@ -25,11 +25,11 @@ class StretchSettings:
     """Settings of a virtual test of a periodic lattice.
 
     axis: of the stretch, "x", "y" or "z". strains: nominal, at which points are kept; rest is always one.
-    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also test whether
-    the lattice would leave the planes of its mirrors (octant.Octant.buckling), at some 60 factorisations a
-    point asked. tolerance: residual over the root sum of squares of all element forces; min_step: least step
-    of strain; predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted
-    move. Raises InputError for strains not above -1.
+    confined: the lateral stretches are held at 1, else their mean stresses are 0. buckling: also test for
+    buckling out of the mirror planes (octant.Octant.buckling), at some 60 factorisations a point. tolerance:
+    residual over the root sum of squares of all element forces; min_step: least step of strain;
+    predictor_tolerance: how far from its prediction a state may lie, as a share of the predicted move. Raises
+    InputError for strains not above -1.
     """
 
     axis: str = attrs.field(default="z", validator=attrs.validators.in_(AXES))
@@ -84,10 +84,10 @@ def stretch_lattice(
 ) -> Stretched:
     """Uniaxial tension and compression of a periodic lattice at finite strain, by one eighth of its cell.
 
-    mesh: the eighth, [0, box] mm; its sides stay plane, as the lattice's mirror planes demand. A lattice
-    that would buckle away from them is detected with `settings.buckling` only. The curve ends where no
-    stable equilibrium is found or where walls meet, and `stopped` says so. on_point: called with each
-    `Point`. Raises MeshingError where the undeformed cell is unstable.
+    mesh: the eighth, [0, box] mm; its sides stay plane, as the lattice's mirror planes demand. A lattice that
+    would buckle away from them is detected with `settings.buckling` only. The curve ends where no stable
+    equilibrium is found or walls meet; `stopped` gives the reason. on_point: called with each `Point`. Raises
+    MeshingError where the undeformed cell is unstable.
     """
     return Stretching(mesh, materials, box, settings).run(on_point)
 
@@ -326,7 +326,7 @@ class Stretching:
         return np.where(self.octant.across, self.octant.mesh.nodes * (stretch - 1.0), u)
 
     def _first_contact(self, path: Sequence[Point]) -> str:
-        """Position on a path, straight between states, where walls first meet, in words; "" if nowhere."""
+        """Position on a path, straight between states, where walls first meet, as text; "" if nowhere."""
         for before, after in itertools.pairwise(path):
             if not self._meeting(after.stretch, after.u):
                 continue
@@ -343,7 +343,7 @@ class Stretching:
         return ""
 
     def _meeting(self, stretch: Array, u: Array) -> str:
-        """Walls of the deformed lattice that intersect, in words, or "".
+        """Walls of the deformed lattice that intersect, as text, or "".
 
         An eighth meets its mirror images exactly where it crosses a mirror plane.
         """

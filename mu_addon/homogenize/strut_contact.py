@@ -31,7 +31,7 @@ class StrutContact:
 
     def __str__(self) -> str:
         place = ", ".join(f"{c + 0.0:.1f}" for c in self.place)
-        return f"a strut meets {self.what} where it was at ({place}) mm from the block's middle"
+        return f"a strut touches {self.what} at the point that was ({place}) mm from the block's middle"
 
 
 @attrs.frozen(eq=False)
@@ -48,8 +48,8 @@ class _Plane:
 def first_strut_contact(mesh: Mesh, strains: Sequence[float], moves: Sequence[Array]) -> StrutContact | None:
     """The first contact along displacements (n, 3) in mm of an eighth at ascending nominal strains, or None.
 
-    The first state must be free of contact. Struts meet a plate where they pass the plane of the mesh's
-    `tip`, and their own images where they pass a mirror plane; between two states nodes move along straight
+    The first state must be free of contact. Struts touch a plate where they pass the plane of the mesh's
+    `tip`, and their own images where they pass a mirror plane. Between two states nodes move along straight
     lines.
     """
     planes = [

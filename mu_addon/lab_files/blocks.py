@@ -53,12 +53,12 @@ class Unread:
 
     @property
     def words(self) -> str:
-        """The same in words, such as "line 62: 'OVERLOAD' in 'Load (N)' is not a number"."""
+        """The same as text, such as "line 62: 'OVERLOAD' in 'Load (N)' is not a number"."""
         return f"{self.what or spans(self.lines)}: {self.why}"
 
 
 def spans(lines: Sequence[int]) -> str:
-    """Numbers of lines in words, such as "lines 3 to 7, 9"."""
+    """Line numbers as text, such as "lines 3 to 7, 9"."""
     runs: list[list[int]] = []
     for line in sorted(set(lines)):
         if runs and line == runs[-1][1] + 1:
@@ -74,10 +74,10 @@ class Block:
     """A table of one record.
 
     columns: the quantity of each; values (n, columns) as in the file, nan where one is missing or unreadable;
-    lines (n,) in the file; label: name above its columns, "" without one; facts: of the rows above, by name
-    in small letters: the cells after it, none for a line of one cell; decimal: the sign in these; bad: text
-    of the cells that are not numbers, by row and column; unread: columns that are not read; unsure: both
-    decimal signs are possible; noted: conclusions; clock: the column that holds times of day, None for none.
+    lines (n,) in the file; label: name above its columns, "" without one; facts: of the rows above, the cells
+    after a name in lower case, none for a line of one cell; decimal: the decimal sign; bad: text of the cells
+    that are not numbers, by row and column; unread: columns that are not read; unsure: both decimal signs are
+    possible; noted: conclusions; clock: the column of times of day, or None.
     """
 
     sheet: str
@@ -161,10 +161,10 @@ class _Finding:
             self._leave(same, f"{shown!r}: {why}")
 
     def _note_numbers(self, begin: int, places: Sequence[int]) -> None:
-        """List rows of numbers that belong to no record, also one that was cut after its first number.
+        """List rows of numbers outside every record, also a row that was cut after its first number.
 
-        Or at another place: a row with a number directly below such a one or the last record, which ends
-        before row `begin`, is not a fact of what follows.
+        A row with a number directly below such a row, or below the last record, which ends before row
+        `begin`, is not a fact of the next table.
         """
         rows, last = [], begin - 1 if begin else -2
         for k in places:
@@ -194,7 +194,7 @@ class _Finding:
         return None
 
     def _extent(self, start: int) -> tuple[list[int], list[int], int]:
-        """The rows of a table, the rows within it without two numbers of it, and its end."""
+        """The rows of a table, the rows within it that lack two of its numbers, and its end."""
         near = [m for m in self.numeric[start : start + _JUDGED] if len(m) > 1]
         counts: dict[int, int] = {}
         for m in near:
@@ -342,7 +342,7 @@ def _is_titles(row: Row) -> bool:
 
 
 def _names_columns(row: Row) -> bool:
-    """Return True if a row is titles without doubt: words in every cell, the first of which is a time."""
+    """Return True if a row certainly holds titles: words in every cell, and the first names a time."""
     cells = row.cells
     words = len(cells) > 1 and all(cell and not cell[0].isdigit() for cell in cells) and _is_titles(row)
     return words and column(cells[0]).quantity == "time"
@@ -606,6 +606,6 @@ def _facts(rows: Sequence[Row]) -> dict[str, tuple[str, ...]]:
 
 
 def _specimen(rows: Sequence[Row]) -> str:
-    """Name of a specimen on a separate line, the last one; "" for none."""
+    """Name of a specimen on the last separate line; "" if there is none."""
     lines = [row.filled[0] for row in rows if len(row.filled) == 1]
     return next((line for line in reversed(lines) if _SPECIMEN.fullmatch(plain(line))), "")

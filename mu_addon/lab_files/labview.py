@@ -43,7 +43,7 @@ def rows_of_labview(rows: Sequence[Row]) -> tuple[Row, ...]:
 
 
 def _titles(cells: Sequence[str], header: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Titles with the units of the header where they have none."""
+    """Titles, with units from the header where they lack one."""
     units, dimensions = header.get("Y_Unit_Label", ()), header.get("X_Dimension", ())
     named = []
     for k, title in enumerate(cells):

@@ -184,13 +184,13 @@ class _Proposing:
         )
 
     def _title(self, k: int) -> str:
-        """A column in words."""
+        """A column as text."""
         one = self.block.columns[k]
         unit = f" [{one.unit}]" if one.unit and one.unit not in one.title else ""
         return f"column {one.title!r}{unit}" if one.title else f"column {one.place}, which has no title{unit}"
 
     def _range(self, k: int) -> str:
-        """The least and the largest number of a column in words, "" for none."""
+        """The least and the largest number of a column as text, "" if it has none."""
         values = self.block.values[:, k]
         if not np.isfinite(values).any():
             return ""
@@ -200,7 +200,7 @@ class _Proposing:
         one = self.block.columns[k]
         if one.quantity == "count":
             return "not a quantity that is read" + (f", in {one.unit!r}" if one.unit else "")
-        return f"its quantity is not known; say it with column.{self._name(one)}=QUANTITY"
+        return f"its quantity is not known; set it by column.{self._name(one)}=QUANTITY"
 
     def _columns(self) -> tuple[dict[str, Array], dict[str, str]]:
         """The columns of known quantity, in the units that are read, and the source of each."""
@@ -211,7 +211,7 @@ class _Proposing:
         for k, given in enumerate(self.block.columns):
             one = self._answered(given, k, untitled)
             if one is None:
-                self.unread.append(Unread(self._title(k), "left out by the answer none"))
+                self.unread.append(Unread(self._title(k), "left out by the answer 'none'"))
                 continue
             if not one.quantity or one.quantity == "count":
                 self.free.append(k)
@@ -219,7 +219,7 @@ class _Proposing:
             if one.factor is None:
                 one = self._unit(one, k)
             if one.stated and one.stated != one.quantity:
-                self.concluded.append(f"{self._title(k)} is read as {one.quantity}, as its unit says")
+                self.concluded.append(f"{self._title(k)} is read as {one.quantity}, by its unit")
             values = self.block.values[:, k] * (one.factor or 1.0)
             read = f" [{one.unit}]" if one.unit else ""
             source = f"{one.title or f'column {one.place}'!r}{read}"
@@ -458,7 +458,7 @@ class _Proposing:
         return known is None or any(READ_IN[q] == known[0] for q in quantities)
 
     def _loading(self) -> str:
-        """Kind of loading, a pulled specimen or a compressed lattice, by the words of the file."""
+        """Kind of loading, tension of a specimen or compression of a lattice, by the file's text."""
         words = " ".join(
             [self.path.stem, self.block.sheet, self.block.label, *(c.title for c in self.block.columns)]
             + [" ".join((key, *cells)) for key, cells in self.block.facts.items()]
@@ -495,7 +495,7 @@ class _Proposing:
         """Columns that a kind may have."""
         kept = {name: values for name, values in columns.items() if KINDS[kind].knows(name)}
         self.unread += [
-            Unread(self._title(self.places[name]), f"{name} is nothing that {kind} has")
+            Unread(self._title(self.places[name]), f"{name} is not a column of {kind}")
             for name in columns
             if name not in kept
         ]
@@ -546,7 +546,7 @@ class _Proposing:
         return {name: values[self.keep] for name, values in columns.items()}
 
     def _time(self, columns: dict[str, Array], kind: str) -> None:
-        """Raise InputError for a time that runs backward; leave out one that stands still, if allowed."""
+        """Raise InputError for a time that runs backward; leave out a constant one, if allowed."""
         if "time_s" not in columns:
             return
         begins = float(columns["time_s"][0])
@@ -568,7 +568,7 @@ class _Proposing:
             del columns["time_s"]
 
     def _signs(self, columns: dict[str, Array], kind: str) -> None:
-        """Set signs: compression positive in a block of lattice; a coupon's force and stretch alike."""
+        """Set signs: compression positive in a lattice block; a coupon's force with its stretch's sign."""
         pairs = [name for name in ("strain", "displacement_mm", "stress_kPa", "force_N") if name in columns]
         negative = [name for name in pairs if _extreme(columns[name]) < 0]
         differ = kind == "coupon" and len(negative) < len(pairs)
@@ -614,7 +614,7 @@ class _Proposing:
         if axis and "orientation_axis" in KINDS[kind].keys:
             keys["orientation_axis"] = axis
         if kind == "blocked_force" and "gap_mm" not in keys:
-            self._ask("gap_mm", "how far in mm did the load cell stand from the tip at rest?", (), "0")
+            self._ask("gap_mm", "how far in mm was the load cell from the tip at rest?", (), "0")
         if "pressure" in KINDS[kind].keys and self._choice("pressure", ("gauge", "absolute")):
             keys["pressure"] = self._choice("pressure", ("gauge", "absolute"))
         if "cells" in self.answers and kind == "lattice_compression":

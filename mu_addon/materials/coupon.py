@@ -1,6 +1,6 @@
 """Coupons: response of a law to the homogeneous deformations of a tension test.
 
-Modes, with axis 1 pulled: "uniaxial" (2 and 3 free), "equibiaxial" (1 and 2 pulled alike, 3 free) and
+Modes, with axis 1 pulled: "uniaxial" (2 and 3 free), "equibiaxial" (1 and 2 pulled equally, 3 free) and
 "pure_shear" (1 pulled, 2 held, 3 free: a wide, short strip). Free axes bear no stress.
 """
 
@@ -74,7 +74,7 @@ def binned(coupon: Coupon, most: int = 128) -> tuple[Coupon, Array]:
     """A coupon with means of stretch and stress (MPa) in `most` equal bins of stretch, and the counts (k,).
 
     The counts are of rows in each bin; empty bins are left out. A coupon of up to 2 `most` rows is returned
-    as it is, with counts of 1.
+    unchanged, with counts of 1.
     """
     n = len(coupon.stretch)
     if n <= 2 * most:

@@ -47,9 +47,9 @@ class Fit:
     """A law fitted to coupons.
 
     parameters: the law's row (count,), in the units that its names give. rss: sum of squared weighted
-    residuals of n values, without unit. memory: number of correlated values that are worth one independent
+    residuals of n values, without unit. memory: number of correlated values equivalent to one independent
     value. errors: of every coupon, fitted or held out. stability: over each mode's range. invalid: why the
-    law does not admit the parameters, "" if it does.
+    law rejects the parameters, or "".
     """
 
     form: Form
@@ -112,7 +112,7 @@ class Fit:
         return self.form.law, self.parameters
 
     def instability(self) -> str:
-        """Reason why the law is unstable, in words; "" if it is stable."""
+        """Reason why the law is unstable; "" if it is stable."""
         if self.invalid:
             return self.invalid
         return "; ".join(s.where() for s in self.stability if not s.stable)
@@ -135,7 +135,7 @@ def fit_coupons(
     """Fit a law to coupons by least squares, all modes at once, at constant volume.
 
     weights: "absolute", residuals over the largest stress of their coupon, as a load cell's errors scale with
-    its range; "relative", residuals over the stress itself, or FLOOR of the largest where that is more.
+    its range; "relative", residuals over the stress itself, or FLOOR of the largest if that is larger.
     `POISSON` sets the bulk modulus. Factors follow from exponents by linear least squares within their
     bounds, exponents by nonlinear least squares from the best combinations on a grid. Intervals of 95 %:
     linearised, or by `profile` for Ogden laws, with Student's t, widened where successive residuals are

@@ -39,8 +39,8 @@ def intervals(
     """95 % intervals of the parameters of a fitted row (count,), from its weighted residuals (n,).
 
     memory: number of correlated residuals that are worth one independent value; it widens every interval by
-    its square root. profile: None for linearised intervals; else the problem, or one of fewer rows, whose
-    profile gives those of Ogden's parameters: up to where the best fit with that parameter fixed is worse by
+    its square root. profile: None for linearised intervals. Else the problem, or one of fewer rows, whose
+    profile likelihood bounds Ogden's parameters: the best fit with one parameter fixed becomes worse by
     Student's t.
     """
     form = problem.form
@@ -129,7 +129,8 @@ def _end(
 ) -> tuple[float, bool]:
     """Distance from a parameter's value at which the sum of squares has grown by `margin`.
 
-    fixed: least sum of squares at a value; half: a guess. Returns the step, and whether it ran to `farthest`.
+    fixed: least sum of squares at a value; half: a guess. Returns the step, and True if it reached
+    `farthest`.
     """
     best = fixed(value)
     inside, outside = 0.0, np.inf

@@ -34,7 +34,7 @@ class Choice:
 def choose(fits: Sequence[Fit]) -> Choice:
     """The stable law with the smallest error on held-out coupons or, without any, with the smallest AICc.
 
-    Laws that miss what they were fitted to are considered only if all do: a straight line may pass near a
+    Laws that miss their own fitted data are considered only if all laws do: a straight line may pass near a
     held-out curve by chance. Of tied laws the one with the fewest parameters is chosen. AICc takes the number
     of independent values from the law that fits best, whose residuals are noise if any are. Raises InputError
     where no law is stable. Sources: Hurvich and Tsai, Biometrika 76 (1989) 297; Burnham and Anderson, 2002,

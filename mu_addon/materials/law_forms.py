@@ -1,4 +1,4 @@
-"""The laws that can be fitted, as sums of terms of which each has one factor and perhaps one exponent."""
+"""The laws that can be fitted, as sums of terms; each has one factor and at most one exponent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXPONENTS = (-15.0, 25.0)
 
 @attrs.frozen
 class Form:
-    """A law as it is fitted: stress = sum over k of factor_k times a term of the stretches.
+    """A law in the form that is fitted: stress = sum over k of factor_k times a term of the stretches.
 
     names: parameters that are fitted. exponents: number of Ogden terms, each with a free exponent alpha_p and
     a factor c_p = mu_p alpha_p/2, its share of the shear modulus; 0 for a law whose terms are fixed. least:

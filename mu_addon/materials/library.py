@@ -84,8 +84,8 @@ class Material:
     """A material: figures by name, points of its stress-strain curve, a law with its row of parameters (p,).
 
     ranges: lowest and highest stretch, by mode, of the data that the law was fitted to or is meant for;
-    fails: modes that it is known to miss; low95, high95: 95 % intervals of fitted parameters. wall: the
-    behaviour of a unit's wall of it beyond the elastic law.
+    fails: modes that it predicts badly; low95, high95: 95 % intervals of fitted parameters. wall: behaviour
+    of a unit's wall of this resin beyond the elastic law.
     """
 
     name: str
@@ -403,7 +403,7 @@ class _Reader:
 
     def _ranges(self, found: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
         ranges, where = found.get("ranges"), self.at("law", "ranges")
-        remedy = "give what it is meant for, such as { uniaxial = [0.7, 1.5] }"
+        remedy = "give the stretches it is valid for, such as { uniaxial = [0.7, 1.5] }"
         if not isinstance(ranges, dict) or not ranges or not set(ranges) <= set(MODES):
             raise InputError(f"ranges = {ranges!r} does not name modes", where, remedy)
         for mode, span in ranges.items():

@@ -37,7 +37,7 @@ class Stability:
         return self.unstable_at is None
 
     def where(self) -> str:
-        """Mode and stretch at which the law is unstable, in words."""
+        """Mode and stretch at which the law is unstable, as text."""
         if self.unstable_at is None:
             return "nowhere"
         side = "at" if self.unstable_at == 1 else "above" if self.unstable_at > 1 else "below"
@@ -47,7 +47,7 @@ class Stability:
 def whole_ranges(reached: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     """Lowest and highest stretch of every mode, from those of the modes in `reached`.
 
-    Another mode gets a range from 1 up to the largest equivalent logarithmic strain of those.
+    Another mode gets a range from 1 to the largest equivalent logarithmic strain of the tested modes.
     """
     far = max(equivalent_stretch(mode, x) for mode, span in reached.items() for x in span)
     return {mode: reached.get(mode, (1.0, float(stretch_of_equivalent(mode, far)))) for mode in MODES}
@@ -57,11 +57,11 @@ def check_stability(law: Any, parameters: Array, mode: str, low: float, high: fl
     """Check a law with one row of parameters (count,) along a mode, from stretch `low` to `high`.
 
     Drucker's postulate in Hill's form: d(tau):d(e) > 0 for every increment de of the logarithmic strain, tau
-    the Kirchhoff stress. At principal stretches that is: the Hessian of the energy by logarithmic strains is
-    positive definite, and (tau_a - tau_b)/(e_a - e_b) > 0 for every pair. A law that splits the volume off is
-    checked at constant volume, for increments that keep it; any other along its own path without lateral
-    stress. Sources: Drucker, J. Appl. Mech. 26 (1959) 101; Hill, Proc. R. Soc. A 314 (1970) 457. Raises
-    InputError for low and high that are not a range, and as `principal_stretches` does.
+    the Kirchhoff stress. In principal stretches: the Hessian of the energy by logarithmic strains is positive
+    definite, and (tau_a - tau_b)/(e_a - e_b) > 0 for every pair. A law with a separate volumetric part is
+    checked at constant volume, for isochoric increments; any other along its own path without lateral stress.
+    Sources: Drucker, J. Appl. Mech. 26 (1959) 101; Hill, Proc. R. Soc. A 314 (1970) 457. Raises InputError
+    for low and high that are not a range, and as `principal_stretches` does.
     """
     if not 0 < low < high:
         raise InputError(f"stretches from {low:g} to {high:g}", mode, "give 0 < low < high")

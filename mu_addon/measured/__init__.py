@@ -1,7 +1,7 @@
 """Measured data: a folder of experiments (`experiments.toml` and CSV files), read and checked.
 
-`read_folder` gives a `Measured` with its experiments in the order in which they were made; every fault of a
-file is an InputError with file, row and what to do.
+`read_folder` gives a `Measured` with its experiments in the order in which they were made; a fault in a file
+raises an InputError with file, row and remedy.
 """
 
 from typing import TYPE_CHECKING

@@ -29,14 +29,12 @@ class Experiment:
     columns: arrays (n,) by their names, which end with the unit; for a coupon or a lattice that was recorded
     as displacement and force they include strain and nominal stress_kPa (compression positive in
     lattice_compression, tension positive in coupon). A column with _sd_ in its name is the standard deviation
-    by which the whole record beside it is uncertain. A lattice that was weighed has columns mass_g and
-    mass_sd_g, one value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction
-    of gravity about `orientation_axis`, x where none is given, 0 hanging with the tip down; see
-    `unit_pose.down`.
-    strut_mm: diameter that straight round struts were drawn with, None for the unit's.
-    gap_mm: from the tip at rest to the load cell that holds it. section_mm: width and thickness of what bears
-    the load. accuracy: stated for instruments, by the column that they read, in its unit. sha256: of the
-    file's bytes.
+    of an error that its whole record shares. A lattice that was weighed has columns mass_g and mass_sd_g, one
+    value throughout. rows (n,): numbers of the lines in the file. orientation_deg: direction of gravity about
+    `orientation_axis`, x where none is given, 0 hanging with the tip down; see `unit_pose.down`. strut_mm:
+    diameter that straight round struts were drawn with, None for the unit's. gap_mm: from the tip at rest to
+    the load cell that holds it. section_mm: width and thickness of the loaded section. accuracy: of
+    instruments as stated, by column, in its unit. sha256: of the file's bytes.
     """
 
     name: str

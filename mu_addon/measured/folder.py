@@ -50,7 +50,7 @@ def read_folder(folder: Path) -> Measured:
     """Read and check a folder of measured data: experiments.toml and the CSV files that it names.
 
     Strain and stress are computed from displacement and force where needed. Raises InputError with file, row
-    or key, and what to do.
+    or key, and remedy.
     """
     path = Path(folder) / FILE
     text = _text(path, f"a folder of measured data holds {FILE}, which names its CSV files")
@@ -307,7 +307,7 @@ def _strained(
                 Remark(
                     f"strain and displacement over length differ by up to {apart:.3g}; the strain is used",
                     str(path),
-                    "see whether length_mm is the length between the marks",
+                    "check that length_mm is the length between the marks",
                 )
             )
     if "stress_kPa" not in columns:
@@ -366,11 +366,11 @@ def _check_spread(spread: Array, column: str, rows: Array, path: Path) -> None:
 
 
 def _check_apart(found: Experiment, before: Sequence[Experiment], at: _Place) -> None:
-    """Check that names differ, and that nothing held out was fitted."""
+    """Check that names differ and that no held-out data were fitted."""
     for other in before:
         if other.name == found.name:
             raise InputError(
-                f"two experiments are named {found.name!r}", at("name"), "give each its own name"
+                f"two experiments are named {found.name!r}", at("name"), "give them different names"
             )
         if other.sha256 == found.sha256 and other.role != found.role:
             raise InputError(

@@ -60,8 +60,8 @@ def at_rest(experiments: Sequence[Experiment]) -> dict[int, tuple[str, Array, st
 def down(orientation_deg: float, axis: Direction = X) -> Array:
     """Unit vector (3,) of gravity in the unit's frame; at 0 degrees along z, as a unit hangs.
 
-    Gravity is turned by orientation_deg degrees about `axis` (3,), of any length but 0, as a right-handed
-    screw turns (Rodrigues): about x to -y, about y to +x. Raises InputError for an axis without a length.
+    Gravity is rotated by orientation_deg about `axis` (3,) of nonzero length, right-handed (Rodrigues): about
+    x to -y, about y to +x. Raises InputError for an axis without a length.
 
     >>> down(0.0).round(9).tolist()[2], down(90.0, (0.0, 1.0, 0.0)).round(9).tolist()[0]
     (1.0, 1.0)

@@ -38,7 +38,7 @@ BESIDE, EXACT, UNSURE = (12, 9, 6), 0.01, 0.08
 
 @attrs.frozen
 class Remark:
-    """Something unusual about data that can still be used: what, where, and what to do about it."""
+    """An unusual feature of usable data: what, where, and what to do."""
 
     what: str
     where: str
@@ -236,7 +236,7 @@ def _numbers(body: Sequence[tuple[int, list[str]]], place: int, name: str, width
                 raise InputError(
                     f"{cell} is not a reading",
                     _at(path, row, name),
-                    "correct it, or leave the cell empty where nothing was read",
+                    "correct it, or leave the cell empty if there is no reading",
                 )
         else:
             raise InputError(
@@ -322,7 +322,7 @@ def _check_missing(name: str, values: Array, rows: Array, path: Path, remarks: l
 def _check_spikes(
     name: str, values: Array, time: Array | None, rows: Array, path: Path, remarks: list[Remark]
 ) -> None:
-    """Remark on single values that stand apart from both neighbours, as a corner or a step does not.
+    """Remark on single values that differ from both neighbours, unlike a corner or a step.
 
     d is the distance from the line through the neighbours; a lone spike of height h shows as d = h with
     -h/2 on either side.
@@ -356,9 +356,9 @@ def _check_spikes(
 
 
 def _check_switched(name: str, columns: dict[str, Array], rows: Array, path: Path) -> None:
-    """Raise InputError where a reading jumps by the factor between two units, while nothing else does.
+    """Raise InputError where one column alone jumps by the factor between two units.
 
-    The lines through `BESIDE` rows on either side tell the factor, at the largest jump of the column.
+    The factor is that of the lines through `BESIDE` rows on either side of the column's largest jump.
     """
     x = columns[name]
     i = int(np.argmax(np.abs(np.diff(x)))) if len(x) > 2 * max(BESIDE) else 0

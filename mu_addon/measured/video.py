@@ -1,7 +1,7 @@
 """Markers tracked in a video: from pixels to millimetres in the unit's frame, and to an angle.
 
-The bending plane is the complex plane, w = y + i z in mm, and a place in the picture is q = right + i up,
-seen from the side the camera is on; a camera far enough away makes w = a q + b, where |a| is the scale.
+The bending plane is the complex plane, w = y + i z in mm. A point of the picture is q = right + i up, seen
+from the camera's side. A distant camera gives w = a q + b, where |a| is the scale.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Tracks:
     """Markers tracked through a clip: (m, n, 2) in pixels, right and down from the upper left corner.
 
     names: of the m markers; positions are nan in frames where a marker was lost. fps: frames per s, 0 where
-    the clip does not give it; time_s (n,): of the frames in s, None where only fps says it. remarks: on how
+    the clip does not give it; time_s (n,): of the frames in s, None if only fps is known. remarks: on how
     they were read.
     """
 
@@ -61,7 +61,7 @@ class View:
     """View of the unit by the camera.
 
     base: two markers that are fixed to the base; places_mm: (y, z) in mm of each in the unit's frame; tip:
-    two markers on the tip, or None if no angle is wanted; camera: "+x" or "-x", the side it stands on. The
+    two markers on the tip, or None if no angle is wanted; camera: "+x" or "-x", its side of the unit. The
     scale is mm_per_pixel, or follows from ruler_mm, the distance of the two markers `ruler`, or from the
     base. follow_base: whether places and angle are relative to the base in each frame, for a camera or clamp
     that moves.

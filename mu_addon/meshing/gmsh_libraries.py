@@ -1,6 +1,6 @@
 """System libraries that gmsh's published wheel needs, and the remedy where one is missing.
 
-Of these the extension's own gmsh asks for libgomp alone.
+The extension's own gmsh needs only libgomp of these.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _CACHE = Path("/etc/ld.so.cache")
 
 
 def missing_libraries() -> list[str]:
-    """Names of those of SYSTEM_LIBRARIES that this system lacks; none where it cannot be known."""
+    """Names in SYSTEM_LIBRARIES that this system lacks; empty if that is unknown."""
     try:
         known = file_bytes(_CACHE)
     except OSError:

@@ -64,8 +64,8 @@ def mesh_unit(
     clamped, the inlet is left out. settings: sizes and order. mesher: "gmsh", "pytetwild" (meshes all from
     surfaces instead, straight-sided, coarser in shape and slower, and cached in the folder `cache`), or
     "auto": pytetwild, with a MeshingWarning, only where gmsh cannot be loaded. body: a closed surface in
-    place of the envelope's box (`design.body.envelope`), which pytetwild meshes: half of it where it is its
-    own mirror image across x = 0. progress: called with a stage and the share done.
+    place of the envelope's box (`design.body.envelope`), which pytetwild meshes; half of it if it is
+    symmetric about x = 0. progress: called with a stage and the share done.
 
     Raises InputError and MeshingError. A coarse mesh takes about a second: `mesh_unit(load_preset("mu-1.0x"),
     MeshSettings(order=1, refine=0.5))`.
@@ -157,8 +157,8 @@ def _joined(membrane: Membrane, nodes: Array, lattice: Array, height: float, ord
 def _flattening_chords(mesh: Mesh, outside: Array) -> Array:
     """Straight edges (k, 2) between profile nodes, in lattice elements that the curved profile flattens.
 
-    An element with two sides on the smooth profile opens to 180 degrees between them; halving the edge
-    that joins their far ends gives it two elements of half the angle. No two chords share an element.
+    An element with two sides on the smooth profile has an angle of 180 degrees between them. Splitting the
+    opposite edge gives two elements of half the angle. No two chords share an element.
     """
     flat = np.flatnonzero((folded_corners(mesh) < _FLAT) & (mesh.region == LATTICE))
     on_profile = np.zeros(len(mesh.nodes), bool)
@@ -205,7 +205,7 @@ def _from_surfaces(
     envelope: Surface | None = None,
     whole: bool = False,
 ) -> Mesh:
-    """A unit's half at x >= 0, or all of it, by pytetwild, tagged by the exact profile."""
+    """A unit's half at x >= 0, or the whole, by pytetwild, tagged by the exact profile."""
     size = d.cell / CELL_MM / settings.refine
     box, profile, cavity = unit_surfaces(d, (2 if whole else 1) * math.pi, settings.meridian_mm * size)
     envelope = envelope or box
@@ -230,7 +230,7 @@ def relieved(mesh: Mesh, bounds: Any) -> Mesh:
     """The mesh with lattice elements bent along with the membrane, where its curvature would fold one.
 
     bounds (3, 2): the envelope's box, (low, high) in mm for x, y and z; its faces and the mirror planes keep
-    their nodes in plane, and the membrane keeps all of its own. Meshes of order 1 are returned as they are.
+    their nodes in plane, and the membrane keeps all its nodes. Meshes of order 1 are returned as they are.
     """
     lattice = mesh.region == LATTICE
     if mesh.order == 1 or folded_corners(mesh)[lattice].min() > _BENT:

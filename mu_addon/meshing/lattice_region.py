@@ -38,7 +38,7 @@ class Sizes:
 
 
 def load_gmsh() -> Any:
-    """The gmsh module. Raises GmshUnavailable, naming what is missing, where it cannot be loaded."""
+    """The gmsh module. Raises GmshUnavailable, naming the missing part, if it cannot be loaded."""
     try:
         import gmsh
     except ImportError as error:
@@ -52,7 +52,7 @@ def load_gmsh() -> Any:
     if not hasattr(gmsh.lib, "gmshInitialize"):
         raise GmshUnavailable(
             "gmsh is installed without its library",
-            remedy="install gmsh by pip into an environment of its own",
+            remedy="install gmsh by pip in a separate environment",
         )
     return gmsh
 
@@ -62,10 +62,10 @@ def lattice_mesh(
 ) -> tuple[Array, Array]:
     """Fill the space between the membrane and its envelope with linear tetrahedra.
 
-    nodes (n, 3) in mm; outside (f, 3), the triangles of the membrane towards the lattice, which the
-    filling keeps; plan (k, 2), corners (x, y) in mm of the envelope from the end of one mirror plane round to
-    the end of the other; height in mm. Returns additional nodes (a, 3), numbered on from n, and tets (m, 4).
-    Raises GmshUnavailable, and MeshingError where gmsh fails or does not keep the given triangles.
+    nodes (n, 3) in mm; outside (f, 3), the triangles of the membrane towards the lattice, which the filling
+    keeps; plan (k, 2), corners (x, y) in mm of the envelope, from the end of one mirror plane to the end of
+    the other; height in mm. Returns additional nodes (a, 3), numbered on from n, and tets (m, 4). Raises
+    GmshUnavailable, and MeshingError where gmsh fails or does not keep the given triangles.
     """
     # gmsh numbers its own nodes on from the largest it was given, so these must be dense.
     used, dense = np.unique(outside, return_inverse=True)
@@ -123,7 +123,7 @@ _OPTIONS = {
 
 @contextmanager
 def gmsh_model(gmsh: Any) -> Iterator[Any]:
-    """Context of a fresh, silent gmsh model under fixed options; gmsh's own state is restored afterwards."""
+    """Context of a new, silent gmsh model with fixed options; gmsh's state is restored afterwards."""
     ours = not gmsh.isInitialized()
     if ours:
         # Personal option files and signal handlers would change results and Ctrl-C.

@@ -46,17 +46,17 @@ class Mesh:
     point out of the solid, into the cavity; base and tip, int32 nodes of the two end planes; symmetry,
     the axes whose zero plane is a mirror of the body.
 
-    A mesh of parts that overlap has two tables more, else empty. filled (m, q): the share, 0 to 1, of the
-    volume at each of an element's q quadrature points that counts. tied (t,), tied_to (t, k), tied_weights
-    (t, k): nodes that move as the weighted sum of others, which are not tied themselves.
+    A mesh of overlapping parts has two more tables, else empty. filled (m, q): the share, 0 to 1, of the
+    volume that counts at each of an element's q quadrature points. tied (t,), tied_to (t, k), tied_weights
+    (t, k): nodes that move as the weighted sum of untied nodes.
 
-    Where struts are beams (`fem.beams`) it has more, else empty. beams (e, 4): of either end the node on the
-    strut's axis, and a node without elements whose displacement is that end's rotation vector; flexible
-    (e, 6): integrals over their sections, see `fem.beams.sections_of`; beam_of (m,): the beam that an element
-    is part of, which then resists nothing by itself, or -1. carried (c,), carriers (c, 4), shares (c,): nodes
-    that move with the sections at two beam nodes, each given as in `beams`: the share of the first counts,
-    and the rest of the second. in_beams (m, q), or empty: the share, 0 to 1, of the volume at each quadrature
-    point of an element that is no beam's part but reaches into one, which resists for it there.
+    A mesh with beams (`fem.beams`) has further tables, else empty. beams (e, 4): for each end the node on the
+    strut's axis, and a node without elements whose displacement is that end's rotation vector. flexible (e,
+    6): integrals over their sections, see `fem.beams.sections_of`. beam_of (m,): the beam that replaces an
+    element, which then has no stiffness, or -1. carried (c,), carriers (c, 4), shares (c,): nodes that move
+    with the sections at two beam nodes, given as in `beams`; the first has the weight `shares`, the second
+    the rest. in_beams (m, q), or empty: for an element that no beam replaces, the share, 0 to 1, of the
+    volume at each quadrature point that lies in a beam and has its stiffness there.
     """
 
     nodes: Array = attrs.field(converter=_float64)
@@ -194,7 +194,7 @@ def _on_plane(mesh: Mesh, axis: str) -> Array:
 
 
 def _mirrored_beams(mesh: Mesh, image: Array) -> dict[str, Array]:
-    """Beams of a mesh and of its image, where image (n,) numbers each node's own."""
+    """Beams of a mesh and of its mirror image; image (n,): number of each node's image."""
     if not len(mesh.beams):
         return {}
     off = image[mesh.carried] != mesh.carried
@@ -211,7 +211,7 @@ def _mirrored_beams(mesh: Mesh, image: Array) -> dict[str, Array]:
 
 
 def _mirrored_ties(mesh: Mesh, image: Array) -> dict[str, Array]:
-    """Ties of a mesh and of its image, where image (n,) numbers each node's own."""
+    """Ties of a mesh and of its mirror image; image (n,): number of each node's image."""
     off = image[mesh.tied] != mesh.tied
     return {
         "tied": np.concatenate([mesh.tied, image[mesh.tied[off]]]),
@@ -241,7 +241,7 @@ def oriented(nodes: Array, tets: Array) -> Array:
 def edges_of(tets: Array) -> tuple[Array, Array]:
     """Unique edges (e, 2), ends ascending, and the numbers (m, 6) of each element's edges among them.
 
-    tets (m, 4 | 10), of which the corners count; the six are in VTK's order, `TET_EDGES`.
+    tets (m, 4 | 10), only corners are used; the six are in VTK's order, `TET_EDGES`.
     """
     pairs = np.sort(tets[:, :4][:, TET_EDGES].reshape(-1, 2), axis=1)
     edges, inverse = np.unique(pairs, axis=0, return_inverse=True)
@@ -251,7 +251,7 @@ def edges_of(tets: Array) -> tuple[Array, Array]:
 def boundary_faces(tets: Array) -> tuple[Array, Array]:
     """Faces that belong to one tetrahedron only, (f, 3) with normals outward, and its number (f,).
 
-    tets (m, 4 | 10), of which the corners count.
+    tets (m, 4 | 10), only corners are used.
     """
     faces = tets[:, :4][:, TET_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
@@ -270,8 +270,8 @@ def edge_keys(edges: Array, count: int) -> Array:
 def second_order(nodes: Array, tets: Array, triangles: Array, middles: Array) -> tuple[Array, Array, Array]:
     """Nodes (n + e, 3), tets (m, 10) and triangles (f, 6) of order 2, from those of order 1.
 
-    nodes (n, 3) and middles (e, 3) in mm; tets (m, 4); triangles (f, 3), of edges of the tets; middles are
-    the mid-edge nodes of `edges_of(tets)`, in its order.
+    nodes (n, 3) and middles (e, 3) in mm; tets (m, 4); triangles (f, 3), of edges of the tets; middles: the
+    mid-edge nodes, in the order of `edges_of(tets)`.
     """
     edges, of_tet = edges_of(tets)
     ends = np.sort(triangles[:, TRIANGLE_EDGES].reshape(-1, 2), axis=1)

@@ -79,9 +79,9 @@ class Morph:
     def to(self, other: Unit, checked: bool = True) -> Mesh:
         """The mesh moved to the unit `other`, of as many chambers and cells.
 
-        Another cell or scale first scales all of it. The membrane moves to its exact position; nodes between
-        it and the envelope follow harmonically. checked: test elements for inversion, which a tiny move does
-        not need. Raises MeshingError where that cannot be done.
+        A change of cell or scale first scales the whole mesh. The membrane moves to its exact position; nodes
+        between it and the envelope follow harmonically. checked: test elements for inversion; not needed for
+        a tiny move. Raises MeshingError where that cannot be done.
         """
         mesh, a, b = self.mesh, self.drawn.printed, other.printed
         if a == b:
@@ -115,7 +115,7 @@ def morphed(mesh: Mesh, drawn: Unit, other: Unit, settings: MeshSettings) -> Mes
 
 
 def struts_alone_differ(a: Dimensions, b: Dimensions) -> bool:
-    """Return True if dimensions differ in nothing but the struts, so that wall and homogenised mesh agree."""
+    """Return True if dimensions differ only in the struts, so that wall and homogenised mesh agree."""
     struts = ("grading", "junction_diameter", "midspan_diameter")
     return attrs.evolve(b, **{name: getattr(a, name) for name in struts}) == a
 

@@ -1,4 +1,4 @@
-"""Mesh quality: counts, angles, Jacobians, and volumes against the design's own."""
+"""Mesh quality: counts, angles, Jacobians, and volumes compared with the design."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _DUNAVANT_WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3) / 2
 class Quality:
     """Quality of a mesh: counts, angles in degrees, Jacobians, volumes in mm3.
 
-    Volumes are the whole body's, their errors relative to the design. min_scaled_jacobian is the least ratio,
-    in one element, of the smallest to the largest det J at its four Gauss points: 1 where edges are straight,
-    0 where it folds; inverted counts elements that do. min_corner_jacobian is that ratio at the corners, the
-    worst points of a curved element.
+    Volumes are of the whole body, with errors relative to the design. min_scaled_jacobian: the least ratio,
+    in one element, of the smallest to the largest det J at its four Gauss points: 1 for straight edges, 0 for
+    a folded element. inverted: number of folded elements. min_corner_jacobian is that ratio at the corners,
+    the worst points of a curved element.
     """
 
     nodes: int
@@ -56,11 +56,11 @@ class Quality:
 def mesh_quality(
     mesh: Mesh, unit: Unit, body: Body | None = None, struts_mm3: float | None = None
 ) -> Quality:
-    """Counts, angles, Jacobians and volumes of a unit's mesh, beside the exact volumes of the design.
+    """Counts, angles, Jacobians and volumes of a unit's mesh, with the exact volumes of the design.
 
-    Half meshes count as the whole body. body: the closed surface that took the place of the envelope's box,
-    if one did. struts_mm3: volume of the struts outside the actuator, with which the lattice of a resolved
-    mesh is compared. See `Quality` for units.
+    Half meshes count as the whole body. body: the closed surface in place of the envelope's box, if any.
+    struts_mm3: volume of the struts outside the actuator, for comparison with the lattice of a resolved mesh.
+    See `Quality` for units.
     """
     d = unit.printed
     (x0, x1), (y0, y1), (z0, z1) = d.bounds
@@ -125,8 +125,8 @@ def check_positive(mesh: Mesh) -> None:
 def folded_corners(mesh: Mesh) -> Array:
     """Least det J at a corner over the largest |det J| in the element, (m,).
 
-    The largest is that at corners and Gauss points. 1 where edges are straight, 0 where two curved edges line
-    up, negative where the element folds.
+    The largest is over corners and Gauss points. 1 for straight edges, 0 where two curved edges are tangent,
+    negative for a folded element.
     """
     determinants = _determinants(mesh, np.vstack([np.eye(4), GAUSS]))
     return np.asarray(determinants[:, :4].min(axis=1) / np.abs(determinants).max(axis=1))
@@ -140,8 +140,7 @@ def element_volumes(mesh: Mesh) -> Array:
 def cavity_enclosed(mesh: Mesh) -> float:
     """Volume in mm3 between the cavity surface and the mirror planes, by the divergence theorem.
 
-    Mirror planes through the origin add nothing to it, so the part of a cavity in a half or quarter
-    mesh counts by its own faces alone.
+    Mirror planes through the origin contribute 0, so the faces of a cavity in a half or quarter mesh suffice.
     """
     shape, gradient = shapes(_DUNAVANT, TRIANGLE_EDGES, mesh.order)
     x = mesh.nodes[mesh.cavity]

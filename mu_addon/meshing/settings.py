@@ -25,7 +25,7 @@ FIDELITY = described(
 SOLID_STRUTS = described(
     "solid_struts",
     False,
-    "mesh every strut as a solid, to check the beams that stand for whole ones; three to four times as long",
+    "mesh every strut as a solid, to check the beams; takes three to four times as long",
 )
 SELF_CONTACT = described(
     "self_contact",
@@ -69,9 +69,9 @@ class MeshSettings:
     in thin walls. refine: divides every size and multiplies through_wall. Sizes in mm for a cell of 12.5 mm:
     along the membrane's meridian and around its apex, at the line of anchors and at the lattice's envelope.
     through_wall: elements across the membrane. fidelity: "homogenised", the lattice as a continuum;
-    "resolved", its struts as printed, as beams wherever they are whole; or "solid", all of every strut
-    meshed, which "resolved" is checked against. For both order 2, fraction and refine alone count. Raises
-    InputError for a value that is not offered or out of bounds.
+    "resolved", its struts as printed, as beams where they are whole; or "solid", every strut meshed, to check
+    "resolved". For both order 2, fraction and refine alone count. Raises InputError for a value that is not
+    offered or out of bounds.
 
     >>> MeshSettings().order, MeshSettings(refine=0.5).fraction
     (2, 'half')

@@ -54,9 +54,9 @@ def bodies(d: Dimensions, bar: Bar | None = None) -> dict[str, float]:
 def write_step(name: str, d: Dimensions, path: Path, bar: Bar | None = None) -> None:
     """Write one body as STEP in mm, completely or not at all.
 
-    cavity: chambers and inlet as one; membrane: the wall with caps and inlet; envelope: the lattice's box
-    without the actuator; waveguide: bar and seats, with everything cut out. Raises InputError for another
-    name, MeshingError where gmsh cannot be loaded (GmshUnavailable) or fails, and OutputError.
+    cavity: chambers and inlet in one; membrane: the wall with caps and inlet; envelope: the lattice's box
+    without the actuator; waveguide: bar and seats, with all their cuts. Raises InputError for another name,
+    MeshingError where gmsh cannot be loaded (GmshUnavailable) or fails, and OutputError.
     """
     makers: dict[str, Callable[[Any], object]] = {
         "cavity": lambda occ: _revolved(occ, _cavity_section(d)),
@@ -82,8 +82,8 @@ def write_step(name: str, d: Dimensions, path: Path, bar: Bar | None = None) -> 
 def step_volume(path: Path) -> tuple[int, float]:
     """Number of solids in a STEP file, and their volume in mm3 within a surface mesh of order 2.
 
-    By the divergence theorem over the mesh, since a kernel's own mass properties are wrong by up to 20 % on
-    some swept splines. Raises MeshingError where gmsh cannot be loaded or cannot read the file.
+    By the divergence theorem over the mesh: the CAD kernel's mass properties are wrong by up to 20 % on some
+    swept splines. Raises MeshingError where gmsh cannot be loaded or cannot read the file.
     """
     with gmsh_model(load_gmsh()) as gmsh:
         try:
@@ -120,7 +120,7 @@ def _enclosed(gmsh: Any, solid: tuple[int, int]) -> float:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Discard standard output: the STEP writer reports there, whatever gmsh's own verbosity."""
+    """Discard standard output: the STEP writer prints there at every verbosity of gmsh."""
     sys.stdout.flush()
     try:
         kept = os.dup(1)

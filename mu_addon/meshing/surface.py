@@ -56,8 +56,8 @@ def mesh_surface(
     Elements are about edge_mm long; the result stays within epsilon_mm of the surface (a fiftieth of edge_mm
     if not given). Each tetrahedron belongs to the last surface of `inside` that encloses its centroid by
     winding number, else to `region`; or `classify` maps centroids (m, 3) to regions (m,). Elements in VOID
-    are left out, and its wall becomes the cavity. Sides on the bounding box are made exactly flat: the lowest
-    and highest in z are base and tip, and those of `symmetry` must be at zero. Elements of order 2 are
+    are left out, and its wall becomes the cavity. Sides on the bounding box are made exactly flat. The lowest
+    and highest in z are base and tip; those of `symmetry` must be at zero. Elements of order 2 are
     straight-sided. With a cache folder the same input always gives the same mesh. Raises InputError for a
     surface that is not closed, OutputError for a cache that cannot be written, and MeshingError.
     """

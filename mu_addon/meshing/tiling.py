@@ -25,7 +25,7 @@ def tiled(
     """Copies of a mesh in its box [0, box] side by side, every other one mirrored, along x, y and z.
 
     counts: of copies along each axis. box: (3,) mm, `box_of(mesh)` if not given. Nodes exactly on a shared
-    plane become one. The m elements of each copy follow those of the one before, in the mesh's own order; the
+    plane become one. The m elements of each copy follow those of the copy before, in the mesh's order; the
     cavity is left out; base and tip are the nodes at the lowest and highest z. symmetry: the axes whose zero
     plane stays a mirror. Raises MeshingError for a mesh that leaves its box or a count below 1.
     """
@@ -45,7 +45,7 @@ def tiled(
 
 
 def _images(nodes: Array, axis: int, count: int, side: float) -> tuple[list[Array], list[Array]]:
-    """Numbers (n,) of the nodes of each copy along an axis, and a mask of those that are new with it."""
+    """Numbers (n,) of the nodes of each copy along an axis, and a mask of its new nodes."""
     low, high = nodes[:, axis] == 0.0, nodes[:, axis] == side
     total = len(nodes)
     numbers, new = [np.arange(total)], [np.ones(total, bool)]

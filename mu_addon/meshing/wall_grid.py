@@ -1,7 +1,7 @@
 """The membrane and its two caps as a revolved structured grid, curved exactly where it is second order.
 
-A wall of 0.6 mm beside arcs that rise by up to 0.9 mm leaves no room for straight diagonals, so
-its elements and all their mid-edge nodes are placed by one map from the profile, not by a mesher.
+A wall of 0.6 mm along arcs that rise by up to 0.9 mm has no room for straight diagonals. One map from the
+profile therefore places its elements and all mid-edge nodes, not a mesher.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _LARGEST_TURN = math.radians(40)
 class Meridian:
     """The half plane (radius, z) of a unit's membrane: every point of the solid from two coordinates.
 
-    p is the height, in mm, of the point of the outer profile that a wall normal starts from; q runs from
-    0 on the profile to 1 on the cavity and, inside the caps only, on to 2 on the axis. `cuts` are the two
-    heights p whose normals meet the cavity's rims.
+    p is the height in mm of the point on the outer profile where a wall normal starts. q runs from 0 on the
+    profile to 1 on the cavity and, inside the caps, to 2 on the axis. `cuts` are the two heights p whose
+    normals end at the cavity's rims.
     """
 
     d: Dimensions
@@ -156,8 +156,7 @@ def membrane_mesh(meridian: Meridian, p: Array, sectors: int, layers: int, rings
 
 
 def _five_each(ids: Array, solid: Array) -> Array:
-    """Tetrahedra (m, 4) of a grid of hexahedra, five for each with solid[i, k]; on the axis, where the
-    hexahedra collapse to prisms, the two without volume are dropped."""
+    """Tetrahedra (m, 4), five for each hexahedron with solid[i, k]; on the axis, three for each prism."""
     ni, nj, nk = (n - 1 for n in ids.shape)
     i, j, k = np.indices((ni, nj, nk)).reshape(3, -1)
     corner = np.stack([ids[i + a, j + b, k + c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], axis=1)

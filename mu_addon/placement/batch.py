@@ -74,7 +74,7 @@ class CandidateBatch:
         return self.points(self.states(state))
 
     def states(self, state: State) -> list[State]:
-        """Each sensor's own state at the pressure of one of Model A's. Raises ConvergenceError, as `at`."""
+        """Each sensor's state at the pressure of a state of Model A. Raises ConvergenceError, as `at`."""
         return self._batched_newton.at(state)
 
     def points(self, states: Sequence[State]) -> Array:

@@ -62,8 +62,8 @@ def roi(mesh: Mesh, candidate: Candidate, radius_mm: float) -> Inclusion:
 def with_sensor(materials: Materials, share: Array, sensor_MPa: float) -> Materials:
     """Materials with a neo-Hookean sensor in a share (m,) of every element.
 
-    sensor_MPa: the sensor's Young's modulus. Poisson's ratio stays the element's own, so that only Young's
-    modulus differs. Raises InputError for a share outside 0 to 1.
+    sensor_MPa: the sensor's Young's modulus. Poisson's ratio is the element's, so that only Young's modulus
+    differs. Raises InputError for a share outside 0 to 1.
     """
     _, poisson = materials.small_strain(len(share))
     return materials.blended(share, NeoHooke, NeoHooke.parameters(sensor_MPa, poisson))

@@ -13,9 +13,8 @@ Array = np.ndarray[Any, Any]
 def centreline(points: Array, stations: int) -> Array:
     """Positions (k, j, 3) in mm at j uniform normalised arc lengths of polylines (k, N, 3) in mm.
 
-    NaN at times of NaN.
-    Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to [0, 1], the usual
-    stand-in for arc length before the curve is known.
+    NaN at times of NaN. Cubic splines (not-a-knot) through the monitored nodes, by chord length normalised to
+    [0, 1], the usual approximation of arc length.
 
     >>> line = np.array([[[0.0, 0.0, z] for z in (0.0, 1.0, 2.0, 4.0)]])
     >>> centreline(line, 3)[0, :, 2].round(9).tolist()

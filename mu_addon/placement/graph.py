@@ -57,8 +57,8 @@ class Graph:
     def chains(self, limits: Limits) -> Iterator[tuple[int, ...]]:
         """Every chain within the limits as its nodes, from the lowest; only one of two mirror images.
 
-        Depth first and in the order of the nodes, so that the same graph gives the same sequence; only one
-        chain is held at a time.
+        Depth first in the order of the nodes, so that the same graph gives the same sequence. Only one chain
+        is in memory at a time.
         """
         shortest, longest = (self.cell * c for c in (limits.shortest_cells, limits.longest_cells))
         least = np.cos(np.radians(limits.sharpest_bend_deg)) - 1e-9
@@ -101,10 +101,10 @@ class Graph:
 def lattice_graph(d: Dimensions, clearance_mm: float | None = None) -> Graph:
     """Graph of the lattice nodes and steps that keep a distance from membrane and envelope.
 
-    Steps: the lattice's struts, and one cell along z from any node to its like, as the windows of anchors
-    go from centre to centre. clearance_mm: least distance of a step's axis from the
-    membrane's outer surface and from the envelope's faces, by default the inclusion's radius, so that
-    every inclusion is whole. Raises InputError where nothing is left.
+    Steps: the lattice's struts, and one cell along z from a node to the equivalent one, like the windows of
+    anchors. clearance_mm: least distance of a step's axis from the membrane's outer surface and from the
+    envelope's faces, by default the inclusion's radius, so that every inclusion is whole. Raises InputError
+    if no step is left.
     """
     clearance = d.inclusion_radius if clearance_mm is None else clearance_mm
     lattice = lattice_of(d)

@@ -134,8 +134,7 @@ def straight_inclusion(corners: Array, lattice: Array, start: Array, end: Array,
     """Inclusion of one straight path in the lattice elements of a mesh.
 
     corners (m, 4, 3), start and end (3,) and radius in mm; lattice (m,) bool, elsewhere the share stays 0;
-    shares below `LEAST_SHARE` are rounding at a face that the cylinder merely grazes and count as no
-    contact.
+    shares below `LEAST_SHARE` are rounding at a face that the cylinder touches and count as 0.
     """
     a, b, c, d = np.moveaxis(corners, 1, 0)
     volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a)) / 6

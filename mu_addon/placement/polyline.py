@@ -29,9 +29,9 @@ def legs(points: Array) -> Array:
 def polyline_overlap(corners: Array, points: Array, radius: float) -> Array:
     """Volume (m,) in mm3 of straight tetrahedra (m, 4, 3) inside a tube about a polyline (n, 3), all in mm.
 
-    Neighbouring cylinders are cut by the plane that halves their bend: they share no volume, leave no
-    gap, and the tube's volume is pi r^2 times the polyline's length whatever its bends. Its two ends
-    are flat. Raises InputError for a bend above 135 degrees or a leg shorter than its mitres.
+    Neighbouring cylinders are cut by the plane that bisects their bend: they neither overlap nor leave a gap,
+    and the tube's volume is pi r^2 times the polyline's length. Its two ends are flat. Raises InputError for
+    a bend above 135 degrees or a leg shorter than its mitres.
     """
     at = legs(points)
     way = np.diff(at, axis=0)

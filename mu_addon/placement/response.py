@@ -1,9 +1,9 @@
 """Reduced, linear response of a unit to a path of stiff steps, without solving for the path.
 
-An inclusion a hundred times stiffer than the lattice is far beyond a first-order map. But its own strain
-stays small, so its forces are linear in the displacement of its co-rotated elements, and the rest of the unit
-responds nearly linearly about Model A. Each step of the graph gets a few patterns of strain. Their forces are
-applied to Model A's tangent once; any chain of steps is then a small dense system.
+An inclusion a hundred times stiffer than the lattice is far beyond a first-order map. Its strain stays small,
+so its forces are linear in the displacement of its co-rotated elements, and the rest of the unit responds
+nearly linearly about Model A. Each step of the graph gets a few patterns of strain. Their forces are applied
+to Model A's tangent once; any chain of steps is then a small dense system.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Response:
     (s, q) the work of each pattern's forces under Model A's deformation, and reach (s, p, 3, q), the
     displacement in mm of the monitored points. stiffness (q,): the sensor's own, pattern by pattern; each
     representative step has as many `patterns`. step (e,) and side (e,) of every step of the graph: index of
-    its representative, and its own side of the mirror plane, 0 if in it. odd: mask of the odd parities.
+    its representative, and its side of the mirror plane, 0 if in it. odd: mask of the odd parities.
     """
 
     graph: Graph
@@ -80,8 +80,8 @@ class Response:
     ) -> Array:
         """Displacement (c, t, p, 3) in mm of the monitored points by each of c chains, against Model A.
 
-        pressures_MPa (t,): between the states of the response, and at 0, where nothing deviates, it is a
-        polynomial in the pressure. block: chains solved at once. Raises KeyError for a chain that is not the
+        pressures_MPa (t,): the response is a polynomial in the pressure through its states and through 0,
+        where the deviation is 0. block: chains solved at once. Raises KeyError for a chain that is not the
         graph's.
         """
         moved = self._at_states(chains, block)
@@ -130,9 +130,9 @@ def reduced_response(
 ) -> Response:
     """Linear response of a unit to any chain of steps of its lattice graph, by a few strain patterns a step.
 
-    model, materials, trajectory: Model A. sensor_MPa, radius_mm: of the sensor, as in `evaluate`.
-    monitor: probe of the backbone's p points. The states are those of `representative_pressures`. Raises
-    InputError where a step meets no element, IndefiniteError at an unstable state.
+    model, materials, trajectory: Model A. sensor_MPa, radius_mm: of the sensor, as in `evaluate`. monitor:
+    probe of the backbone's p points. The states are those of `representative_pressures`. Raises InputError if
+    a step touches no element, IndefiniteError at an unstable state.
     """
     mesh = model.mesh
     sides = parities(model)
@@ -229,7 +229,7 @@ def _patterns(
         bars.append([_filled(np.minimum(s, 1.0)) for s in shares])
         if not own.any():
             place = tuple(((start + end) / 2).round(2).tolist())
-            raise InputError("a step of the graph meets no lattice element", f"near {place} mm")
+            raise InputError("a step of the graph touches no lattice element", f"near {place} mm")
     elements = np.unique(np.concatenate([e for bar in bars for e, _ in bar]))
     added = _added_stiffness(model, materials, sensor_MPa, elements)
     found = []
@@ -270,7 +270,7 @@ def _independent(displacement: Array, stiffness: Array) -> Array:
 
 
 def _added_stiffness(model: Model, materials: Materials, sensor_MPa: float, elements: Array) -> Array:
-    """Stiffness (e, 3k, 3k) in N/mm at rest of elements of the sensor's material, less their own."""
+    """Change of stiffness (e, 3k, 3k) in N/mm at rest when elements get the sensor's material."""
     every = np.arange(len(model.mesh.tets))
     _, poisson = materials.small_strain(len(every))
     parameters = NeoHooke.parameters(np.full(len(every), sensor_MPa), poisson)

@@ -13,7 +13,7 @@ Array = np.ndarray[Any, Any]
 def solution_order(pressure: Array, has_gravity: bool = False) -> list[list[int]]:
     """Numbers of distinct pressures (s,) in the order to solve them: two at a time, the extremes first.
 
-    Each later pressure is the one farthest from those before it and from 0, where nothing deviates. A unit
+    Each later pressure is the one farthest from the earlier ones and from 0, where the deviation is 0. A unit
     with weight deviates there, too: 0, if present, is then solved with the extremes.
     """
     pressure = np.asarray(pressure, float)
@@ -44,7 +44,7 @@ def polynomials(known: Array, wanted: Array) -> Array:
 
 
 def between(pressure: Array, known: Mapping[int, Array]) -> Array:
-    """Differences (s, ...) at all pressures (s,), from those known at some of them by number.
+    """Differences (s, ...) at all pressures (s,), from those at some of them, by number.
 
     By their polynomial, see `polynomials`; known values stay. Pressures in any unit.
     """
@@ -60,8 +60,8 @@ def between(pressure: Array, known: Mapping[int, Array]) -> Array:
 def relative_error(fuller: Array, sparser: Array, weight: Array) -> float:
     """Relative error of the sparser of two sets of differences (s, jobs, p, 3) in mm against the fuller.
 
-    weight (s,): instants at each pressure. The largest of any job, over its mean deviation; by the triangle
-    inequality a bound of how far the mean deviations of the two lie apart.
+    weight (s,): instants at each pressure. The largest of any job, over its mean deviation. By the triangle
+    inequality it bounds the difference of the two mean deviations.
     """
 
     def mean(values: Array) -> Array:

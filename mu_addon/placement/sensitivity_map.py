@@ -42,10 +42,10 @@ class Parity:
 def parities(model: Model) -> list[Parity]:
     """The responses of a whole body about a state of its model, which may be of one half.
 
-    A load on one side of a half's mirror plane is half an even load and half an odd one; the tangents of both
-    are those of the half mesh, under different supports on the plane. In an odd motion a point in contact
-    with its image moves with it, so that contact across the plane has no part in that tangent. Raises
-    MeshingError for a mesh with other mirror planes.
+    A load on one side of the mirror plane is half an even and half an odd load. Both tangents are those of
+    the half mesh, with different supports on the plane. In an odd motion a point in contact with its image
+    moves with it, so that contact across the plane does not enter that tangent. Raises MeshingError for a
+    mesh with other mirror planes.
     """
     mesh = model.mesh
     if not mesh.symmetry:
@@ -68,7 +68,7 @@ def probe_loads(mesh: Mesh, monitor: Probe, components: Sequence[int]) -> Array:
     """Nodal loads (3n, p, c) whose work is the displacement of p monitored points along c components.
 
     components: numbers 0 to 2 of the axes. A load is 1 N on the point, shared among its element's nodes;
-    `Model.passed_on` moves what acts on those that follow others.
+    `Model.passed_on` moves the forces on nodes that follow others.
     """
     points = len(monitor.nodes)
     loads = np.zeros((3 * len(mesh.nodes), points, len(components)))
@@ -130,9 +130,9 @@ def stable_part(
 def representative_pressures(trajectory: Trajectory) -> Array:
     """Pressures (t,) in MPa, ascending, of three of a trajectory's loaded states that represent all.
 
-    The least, the largest, and the one nearest two thirds of the way between; 0 as well, where the unit's
-    weight makes it deviate there, too. Over the grasp protocol J_hat by `polynomials` through these was
-    within 0.4 % of that with each pressure solved for.
+    The least, the largest, and the one nearest two thirds between them; also 0 if the unit deviates there by
+    its weight. Over the grasp protocol J_hat by `polynomials` through these was within 0.4 % of that with
+    each pressure solved for.
     """
     pressures = np.array([state.pressure_MPa for state in loaded(trajectory)])
     low, high = pressures.min(), pressures.max()
@@ -169,9 +169,9 @@ def influence_map(
 
     In each state K lambda = probe is solved for every monitored point and component (adjoint method);
     stiffening an element whose internal force is f then moves the point by -lambda f. Linear in the weights
-    of the element's laws, whatever they are. trajectory: of Model A; monitor: probe of p points;
-    pressures_MPa: the states to take, by default all under pressure or weight; sides: `parities(model)`.
-    Raises IndefiniteError at an unstable state, and MeshingError as `parities`.
+    of the element's laws. trajectory: of Model A; monitor: probe of p points; pressures_MPa: the states to
+    take, by default all under pressure or weight; sides: `parities(model)`. Raises IndefiniteError at an
+    unstable state, and MeshingError as `parities`.
     """
     mesh = model.mesh
     sides = parities(model) if sides is None else sides
@@ -259,7 +259,7 @@ def deviation_map(found: Influence, gradients: Array, weights: Array) -> Array:
     """dJ_hat (m,) in mm by each element's relative stiffening, alone, about Model A.
 
     gradients (s, j, 3, p, 3), weights (s,): as `mean_deviation` has them. J_hat is a mean of distances and
-    has a kink at Model A, where all of them are 0: this is its slope on the side of stiffening, and never
+    has a kink at Model A, where all of them are 0. This is its slope toward stiffening, which is never
     negative.
     """
     return mean_deviation(gradients, np.moveaxis(found.displacement, -1, 0), weights)

@@ -14,8 +14,8 @@ FIELD_MAP = "YlOrRd"  # small values are light: a shaded surface in a dark colou
 def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     """SVG of one path's deviation delta (k, j) in mm at k times and j stations, coloured from 0 to `top` mm.
 
-    Arc length is to the right, time upward, both in percent; the colour goes by square root, as in
-    `color_bar`. chosen: draw its frame in colour.
+    Arc length is to the right, time upward, both in percent; colour is by square root, as in `color_bar`.
+    chosen: draw its frame in colour.
     """
     from matplotlib.colors import PowerNorm
 
@@ -42,7 +42,7 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
 def color_bar(top: float) -> str:
     """SVG of the colour scale from 0 to `top` mm that the heatmaps share.
 
-    Colour goes by square root, so that small deviations are visible beside the largest.
+    Colour is by square root, so that small deviations remain visible.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm

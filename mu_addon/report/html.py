@@ -43,7 +43,7 @@ def page(title: str, subtitle: str, notes: str, lead: str, sections: Sequence[tu
 
 def note(paragraphs: Iterable[str], stopped: str = "") -> str:
     """HTML of a box with paragraphs of text, "" where there are none; `stopped`: why its run ended early."""
-    first = [f"This run is partial: {stopped}. What is missing was not computed."] if stopped else []
+    first = [f"This run is partial: {stopped}. Missing parts were not computed."] if stopped else []
     html = "".join(f"<p>{escape(paragraph)}</p>" for paragraph in (*first, *paragraphs))
     return f'<div class="note">{html}</div>' if html else ""
 
@@ -69,7 +69,7 @@ def table(
     groups: Sequence[tuple[str, int]] = (),
     css: str = "",
 ) -> str:
-    """HTML of a table that scrolls sideways by itself; texts are escaped.
+    """HTML of a table that scrolls sideways; texts are escaped.
 
     head: title and CSS class of each column; rows: cells, and True for the best row; groups: titles over so
     many columns each; css: "stack" shows each row as a block on a phone. A cell "FAILED" is marked.

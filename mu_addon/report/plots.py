@@ -75,7 +75,7 @@ def line_style(path: Path) -> dict[str, Any]:
 
 
 def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: Floats | None = None) -> str:
-    """SVG of the unit's section and, beside it, each path as a line between the heights of its anchors.
+    """SVG of the unit's section and, next to it, each path as a line between the heights of its anchors.
 
     chosen: name of the path drawn in colour; j_hat (paths,): mean deviations in mm, written below the lines.
     """

@@ -197,7 +197,7 @@ def shade(
     scale: float,  # pixels of a depth map per mm
     color: wp.array2d(dtype=wp.vec3),
 ):
-    """Multiply the colours of pixels (h, w) by the light of a lamp and of the sky that nothing blocks.
+    """Multiply the colours of pixels (h, w) by the light of a lamp and of the unobstructed sky.
 
     The unblocked share of the sky is found by comparing positions with the depth maps; each pixel takes one
     of samples^2 subsets of the directions. To be launched with dim (h, w).

@@ -1,7 +1,7 @@
 """Pictures of triangle meshes without a graphics card, a window or a graphics library.
 
-Triangles go into a depth buffer; light comes from the viewer's upper left and from a whole sky, of which
-every visible point sees the share that no opaque part blocks.
+Triangles are drawn into a depth buffer. Light comes from the viewer's upper left and from the sky; each
+visible point gets the share of the sky that no opaque part blocks.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ MOST_ROWS = 20
 def write_stopped_report(folder: Path, why: str) -> None:
     """Write report.html of a run that stopped early, from its summary, tables and other files.
 
-    why: in words. The run's next start removes it. Raises InputError, OSError and OutputError.
+    why: as text. The run's next start removes it. Raises InputError, OSError and OutputError.
     """
     summary = _summary(folder)
     seconds = {stage: spell(float(s)) for stage, s in summary.get("seconds", {}).items()}
@@ -37,7 +37,7 @@ def write_stopped_report(folder: Path, why: str) -> None:
     ]
     words = [
         f"This run is partial: {why}. The results below are from before the stop, and are not final.",
-        "The same command, or `run.py resume` with this folder, continues from what is finished.",
+        "The same command, or `run.py resume` with this folder, continues from the finished stages.",
     ]
     whole = page(f"Stopped run: {folder.resolve().name}", "", note(words), "", sections)
     write_text(folder / REPORT, f"{whole}{STOPPED}\n")

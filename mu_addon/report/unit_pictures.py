@@ -89,8 +89,8 @@ def motion(
     outside: show the half from the other side, uncut.
 
     A state is displacement (n, 3) in mm, caption and alternative text. beside: rigid bodies, of which the
-    part at x <= 0 and within the picture is shown; width: in pixels. colors: of each state, by region, sRGB
-    (n, 3) of every node, in place of one colour a region; a region without any is left out.
+    part at x <= 0 and within the picture is shown; width: in pixels. colors: for each state, by region, sRGB
+    (n, 3) of the nodes, in place of one colour a region; other regions are left out.
     """
     skins, plain = skins_of(mesh), COLORS
     # A half mesh lies at x >= 0; its mirror image shows the same section to a viewer at +x.

@@ -1,7 +1,7 @@
 """A run in a separate process that writes one JSON message a line; no thread, no bpy.
 
 The child writes to files and `poll` reads new lines: nothing blocks, no pipe fills up, and the messages
-outlive the parent. Blender's panels and sweeps watch their runs this way.
+survive the parent. Blender's panels and sweeps watch their runs this way.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Child:
     ) -> None:
         """Start `command`, with its output in `folder`: messages.ndjson and stderr.txt. Raises MuError.
 
-        plan: its expected stages; waits: leave the start to `begin`. ends_with_parent: hold the child's
-        standard input open, by whose end `processes.end_with_input` detects that this process has ended.
+        plan: its expected stages; waits: leave the start to `begin`. ends_with_parent: keep the child's
+        standard input open, so that `processes.end_with_input` detects the end of this process.
         """
         self.folder = folder
         self.state = WAITING

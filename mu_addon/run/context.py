@@ -57,10 +57,10 @@ class _Unexpected(MuError):
 class RunContext:
     """Outcome of a run: its exit status, and the `summary` that its body fills and its folder keeps.
 
-    report: writes the report of the results so far; its argument says why the run stops early, else "".
-    short_report: writes a report from a folder at once, with the reason of a requested stop. wants_report:
-    write one at all. hurried: whoever asked the run to stop waits for its end, and so for its report.
-    console_summary: the lines that end the run at a terminal, from its summary.
+    report: writes the report of the results so far; its argument is the reason of an early stop, else "".
+    short_report: writes a report quickly from a folder, with the reason of a requested stop. wants_report:
+    False to write no report. hurried: the user or the parent process waits for the run to stop.
+    console_summary: makes the last lines at a terminal from the summary.
     """
 
     progress: Progress
@@ -76,7 +76,7 @@ class RunContext:
     _kept_s: float = 0.0
 
     def write_report(self, stopped: str = "") -> None:
-        """Write the report, if there is one and it is wanted; it says why the run stopped, if it did."""
+        """Write the report, if it is wanted. stopped: reason of an early stop."""
         if self.report is not None and self.wants_report:
             self.report(stopped)
 
@@ -97,7 +97,7 @@ class RunContext:
             self.progress.warning(
                 "the last run in this folder was interrupted: it was killed, or the computer stopped",
                 str(folder),
-                "nothing: this run continues from its finished stages; log.ndjson shows how far it came",
+                "nothing: this run continues from its finished stages; log.ndjson shows the last one",
             )
 
     def unlock(self) -> None:
@@ -109,8 +109,8 @@ class RunContext:
     def open_folder(self, folder: Path) -> Path:
         """Make `folder` the run's: locked, with log.ndjson, and "running" in summary.json until the end.
 
-        So a run that was killed, or replaced by a new one, never passes for complete. The summary is padded
-        with blanks to RESERVED bytes, which the last summary may use. Raises InUseError and OutputError.
+        A run that was killed or replaced is therefore never shown as complete. The summary is padded with
+        blanks to RESERVED bytes, which the last summary may use. Raises InUseError and OutputError.
         """
         self.lock_folder(folder)
         self.progress.sinks.append(log_file(folder / "log.ndjson"))

@@ -1,4 +1,4 @@
-"""A run's folder: its owner, and whether its content belongs to these inputs."""
+"""A run's folder: its owner, and the inputs that its content was made from."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ RUN = "run"
 class FolderLayout:
     """Layout of a folder of one kind of run.
 
-    inputs: its first file of inputs; header: the first line of that, which identifies the folder; results:
-    files and folders by name or pattern; optional: further inputs that a run may lack.
+    inputs: name of its first input file; header: first line of that file, which identifies the folder;
+    results: files and folders by name or pattern; optional: inputs that a run may lack.
     """
 
     inputs: str
@@ -119,7 +119,7 @@ def _document(text: str) -> dict[str, Any] | None:
 def keep_inputs(folder: Path, inputs: Mapping[str, str], known_by: str = "") -> None:
     """Write a run's inputs into its folder, last the file that identifies it. Raises OutputError.
 
-    So a run that was stopped between two of them has not begun, and starts anew.
+    A run that was stopped between two of them has therefore not begun, and starts again.
     """
     for name in sorted(inputs, key=lambda name: name == known_by):
         write_text(folder / name, inputs[name])

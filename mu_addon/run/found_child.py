@@ -26,7 +26,7 @@ class FoundChild(Child):
     """`Child` of a process that another process started."""
 
     def __init__(self, run: Path, own: Path, plan: Plan = (), started_s: float = 0.0) -> None:
-        """The run in a folder, its messages in `own`, begun at `started_s` since the epoch. MuError."""
+        """The run in a folder. own: folder of its messages; started_s: its start in s since the epoch."""
         super().__init__((), own, {}, plan=plan, waits=True)
         self.run = run
         try:

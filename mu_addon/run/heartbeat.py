@@ -1,7 +1,7 @@
-"""Words for a worker that says nothing, by the process that watches it.
+"""Progress of a worker that sends no messages, reported by the process that watches it.
 
-A library may hold the interpreter, on a busy machine for half a minute, and no thread of the worker runs.
-It tells its watcher each step, and this one repeats the last.
+A library may hold the interpreter, on a busy machine for half a minute, and no thread of the worker runs. The
+worker sends each step to its watcher, which repeats the last one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _KEPT = ("type", "stage", "state", "fraction", "seconds", *_LEFT, "whole", "why"
 
 
 def to_watcher(send: Callable[[bytes], object], clock: Callable[[], float] = time.monotonic) -> Sink:
-    """A sink that tells who watches what runs, by `send`: twice a second, and each percent of the whole."""
+    """A sink that reports progress to the watcher by `send`, twice a second and at each percent."""
     percent = -1
 
     def sink(message: Message) -> None:
@@ -41,10 +41,10 @@ def to_watcher(send: Callable[[bytes], object], clock: Callable[[], float] = tim
 
 
 class Heartbeat:
-    """Repeats the last progress message of a worker that has said nothing for `PATIENCE_S`.
+    """Repeats the last progress message of a worker that has sent nothing for `PATIENCE_S`.
 
-    show: gets the message, with its time gone on and the share done unchanged. between: gets words where no
-    stage is running: before the first and after one has ended.
+    show: gets the message with its time advanced and its fraction unchanged. between: gets a text while no
+    stage is running, before the first and after the last one.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Heartbeat:
         self._at = self._shown = clock()
 
     def hear(self, words: bytes) -> None:
-        """Process what the worker said, in pieces of any size; b"" where a second passed without any."""
+        """Process bytes from the worker, in pieces of any size; b"" after a second without any."""
         now = self._clock()
         if words:
             *lines, self._rest = (self._rest + words).split(b"\n")

@@ -60,8 +60,8 @@ def read_inputs(path: Path, *words: str) -> tuple[dict[str, Any], dict[str, Any]
 def structured(kind: type[Made], table: Any, where: str, **given: Any) -> Made:
     """An instance of an attrs class from a table of TOML, each value of the type of its field.
 
-    given: values beside those of the table. Tables become classes, arrays tuples, whole numbers real ones
-    where the class says so. Raises InputError that names the key.
+    given: values in addition to those of the table. Tables become classes, arrays become tuples, and integers
+    become floats where the class has a float. Raises InputError that names the key.
     """
     if not isinstance(table, Mapping):
         raise InputError(f"{table!r} is not a table", where, "write it as a table")
@@ -113,7 +113,7 @@ def named_path(path: Path, run: Mapping[str, Any], key: str, what: str) -> Path:
     named = run.get(key)
     if not isinstance(named, str):
         raise InputError(
-            f"{path.name} does not say where the {what} lies",
+            f"{path.name} does not name the place of the {what}",
             f"{path}, [{RUN}] {key}",
             "start the run by its own command, with this folder as --out: finished stages are kept",
         )

@@ -1,7 +1,7 @@
 """The Python that runs a job in a separate process, started from inside Blender.
 
 Blender has its own copies of libraries that the solver's wheels also contain (CHOLMOD, BLAS). In one process
-calls to one may be bound to the other's code, of another version, so nothing is solved in Blender's process.
+a call may reach the other version's code, so nothing is solved in Blender's process.
 """
 
 from __future__ import annotations

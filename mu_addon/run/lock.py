@@ -85,8 +85,8 @@ class FolderLock:
 def holder(folder: Path) -> int | None:
     """Number of the process of this machine that works in a folder, or None for none or another machine's.
 
-    For a watched process it is the number of its watcher, which is to be asked to stop. 0 for one that has
-    not signed yet. None where the file system offers no locks.
+    For a watched process it is the number of its watcher, which receives requests to stop. 0 until the number
+    is written. None where the file system offers no locks.
     """
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     try:

@@ -61,7 +61,7 @@ class Pool:
             ) from None
 
     def close(self) -> None:
-        """End the processes at once, without waiting for results that nobody reads."""
+        """End the processes at once, without waiting for their results."""
         if self._pool is None:
             return
         processes = list((self._pool._processes or {}).values())

@@ -29,7 +29,7 @@ def cores() -> int:
 def slowed_by_load() -> float:
     """Factor by which the machine's other work slows a new process, by the load of the last minute.
 
-    Half of what the load says: work that waits for a disk or has a lower priority counts in it, too.
+    Half of the system's load: that also counts work that waits for a disk or has a lower priority.
     """
     load = os.getloadavg()[0] / cores() if hasattr(os, "getloadavg") else 1.0
     return max(0.5 + 0.5 * load, 1.0)

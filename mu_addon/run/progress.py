@@ -4,11 +4,10 @@ A `Progress` makes messages, plain dictionaries with a `type`, and hands each to
 
 - plan: the stages that are expected, as [name, seconds], the seconds of all, and how many times slower other
   work of the machine makes them
-- progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None),
-  of a run within this one its name before the stage, and part (0..1) and part_seconds_left of that run,
-  and detail where there is something to say of what was just done, at its end of what the stage made; where
-  there is a plan also whole (0..1) and whole_seconds_left, of the run, and why the latter grew, if it did;
-  beat where nothing is new but the time
+- progress: stage, state ("start" | "run" | "end"), fraction (0..1 or None), seconds, seconds_left (or None).
+  Optional: detail, the last step done or, at the end, the stage's result; beat, only the time is new. With a
+  plan: whole (0..1) and whole_seconds_left of the run, and why, the reason if the time left grew. Of a run
+  within this one the stage begins with its name, and part (0..1) and part_seconds_left are its own.
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
 - error: what, where, what_to_do, status; the last message of a run that did not
@@ -41,7 +40,7 @@ Clock = Callable[[], float]
 BEAT_S = 5.0
 """Seconds after which a message is sent for a stage that reports nothing."""
 SLOWED = 1.25
-"""Factor by which other work slows a run from which its time is told with and without that."""
+"""From this slowdown by other work on, a run's time is shown with and without that work."""
 
 
 class Progress:
@@ -76,7 +75,7 @@ class Progress:
 
     @contextmanager
     def beating(self, every_s: float = BEAT_S) -> Iterator[None]:
-        """Context in which a thread reports a stage's time if it has reported nothing for `every_s`.
+        """Context in which a thread reports the stage's time after `every_s` without another report.
 
         None in Blender, which bears no threads.
         """
@@ -138,7 +137,7 @@ class Progress:
                 self._emit_progress("run", self._fraction, detail)
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
-        """Report something that the user should know and that does not end the run."""
+        """Report a problem that does not end the run."""
         self.emit({"type": "warning", "what": what, "where": where, "what_to_do": what_to_do})
 
     def result(self, found: Mapping[str, Any]) -> None:
@@ -233,8 +232,8 @@ def outcome(sink: Sink) -> Sink:
 def printable(text: str, stream: TextIO | None = None) -> str:
     """`text` with everything but line ends that would not be shown as a character spelt as \\xNN or \\uNNNN.
 
-    Names and values come from devices and files: an escape sequence among them would be obeyed by a terminal,
-    a change of direction would show another text. Likewise what `stream` has no character for.
+    Names and values come from devices and files: a terminal would obey an escape sequence among them, and a
+    change of direction would show another text. Characters that `stream` cannot encode are replaced, too.
     """
     if not text.isascii() or not text.replace("\n", "").isprintable():
         text = "".join(
@@ -270,7 +269,7 @@ class _Lines:
         if message["type"] == "plan":
             seconds, slowed, count = message["seconds"], message["slowed"], len(message["stages"])
             alone = f"about {spell(seconds)} on two cores"
-            busy = f"about {spell(seconds * slowed)} beside other work, {alone[6:]} alone"
+            busy = f"about {spell(seconds * slowed)} with other programs running, {alone[6:]} without"
             self.write(f"{busy if slowed >= SLOWED else alone}, {count} stage{'s' * (count > 1)}\n")
         elif message["type"] == "progress":
             self.progress(message)
@@ -337,7 +336,7 @@ class _PlainLines(_Lines):
 
 
 def _left(message: Message, before: str) -> str:
-    """Time left in words, of the whole run if that was planned, and why it grew; or ""."""
+    """Time left as text, of the whole run if it has a plan, and why it grew; or ""."""
     left = message.get("whole_seconds_left", message["seconds_left"])
     # Shorter stages need no display, and would leave it standing.
     if left is None or left < 1.0:
@@ -395,7 +394,7 @@ def seldom(sink: Sink, every_s: float, clock: Clock) -> Sink:
 def log_file(path: Path, clock: Clock = time.perf_counter) -> Sink:
     """A sink that appends to `path` (log.ndjson): messages with the time of day, running fractions every 5 s.
 
-    Raises OutputError where the file cannot be written, at once and later.
+    Raises OutputError, now or on a later message, if the file cannot be written.
     """
 
     def sink(message: Message) -> None:

@@ -22,17 +22,17 @@ MOST_BY_CLOCK = 0.95
 SURE = 0.1
 """Share of a stage, or of all, from which it alone determines the rest: first steps may be far slower."""
 OVERDUE = 0.2
-"""Remaining share of its time assumed for a stage beyond its plan, as nothing says that it ends now."""
+"""Share of its time assumed to remain for a stage that takes longer than planned."""
 UNPLANNED_S = 20.0
 """Seconds assumed for a stage that no plan has."""
 AT_ONCE_S = 1.0
-"""A share told within this time of a stage's start was in the cache, and says nothing of the rest's pace."""
+"""A share reported within this time of a stage's start came from the cache and is left out of the pace."""
 RECENT = 1.0 / 3.0
 """Share of a stage's time that is left out of its pace: its first steps may be other work than its last."""
 SKIPPED = 0.1
-"""A stage that took less than this share of its plan was in the cache, and says nothing of the pace."""
+"""A stage that took less than this share of its plan came from the cache and is left out of the pace."""
 SHOWN_S = 7.0
-"""Seconds for which a reason stands at the least: a terminal's lines are almost that far apart."""
+"""Least seconds for which a reason is shown: a terminal's lines are almost that far apart."""
 PACES = 0.2, 20.0
 """Least and largest ratio of a run's time to its plan that is believed."""
 LOADED, LOADED_S = 0.2, 1.5
@@ -40,7 +40,7 @@ LOADED, LOADED_S = 0.2, 1.5
 
 
 class Pace:
-    """Pace of a stage by the shares done that it told: that of the later part of its time."""
+    """Pace of a stage, from the shares that it reported in the later part of its time."""
 
     def __init__(self) -> None:
         self._shares = deque([(0.0, 0.0)])
@@ -70,9 +70,9 @@ class ProgressEstimate:
     """Progress of the whole run; `tell` it each progress message.
 
     fraction: done of the whole, 0..1, which never shrinks; number and count: of the present stage and of all;
-    why: why the time left grew, while it is more than before, or "". Without a plan there are only the stages
-    so far, and only the present stage's time left. slowed: factor on the plan's seconds by other work, until
-    the run's own pace is known.
+    why: why the time left grew, while it is more than before, or "". Without a plan only the stages so far
+    are counted, and the time left is that of the current stage. slowed: factor on the plan's seconds by other
+    work, until the run's own pace is known.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class ProgressEstimate:
     def _tell_part(self, stage: str, message: Mapping[str, Any]) -> None:
         """Process a message of a planned stage's part: "wall 0.9: Model A".
 
-        The stage's share goes by its own plan, `part` of the message, or by the clock where it has none.
+        The stage's share comes from its own plan (`part` of the message), or from the clock if it has none.
         """
         now = self._clock()
         if stage != self._stage:
@@ -196,9 +196,10 @@ class ProgressEstimate:
             self._set_left(own, "")
 
     def _pace(self) -> float:
-        """Ratio of what has run to its plan, within plausible bounds.
+        """Ratio of time taken to time planned, within plausible bounds.
 
-        Four seconds say little of ten minutes: less than SURE of the whole is weighted by its share of that.
+        Four seconds predict little of ten minutes: less than SURE of the whole is weighted by its share of
+        SURE.
         """
         ran = [(s, self._expected[name]) for name, s in self._taken.items()]
         share = self._share - self._kept
@@ -226,7 +227,7 @@ class ProgressEstimate:
         self._left, self._at = left, self._clock()
 
     def _forget_reason(self, left: float) -> None:
-        """Clear the reason why the time left grew once it is about what it was before."""
+        """Clear the reason why the time left grew once the time left is about its former value."""
         shown_long = self._clock() - self._grown_at >= SHOWN_S
         if shown_long and left <= LONGER * self._grown_from + SLACK_S:
             self.why = ""

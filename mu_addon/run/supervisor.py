@@ -1,9 +1,9 @@
 """Work in a forked process that this one watches, so that a crash never ends a command without a message.
 
 A native library (CHOLMOD, BLAS, gmsh, Manifold, Warp) without memory or with a fault ends its process by a
-signal, and no Python in it runs again. So another process, which loads nothing and waits, reports the end.
-Both act as one: Ctrl-C, SIGTERM and Ctrl-Z reach the worker once, its exit status is passed on, and neither
-survives the other's `kill -9`.
+signal, and no Python in it runs again. Therefore another process, which loads no library, waits for it and
+reports its end. Both act as one: Ctrl-C, SIGTERM and Ctrl-Z reach the worker once, its exit status is passed
+on, and neither survives the other's `kill -9`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ library may hold the interpreter for longer, and a report takes longer."""
 _PASSED_ON = ("SIGINT", "SIGTERM", "SIGTSTP")
 _watcher: list[int] = []
 _messages_to: list[int] = []
-"""File descriptor for what a worker says to its watcher."""
+"""File descriptor for a worker's messages to its watcher."""
 _stack_to: list[int] = []
 """File descriptor for Python's stack of a crashing worker: the end of the pipe to its watcher."""
 
@@ -62,7 +62,7 @@ def supervised(
 
     A worker that does not end within `GRACE_S` of Ctrl-C or SIGTERM is killed: status 128 + that signal.
     tell: called in this process, after an unreported end. ends_with_input: end both once standard input
-    closes. hear: gets what the worker will `send`, and b"" after each second without a word. Without fork
+    closes. hear: gets the bytes that the worker sends, and b"" after each second without any. Without fork
     (Windows), or if the system refuses one, `work` runs in this process.
     """
     if not hasattr(os, "fork"):
@@ -112,7 +112,7 @@ def supervised(
 
 
 def _wait_for(worker: int, messages: int, hear: Callable[[bytes], object] | None) -> tuple[int, Any]:
-    """Wait until a worker has ended, and hear what it says meanwhile; its wait status and usage."""
+    """Wait until a worker has ended, passing on its messages; return its wait status and usage."""
     while True:
         if hear is not None:
             ready, _, _ = select.select([messages], [], [], 1.0)
@@ -184,7 +184,7 @@ def send(words: bytes) -> None:
 
 
 def watcher() -> int:
-    """Number of the process that watches this one and is asked to stop it; this one's own without one."""
+    """Number of the process that watches this one, to which a request to stop is sent; else of this one."""
     return _watcher[0] if _watcher else os.getpid()
 
 
@@ -204,9 +204,9 @@ def write_stack_at_crash() -> None:
 def _end_with(group_alive: int, alive: int) -> None:
     """Kill this process once the other end of a pipe is closed, as when its holder ends.
 
-    Its process group is ended with it: a process that it was just starting would otherwise find half of its
-    input, and show a stack of Python's. They get SIGTERM, which the process that removes shared resources
-    after the others' end ignores.
+    Its process group ends with it: a process that was just starting would otherwise read half of its input
+    and print a traceback. They get SIGTERM, which the process that removes shared resources after the others'
+    end ignores.
     """
     threading.Thread(target=_wait_for_end, args=(alive,), daemon=True).start()
     if sys.platform == "linux":

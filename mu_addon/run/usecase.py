@@ -22,9 +22,9 @@ class UseCase(Generic[Job]):
 
     name: of its command. read: the job that a folder's inputs describe; raises InputError. run: does the job
     in its folder, fills `context.summary`, sets `context.report` and returns the result. console_summary: a
-    run's summary in a few lines of text. begin: makes a folder the run's, where that takes more than
-    `folder.begin`. plan: expected stages of a job, with their seconds on two cores; kept: beginnings of the
-    names of those that a resumed run takes from its cache.
+    run's summary in a few lines of text. begin: prepares a folder, if `folder.begin` is not enough. plan:
+    expected stages of a job, with their seconds on two cores; kept: first letters of the names of stages that
+    a resumed run takes from its cache.
     """
 
     name: str
@@ -39,8 +39,8 @@ class UseCase(Generic[Job]):
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
         """Run a job in a folder and write its report, also if it stops early; return the result.
 
-        Raises InputError, also for a folder of another kind of run or one in use, OutputError, MuError where
-        the process may take up too little memory, and what the job itself raises.
+        Raises InputError, also for a folder that is in use or of another kind of run; OutputError; MuError if
+        the process may use too little memory; and the errors of the job.
         """
         require_memory()
         if self.begin is not None:

@@ -1,4 +1,4 @@
-"""Sensing: the optical waveguide, its calibration, and the serial line that it speaks on.
+"""Sensing: the optical waveguide, its calibration, and the serial line.
 
 `Decoder` turns bytes of a serial line into samples, `run_session` records them, `calibrate` maps voltage to
 bending angle with a 95 % band. `fit_law` and `signal_of_nodes` predict the light of a waveguide in a unit

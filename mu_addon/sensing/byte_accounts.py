@@ -1,8 +1,8 @@
 """Accounts of a serial line's bytes: each is counted once by its outcome; those without a sample are kept.
 
 bytes = read_bytes + rejected_bytes + cut_bytes + overlong + buffered. Read: lines and frames with a sample.
-Rejected: those that could not be read. Cut: by the start, a pulled cable or the end. Overlong: stretches that
-nothing ended. Buffered: still with the decoder.
+Rejected: those that could not be read. Cut: by the start, a pulled cable or the end. Overlong: bytes without
+a line or frame end. Buffered: still with the decoder.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ class Counters:
     malformed: int = 0
     """Lines or frames that could not be read."""
     restarts: int = 0
-    """Times the device's clock or running number began anew."""
+    """Times the device's clock or running number restarted."""
     read_bytes: int = 0
     """Bytes of lines and frames that were read."""
     rejected_bytes: int = 0
     """Bytes of lines and frames that could not be read, or have a wrong CRC."""
     overlong: int = 0
-    """Bytes of stretches longer than any line or frame, that nothing ended."""
+    """Bytes in stretches without an end that are longer than any line or frame."""
     cut_bytes: int = 0
     """Bytes of lines cut by the beginning, by a pulled cable or by the end."""
     coloured: int = 0
@@ -60,7 +60,7 @@ class Reject(NamedTuple):
 
 
 class Accounts:
-    """Counters of a line, and what gave no sample, for the caller to keep and to clear."""
+    """Counters of a line, and the rejected bytes, for the caller to keep and to clear."""
 
     def __init__(self) -> None:
         self.counters = Counters()
@@ -73,7 +73,7 @@ class Accounts:
         self.counters.read_bytes += len(piece)
 
     def read_line(self, piece: bytes) -> None:
-        """Count a line of text that was read, and whether it had colour codes."""
+        """Count a line of text that was read, and its colour codes."""
         self.counters.coloured += without_colour(piece) is not piece
         self.read(piece)
 
@@ -87,7 +87,7 @@ class Accounts:
         self.rejects.append(Reject(why, piece))
 
     def reject_after_all(self, piece: bytes) -> None:
-        """Count as malformed what had been counted as read."""
+        """Count as malformed a line that had been counted as read."""
         self.counters.read_bytes -= len(piece)
         self.reject(piece, "malformed")
 
@@ -102,13 +102,13 @@ class Accounts:
                 self.read(line + b"\n")
 
     def cut(self, piece: bytes) -> None:
-        """Count and keep a line or frame of which a part is missing."""
+        """Count and keep an incomplete line or frame."""
         if piece:
             self.counters.cut_bytes += len(piece)
             self.rejects.append(Reject("cut", piece))
 
     def unended(self, piece: bytes) -> None:
-        """Count and keep a stretch that nothing ended."""
+        """Count and keep a stretch without an end."""
         self.counters.overlong += len(piece)
         self.rejects.append(Reject("no end", piece))
 

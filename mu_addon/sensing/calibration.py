@@ -1,9 +1,9 @@
 """Bending angle from voltage: a monotone map fitted to sweeps, with a band that new sweeps keep to.
 
-Model of the signal less its dark level: (1 + drift t) f(angle), f a cubic spline whose coefficients rise only
-or fall only, and so does f. Each voltage has one angle, or one interval where the sensor is blind. The band
-comes from sweeps left out of the fit: their error as a whole (mounting, drift, rate) and within (noise,
-hysteresis).
+Model of the signal less its dark level: (1 + drift t) f(angle), with f a cubic spline. Its coefficients are
+monotonic, and therefore f is. Each voltage has one angle, or one interval where the sensor is blind. The band
+comes from sweeps left out of the fit: the error common to a sweep (mounting, drift, rate) and the error
+within it (noise, hysteresis).
 
 Source: Ramsay, Statistical Science 3 (1988) 425, for monotone splines by increments of one sign.
 """
@@ -61,8 +61,8 @@ class Calibration:
 
     knots (m + 7,) in degrees and coefficients (m + 3,) in V of a cubic spline on `range_deg`; band_V: a new
     reading lies within that of the map with 95 % probability; drift_per_h: relative change of the light an
-    hour that was seen and taken out; gain: what the signal is divided by before it is read, 1 when
-    calibrated, set anew by `zeroed`; channel and dark: columns of the recording, or the dark level in V.
+    hour that was found and removed; gain: divisor of the signal before it is converted, 1 at calibration,
+    changed by `zeroed`; channel and dark: columns of the recording, or the dark level in V.
     """
 
     knots: Array
@@ -94,8 +94,8 @@ class Calibration:
         """Angles, and low and high ends of their 95 % intervals (n,) in degrees, and a validity mask (n,).
 
         voltage_V (n,): in V, dark level subtracted. The mask is True where the map, within `band_V`, can give
-        the voltage. Where the map is flat, the angle is the middle of that interval; low and high are where
-        the map reaches the voltage less and plus `band_V`.
+        the voltage. Where the map is flat, the angle is the middle of that interval. At low and high the map
+        reaches the voltage minus and plus `band_V`.
         """
         voltage = np.asarray(voltage_V, float) / self.gain
         angles = np.linspace(*self.range_deg, _TABLE)
@@ -144,9 +144,9 @@ def calibrate(sweeps: Sequence[CalibrationSweep], channel: str, dark: str | floa
     """Fit a monotonic map from voltage to bending angle, with its 95 % band, to two sweeps or more.
 
     channel: column of the recording that is calibrated; dark: the column of the dark level, or its value in
-    V. The number of spline intervals is the one of least leave-one-out error; a drift of the light is removed
-    if that reduces the squared error of left-out sweeps to a quarter. Raises InputError for fewer than two
-    sweeps, too few readings or angles in one, values that are not numbers, or no signal.
+    V. The number of spline intervals minimises the leave-one-out error. Drift of the light is removed if that
+    reduces the squared error of left-out sweeps to a quarter. Raises InputError for fewer than two sweeps,
+    too few readings or angles in one, values that are not numbers, or no signal.
     """
     _require(sweeps)
     middle = float(np.mean(np.concatenate([s.time_s for s in sweeps])))
@@ -186,8 +186,8 @@ def _best(sweeps: Sequence[CalibrationSweep], drift: float) -> tuple[float, int,
 def _determined(sweeps: Sequence[CalibrationSweep], intervals: int) -> bool:
     """True if the visited angles determine each coefficient of a spline of so many intervals.
 
-    Sweeps that hold a few angles say nothing of those between, and sweeps left out hold the same few: they
-    cannot tell that a spline goes there in steps.
+    Sweeps that hold a few angles have no data between these. Sweeps left out hold the same angles, so they
+    cannot show that a spline is stepped there.
     """
     knots = _knots(sweeps, intervals)
     basis = BSpline.design_matrix(np.concatenate([s.angle_deg for s in sweeps]), knots, _DEGREE).toarray()
@@ -314,8 +314,8 @@ def sweeps_of(time_s: Array, angle_deg: Array, voltage_V: Array, fewest: int = 2
     """Cut one record into sweeps, each back and forth.
 
     time_s in s, angle_deg in degrees and voltage_V in V, (n,) each; rows with a value that is not finite are
-    left out. It is cut where the angle is lowest between two visits to the upper third of its range, so that
-    neither noise nor hesitation counts as a turn. Raises InputError for fewer than `fewest` sweeps.
+    left out. It is cut at the lowest angle between two visits to the upper third of its range, so that noise
+    and pauses do not count as turns. Raises InputError for fewer than `fewest` sweeps.
     """
     good = np.isfinite(angle_deg) & np.isfinite(voltage_V) & np.isfinite(time_s)
     time_s, angle_deg, voltage_V = time_s[good], angle_deg[good], voltage_V[good]
@@ -368,8 +368,8 @@ def write_calibration(path: Path, calibration: Calibration, about: str = "") -> 
 def read_calibration(path: Path) -> Calibration:
     """Read a file of `write_calibration`.
 
-    Raises InputError where it cannot be read, has another version, lacks a value or has one that is no
-    number, or where its map is not monotonic.
+    Raises InputError if it cannot be read, has another version, lacks a number, or has a map that is not
+    monotonic.
     """
     remedy = "give the calibration.toml that `calibrate` writes"
     try:
@@ -382,7 +382,7 @@ def read_calibration(path: Path) -> Calibration:
         numbers = [*table["knots_deg"], *table["coefficients_V"]]
         numbers += [table[n] for n in ("version", "band_V", "drift_per_h", "gain", "error_deg", "sweeps")]
         if not all(map(is_number, [*numbers, 0 if isinstance(table["dark"], str) else table["dark"]])):
-            raise TypeError("true, false or words where numbers should be")
+            raise TypeError("true, false or text in place of numbers")
         if table["version"] != VERSION:
             raise InputError(f"version {table['version']} is not known", str(path), "calibrate again")
         result = Calibration(

@@ -17,7 +17,7 @@ _MOST_NEW = 1000
 
 
 def channels_of(found: Iterable[object]) -> list[str]:
-    """Names that are neither running number nor clock; of a row of numbers there is none."""
+    """Names other than running number and clock; none for a row of numbers."""
     return [name for name in found if isinstance(name, str) and name not in NUMBERS and name not in CLOCKS]
 
 
@@ -29,11 +29,11 @@ class ChannelNames:
         self._new: dict[str, deque[int]] = {}
 
     def forget_new(self) -> None:
-        """Begin anew with names that are to become channels."""
+        """Restart with names that are to become channels."""
         self._new = {}
 
     def is_unsure(self, lines: Sequence[Pairs]) -> bool:
-        """True if first lines are too few and too different to tell a damaged name from a right one."""
+        """True if the first lines are too few and too different to recognise a damaged name."""
         names = Counter(name for line in lines for name in channels_of(line))
         return len(lines) < SURE and any(2 * times <= max(names.values()) for times in names.values())
 
@@ -57,7 +57,7 @@ class ChannelNames:
         self._doubtful = set()
 
     def strange(self, names: list[str], layout: Layout | None, number: int) -> tuple[set[str], Layout | None]:
-        """Names that are no channels, or not yet, and the layout with those that became channels.
+        """Names that are not channels so far, and the layout with those that became channels.
 
         Those that keep coming do. number: of the line that holds them.
         """

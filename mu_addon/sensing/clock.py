@@ -13,7 +13,7 @@ Array = np.ndarray[Any, Any]
 class UnwrappedCounter:
     """Readings of a counter that restarts at `modulus` (None: never), as one that does not restart.
 
-    A reading less than half the modulus ahead of the last is later; anything else came out of order, or its
+    A reading less than half the modulus ahead of the last one is later. Any other came out of order, or the
     counter was set back. last: the last accepted reading, set by the caller.
     """
 
@@ -41,9 +41,9 @@ class UnwrappedCounter:
 class HostTime:
     """Conversion of a device's time to the host's, in s, by the messages with the least delay.
 
-    A message is never early: host minus device time at its arrival is their offset plus a delay. The least of
-    each second lies near the offset, which drifts linearly as the two oscillators differ; a line is fitted to
-    the last half minute and lowered until no message is early.
+    A message is never early: host minus device time at its arrival is their offset plus a delay. The least
+    value of each second is near the offset, which drifts linearly because the oscillators differ. A line is
+    fitted to the last half minute and lowered until no message is early.
     """
 
     bin_s = 1.0

@@ -10,7 +10,7 @@ from .text_lines import Pairs, header_of, pairs_of_row, row_of
 
 
 class CsvColumns:
-    """Meaning of a CSV stream's columns, learned from header and rows; `refused` headers were none."""
+    """Meaning of a CSV stream's columns, from header and rows; `refused`: lines that were no headers."""
 
     def __init__(self) -> None:
         self.refused: list[bytes] = []
@@ -30,12 +30,12 @@ class CsvColumns:
 
     @staticmethod
     def is_unsure(rows: Sequence[Sequence[float]]) -> bool:
-        """True if first rows are too few and too different to tell the number of columns."""
+        """True if the first rows are too few and too different to determine the number of columns."""
         commonest = max(Counter(map(len, rows)).values(), default=0)
         return len(rows) < SURE and 4 * commonest < 3 * len(rows)
 
     def take(self, line: str, piece: bytes, first: bool) -> Pairs | None:
-        """Values by column of a line that is a row, nothing of a header, or None of one that is neither.
+        """Values by column of a row, an empty dictionary of a header, None of any other line.
 
         piece: the line as it came. first: the line may lack its beginning, and is no row.
         """
@@ -80,7 +80,7 @@ class CsvColumns:
         return self._columns
 
     def _refuse_header(self) -> None:
-        """A header that no row of its width followed was none."""
+        """A header without a following row of its width was not a header."""
         if self._header is not None:
             self.refused.append(self._header[1])
             self._header = None

@@ -24,7 +24,7 @@ _PATIENCE_S = 1.5
 
 
 class Decoder:
-    """Converts the bytes of a serial line to samples; knows binary frames, label:value pairs, CSV and JSON.
+    """Converts the bytes of a serial line to samples: binary frames, label:value pairs, CSV and JSON.
 
     `feed` takes bytes as they come and returns the samples that are complete. Lost and damaged samples are
     counted in `counters`. It keeps at most a few kilobytes of input.
@@ -61,7 +61,7 @@ class Decoder:
         return self._accounts.rejects
 
     def interrupted(self) -> None:
-        """Process pending input as it is: the line was cut, and the next bytes may begin within a frame."""
+        """Process pending input now: the line was cut, and the next bytes may begin within a frame."""
         self._flush_pending()
         self._flush_buffer()
         self._first = True
@@ -100,12 +100,12 @@ class Decoder:
 
     @property
     def complaint(self) -> tuple[str, str] | None:
-        """Fault of input that is almost entirely unreadable, and what to do; else None."""
+        """Fault of input that is almost entirely unreadable, and remedy; else None."""
         return None if self.format is not None else self._accounts.complaint(bytes(self._buffer))
 
     @property
     def why_no_sample(self) -> tuple[str, str] | None:
-        """Return `complaint`, however little input came, if nothing could be read by the end; else None."""
+        """Return `complaint`, for any amount of input, if nothing could be read by the end; else None."""
         return None if self.counters.samples else self._accounts.complaint(bytes(self._buffer), 1)
 
     # The buffer.
@@ -170,7 +170,7 @@ class Decoder:
             self._lines()
 
     def _detect_format(self, enough: int = ENOUGH) -> None:
-        """Find the format by what most of the latest whole pieces can be read as."""
+        """Find the format in which most of the latest whole pieces can be read."""
         found = format_of(bytes(self._buffer), not self._first, enough, self._last_format)
         if found is None:
             return
@@ -186,7 +186,7 @@ class Decoder:
         self._learn(found)
 
     def _is_unsure(self, found: str) -> bool:
-        """True if the buffer's lines are few and disagree on their channels: later ones will tell."""
+        """True if the buffer's lines are few and disagree on their channels: later ones decide."""
         if found == "csv":
             return self._csv.is_unsure(self._rows())
         return self._names.is_unsure(self._named_lines(found))

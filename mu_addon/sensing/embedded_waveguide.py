@@ -1,8 +1,8 @@
 """A printed waveguide in a body that deforms: its lattice's nodes move and turn, and it bends between them.
 
-A bar is joined to the lattice at its path's nodes alone. There the struts hold it in place and direction;
-between two nodes it is a beam without a load, whose axis is the cubic through both ends with their
-directions (Euler and Bernoulli). Its own stiffness, which holds the lattice back a little, is left out.
+A bar is joined to the lattice at its path's nodes alone. There the struts fix its position and direction.
+Between two nodes it is an unloaded Euler-Bernoulli beam: its axis is the cubic with the ends' positions and
+directions. Its own stiffness, which slightly restrains the lattice, is neglected.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ class WaveguideShape:
 class EmbeddedWaveguide:
     """A printed waveguide at rest, and the lattice nodes that carry it.
 
-    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, and before and
-    after them the end faces; s (m,): lengths in mm along the axis; joint (m,): number of the node that
-    carries each point; normals (m - 1, 3): of the face with the wells, a piece of the axis.
+    shape: its section and wells. nodes (h, 3) in mm: the lattice's. points (m, 3): the nodes, with an end
+    face before and after them; s (m,): lengths in mm along the axis; joint (m,): number of the node that
+    carries each point; normals (m - 1, 3): of the face with the wells, for each piece of the axis.
     """
 
     shape: WaveguideShape
@@ -66,8 +66,8 @@ class EmbeddedWaveguide:
     def legs(self, positions: Array, rotations: Array) -> tuple[Centreline, ...]:
         """The axis where the nodes are at positions (h, 3) in mm, turned by rotations (h, 3, 3).
 
-        One centreline from each bend of the bar at rest to the next; s goes on from one to the next. Between
-        two nodes the axis is the cubic of a beam without load (Euler and Bernoulli).
+        One centreline from each bend of the bar at rest to the next, with s continuous. Between two nodes the
+        axis is the cubic of a beam without load (Euler and Bernoulli).
         """
         way = np.diff(self.points, axis=0) / np.diff(self.s)[:, None]
         found: list[list[tuple[Array, Array, Array]]] = []
@@ -183,8 +183,8 @@ class Joints:
     def moved(self, u: Array) -> tuple[Array, Array]:
         """Positions (n, 3) in mm and rotations (n, 3, 3) after displacements (nodes of the mesh, 3) in mm.
 
-        The rotation is that of the mean deformation around the node (polar decomposition): a symmetric
-        strain turns no node whose struts are arranged alike in all three directions.
+        The rotation is that of the mean deformation around the node (polar decomposition). A symmetric strain
+        rotates no node whose struts have cubic symmetry.
         """
         at = self._around.displacement(u).reshape(len(self.nodes), 7, 3)
         F = np.eye(3) + np.swapaxes(at[:, 1:4] - at[:, 4:7], 1, 2) / (2 * self.reach)

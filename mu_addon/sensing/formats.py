@@ -63,7 +63,7 @@ def without_colour(piece: bytes) -> bytes:
 
 
 def text_of(piece: bytes) -> str | None:
-    """A line as text without colour codes, and without blanks around it, or None if it is none."""
+    """A line as text without colour codes and surrounding blanks, or None if it is not text."""
     piece = without_colour(piece)
     try:
         line = piece.decode().strip()

@@ -1,8 +1,8 @@
 """Binary frames on a serial line: a payload with its CRC-16, byte-stuffed by COBS, ended by a zero byte.
 
-A payload's first byte tells its kind. SAMPLE: sequence number and device time in microseconds, both modulo
-2^32, then one count for each channel. INFO: JSON in UTF-8, sent about once a second:
-{"channels": ["light", ...], "unit_per_count": 0.0008, "unit": "V", "firmware": "..."}.
+A payload's first byte is its kind. SAMPLE: sequence number and device time in microseconds, both modulo 2^32,
+then one count for each channel. INFO: JSON in UTF-8, sent about once a second: {"channels": ["light", ...],
+"unit_per_count": 0.0008, "unit": "V", "firmware": "..."}.
 
 Sources: Cheshire and Baker, IEEE/ACM Trans. Networking 7 (1999) 159 (COBS); CRC-16/IBM-3740 (polynomial
 0x1021, start 0xFFFF) of the catalogue of parametrised CRC algorithms.
@@ -58,7 +58,7 @@ def cobs_encoded(data: bytes) -> bytes:
 
 
 def cobs_decoded(data: bytes) -> bytes | None:
-    """The bytes of which `cobs_encoded` made `data`, or None where `data` is not COBS-encoded."""
+    """The bytes that `cobs_encoded` encodes as `data`, or None if `data` is not COBS-encoded."""
     out = bytearray()
     place, length = 0, len(data)
     while place < length:
@@ -74,7 +74,7 @@ def cobs_decoded(data: bytes) -> bytes | None:
 
 
 def framed(payload: bytes) -> bytes:
-    """A payload as it is sent: with its CRC, COBS-encoded, ended by a zero byte."""
+    """A payload as sent: with its CRC, COBS-encoded, ended by a zero byte."""
     return cobs_encoded(payload + _CRC.pack(crc16(payload))) + END
 
 
@@ -103,7 +103,7 @@ def payload_of(frame: bytes) -> bytes | None:
 
 
 def sample_of(payload: bytes) -> tuple[int, int, tuple[int, ...]] | None:
-    """Running number, device time in microseconds and counts of a SAMPLE's payload, or None if it is none."""
+    """Running number, device time in microseconds and counts of a SAMPLE payload; None for any other."""
     if len(payload) < _HEAD.size:
         return None
     kind, sequence, time_us, n = _HEAD.unpack_from(payload)
@@ -113,7 +113,7 @@ def sample_of(payload: bytes) -> tuple[int, int, tuple[int, ...]] | None:
 
 
 def info_of(payload: bytes) -> dict[str, Any] | None:
-    """The JSON object of an INFO's payload, or None if it is none."""
+    """The JSON object of an INFO payload; None for any other."""
     if payload[:1] != bytes([INFO]):
         return None
     try:

@@ -16,10 +16,10 @@ from ..errors import InputError
 class Optics:
     """Optical constants of a resin at one wavelength; for Elastic 50A at 850 nm none are published.
 
-    index, around: refractive index of the resin, and of what surrounds it; attenuation_per_mm: natural
-    logarithm of the loss a mm, in 1/mm; roughness: standard deviation of the wall's slope (no unit). The
-    defaults are assumed: a silicone-like index, a tenth of the light lost in a centimetre, walls as smooth as
-    layers of 0.1 mm with rounded steps. Raises InputError for an index outside 1 to 4 or negative losses.
+    index, around: refractive indices of the resin and of its surroundings; attenuation_per_mm: in 1/mm, of
+    the natural exponential; roughness: standard deviation of the wall's slope (no unit). The defaults are
+    assumed: a silicone-like index, a tenth of the light lost per centimetre, walls of 0.1 mm layers with
+    rounded steps. Raises InputError for an index outside 1 to 4 or negative losses.
     """
 
     index: float = 1.5
@@ -112,9 +112,9 @@ def swept(
 
     width is measured across, height along the normals, both of the bar at rest; wells are cut into the outer
     face over the whole width. Cross-sections stay plane and square to the axis, so that a well opens as its
-    side is stretched: (1 + height curvature / 2) times. They shrink as the axis is stretched, since the resin
-    keeps its volume. junctions: (start, end) lengths over which the two side faces open into struts. edge:
-    longest step along the axis. Raises InputError for wells that overlap or leave the bar.
+    side is stretched: (1 + height curvature / 2) times. They shrink as the axis is stretched, at constant
+    volume. junctions: (start, end) lengths over which the two side faces open into struts. edge: longest step
+    along the axis. Raises InputError for wells that overlap or leave the bar.
     """
     total = float(line.s[-1])
     cuts = sorted((at - well_width / 2, at + well_width / 2) for at in wells)

@@ -1,11 +1,11 @@
-"""The light that a bent waveguide lets through: traced rays, and a law fitted to them that costs nothing.
+"""The light that a bent waveguide transmits: traced rays, and a fast law fitted to them.
 
 The logarithm of the light's loss is linear in
 
 - the guide's length, its junctions, and its elongation;
 - the logarithm of its number of wells: each finds less of the light that it can take;
 - the kinks at its wells, either way;
-- the signed curvature at its wells: light runs along the outer side of a bend and meets the wells there;
+- the signed curvature at its wells: light travels along the outer side of a bend and reaches wells there;
 - the curvature squared along it: bend loss.
 """
 
@@ -99,8 +99,8 @@ def _area(values: Array, s: Array) -> float:
 class Law:
     """-log(transmitted) = coefficients (8,) times `features`, fitted to traces.
 
-    coefficients: in one over the unit of each feature. covariance (8, 8): of the coefficients; rms: root mean
-    square error of log(transmitted) for traces left out, weighted, their own noise included.
+    coefficients: in one over the unit of each feature. covariance (8, 8): of the coefficients; rms: weighted
+    root mean square error of log(transmitted) for traces left out, including their noise.
     """
 
     coefficients: Array
@@ -194,7 +194,7 @@ def fit_law(
 
 
 def _bent(length: float, end: float, curvature: Array, stretch: float = 1.0) -> Centreline:
-    """A planar axis whose curvature goes linearly between its ends' (2,), in 1/mm when straight.
+    """A planar axis whose curvature is linear between its ends' values (2,), in 1/mm when straight.
 
     The last `end` mm at either end are straight and not stretched.
     """

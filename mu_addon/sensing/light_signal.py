@@ -1,4 +1,4 @@
-"""Light signal of a waveguide over a body's motion, and the figures of it as a sensor.
+"""Light signal of a waveguide over a body's motion, and its figures as a sensor.
 
 `signal_of_states` is the one door for a path's signal from states of a finite-element mesh.
 """
@@ -54,10 +54,10 @@ def signal_of_states(
 ) -> Signal:
     """The signal of a unit's waveguide in a sequence of its states, in their order.
 
-    path: a window of anchors, or lattice nodes (h, 3) in mm; mesh: the unit's own, in its own frame, whole
-    or halved; displacements: k arrays (nodes, 3) in mm. law: one fitted to the unit's printed dimensions and
-    the optics (`fit_law`, some seconds); without it it is fitted here. rays: follow so many through the bent
-    bar in place of the law, see `traced_signal`. Raises InputError for a path that no waveguide can follow.
+    path: a window of anchors, or lattice nodes (h, 3) in mm; mesh: the unit's own, in its own frame, whole or
+    halved; displacements: k arrays (nodes, 3) in mm. law: one fitted to the unit's printed dimensions and the
+    optics (`fit_law`, some seconds), by default fitted here. rays: number to trace through the bent bar in
+    place of the law, see `traced_signal`. Raises InputError for a path that no waveguide can follow.
     """
     optics = Optics() if optics is None else optics
     nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
@@ -92,8 +92,8 @@ def traced_signal(
 ) -> Signal:
     """The light of an embedded waveguide in states of its nodes, by tracing rays in the bent bar.
 
-    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). errors are the statistical
-    ones of so many rays (no unit). Raises InputError for a bar that is not straight at rest.
+    moved: for each of k states positions (h, 3) in mm and rotations (h, 3, 3). errors: statistical errors for
+    this number of rays (no unit). Raises InputError for a bar that is not straight at rest.
     """
     if len(guide.at_rest) > 1:
         raise InputError(
@@ -112,10 +112,9 @@ def traced_signal(
 class Response:
     """A sensor's signal over a motion.
 
-    angle_deg (k,) and transmitted (k,), sorted by angle; sensitivity_per_deg: change of Delta V / V_f a
-    degree at rest, signed; monotonic_deg: the widest interval about rest in which the signal only rises
-    or only falls; span: what Delta V / V_f covers over that interval; rest_deg: the angle at rest, which a
-    weight may turn from 0.
+    angle_deg (k,) and transmitted (k,), sorted by angle; sensitivity_per_deg: signed change of Delta V / V_f
+    a degree at rest; monotonic_deg: the widest interval about rest in which the signal is monotonic; span:
+    range of Delta V / V_f over that interval; rest_deg: the angle at rest, not 0 under a weight.
     """
 
     angle_deg: Array
@@ -184,7 +183,7 @@ def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[b
 def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tuple[tuple[int, ...], float]]:
     """Sets of `size` sensors with the largest information, best first, and that information in nats.
 
-    signals (n, q): each sensor's derivative by q independent ways to bend, each of unit standard deviation;
+    signals (n, q): each sensor's derivative by q independent bending modes, each of unit standard deviation;
     noise: standard deviation of a reading, in the unit of the signals. D-optimality with a unit prior: log
     det(1 + S^T S / noise^2) / 2. most: how many sets. Raises InputError for a size outside 1 to n.
     """
@@ -202,7 +201,7 @@ def differential_pairs(sensitivity: Sequence[float], most: int = 5) -> list[tupl
     """Pairs of sensors whose difference changes most with bending, best first, with that signed change.
 
     sensitivity (n,): relative change of each one's light by bending, in 1/degree, say; the result has the
-    same unit. What dims both alike, such as a light source that warms, cancels in the difference of their
+    same unit. A dimming common to both, as of a warming light source, cancels in the difference of their
     logarithms.
     """
     pairs = [((i, j), sensitivity[i] - sensitivity[j]) for i, j in combinations(range(len(sensitivity)), 2)]

@@ -1,9 +1,9 @@
 """Kinks of a bent and stretched bar at its wells, where it is weaker and its centroid is off its axis.
 
-Each section carries the same force N and moment M about the bar's axis: with the area A, its second moment I
-and its centroid's distance c from the bar's axis, N = E A (e + c k) and M = E (A c e + (I + A c^2) k) for the
-axis' strain e and curvature k (Euler and Bernoulli's bar with a varying section). At a well A and I are those
-of what is left below it, c is half its depth: a pulled bar opens its wells though its ends do not turn.
+Each section carries the same force N and moment M about the bar's axis. With the area A, its second moment I
+and its centroid's distance c from the axis, an Euler-Bernoulli bar with strain e and curvature k of its axis
+has N = E A (e + c k) and M = E (A c e + (I + A c^2) k). At a well A and I are those of the section below it,
+and c is half its depth: a pulled bar opens its wells though its ends do not turn.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _STEPS_A_MM = 8
 def with_wells(shape: WaveguideShape, line: Centreline) -> Centreline:
     """The axis of a bar with wells whose mean curvature and stretch are those of `line`.
 
-    Lengths in mm, curvatures in 1/mm. The mean is over what struts hold, from the line's first junction to
-    its last; beyond them it is as it was. The far end face is displaced a little from the line's, which has
-    no effect on light.
+    Lengths in mm, curvatures in 1/mm. The mean is over the part held by struts, from the line's first
+    junction to its last; the rest is unchanged. The far end face is displaced a little from the line's, which
+    has no effect on light.
     """
     s, strain, curvature, before = _given_way(shape, line)
     step = np.diff(s)

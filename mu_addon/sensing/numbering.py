@@ -1,8 +1,8 @@
 """Running numbers and device clocks unwrapped: gaps, repeats, wraps, resets and glitches distinguished.
 
-A number that goes on by one is taken at once. Any other is judged with the next sample's: after a gap, a wrap
-or a restart the count goes on from there, after a glitch it does not. The only sample left out is one equal
-in number, clock and values to one shortly before.
+A number one above the last is accepted at once. Any other is judged with the next sample's: the count
+continues from it after a gap, a wrap or a restart, but not after a glitch. The only sample left out is one
+equal in number, clock and values to one shortly before.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Row(NamedTuple):
 class Numbered(NamedTuple):
     """A sample with its running number and device time in s (or nan), both without wraps.
 
-    clock_restarted: True if the device's clock began anew at this sample.
+    clock_restarted: True if the device's clock restarted at this sample.
     """
 
     row: Row
@@ -43,7 +43,7 @@ class Numbered(NamedTuple):
 
 @attrs.define
 class Tally:
-    """Counts of what the samples' numbers show: missing, repeated and misnumbered samples, and restarts."""
+    """Counts by the samples' numbers: missing, repeated and misnumbered samples, and restarts."""
 
     lost: int = 0
     repeated: int = 0
@@ -86,7 +86,7 @@ class Numbering:
         self._recent: deque[tuple[float | None, float | None, list[float]]] = deque(maxlen=_RECENT)
 
     def take(self, row: Row) -> list[Numbered]:
-        """Take a sample; return the settled ones: none, itself, or also one that was held back."""
+        """Accept a sample; return the settled ones: none, itself, or also one that was held back."""
         settled = []
         if self._repeat(row):
             self._repeats += 1
@@ -174,7 +174,7 @@ class Numbering:
         return numbered._replace(clock_restarted=clock == _RUN)
 
     def _judged(self, ahead: float, after: float | None) -> str:
-        """Judgement of a number that does not go on by one; `after`: the next one's lead over the last."""
+        """Judgement of a number that is not one above the last; after: the next one's lead over the last."""
         stubborn = self._odd >= _ODD
         if ahead > 0:
             goes_on = after is None or (after > ahead and (ahead <= _FAR or after - ahead <= _NEAR))
@@ -193,7 +193,7 @@ class Numbering:
         return found if found is not None and number <= _NEAR and found - last <= _NEAR else None
 
     def _accept(self, row: Row, ahead: float | None, later: float | None, glitch: bool = False) -> Numbered:
-        """Take a sample; ahead: samples since the last number, None to count on without believing its own."""
+        """Accept a sample; ahead: samples since the last number, None to count on without using its own."""
         if self._sequence is None:
             self._sequence = 0 if row.number is None else int(row.number)
             self.numbers.last = row.number

@@ -50,8 +50,9 @@ def trace_rays(
     """Follow each of n rays from outside the entry to its end.
 
     starts, directions (n): in mm, and of unit length; kinds (f): of the mesh's faces; index, around:
-    refractive indices; attenuation in 1/mm; roughness: standard deviation of the wall's slope (no unit).
-    Written: fate (n), weight (n), the share of its light left, and absorbed (n), the share absorbed.
+    refractive indices inside and outside; attenuation in 1/mm; roughness: standard deviation of the wall's
+    slope (no unit). Written: fate (n), weight (n), the share of its light left, and absorbed (n), the share
+    absorbed.
     """
     ray = wp.tid()
     state = wp.rand_init(seed, ray)

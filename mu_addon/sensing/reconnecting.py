@@ -19,7 +19,7 @@ class Control:
 
     stop: threading.Event = attrs.field(factory=threading.Event)
     pause: threading.Event = attrs.field(factory=threading.Event)
-    """While set, the port is given back; the session goes on when it is cleared."""
+    """While set, the port is released; the session continues when it is cleared."""
     marks: queue.SimpleQueue[str] = attrs.field(factory=queue.SimpleQueue)
 
 

@@ -65,7 +65,7 @@ def columns_of(samples: Samples) -> tuple[str, ...]:
 
 
 def _column(name: str) -> str:
-    """A device's name for a channel without blanks, separators, quotes and what cannot be printed."""
+    """A device's name for a channel, without blanks, separators, quotes and unprintable characters."""
     shown = "".join(c if c.isprintable() else "_" for c in name)
     return re.sub(r"[\s,;\"']", "_", shown)[:200] or "_"
 

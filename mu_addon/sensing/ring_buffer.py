@@ -60,7 +60,7 @@ class Ring:
 
     @classmethod
     def attach(cls, path: Path) -> Ring:
-        """Open the ring in the file `path` to read; raises InputError where the file holds none."""
+        """Open the ring in the file `path` to read; raises InputError if the file is not a ring."""
         try:
             with path.open("rb") as stream:
                 mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
@@ -90,8 +90,8 @@ class Ring:
     def since(self, row: int) -> tuple[Array, int]:
         """A copy (m, columns) of the rows from number `row` on, and the number of the next row.
 
-        Values have the units of their writer. At most half of the ring, the latest: the other half is what
-        the writer may overwrite meanwhile.
+        Values have the units of their writer. At most the latest half of the ring: the writer may overwrite
+        the other half during the call.
         """
         count, capacity = self.written, len(self.rows)
         m = min(max(count - row, 0), capacity // 2)

@@ -35,8 +35,8 @@ class Layout:
 class Samples:
     """n samples of one layout with c channels, in the order they came.
 
-    host_s (n,): seconds on the host's clock, rising; device_s (n,): the device's own in s, without wraps, or
-    nan; sequence (n,): running number without wraps, counted on where the device sends none; values (n, c) in
+    host_s (n,): seconds on the host's clock, rising; device_s (n,): the device's time in s, without wraps, or
+    nan; sequence (n,): running number without wraps, counted here if the device sends none; values (n, c) in
     the layout's unit.
     """
 

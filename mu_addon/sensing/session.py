@@ -64,11 +64,10 @@ def run_session(
 ) -> dict[str, Any]:
     """Record a source into `folder` until it ends, `seconds` have passed, or `control` asks it to stop.
 
-    Beside the recording, status.json is written five times a second and names the file of the latest samples
-    (a Ring: time_s, device_s, sequence, channels, columns of `derive`). about: entries for the recording's
-    index. on_event: called with events, and with "status" as often. keep_time: the source's clock is the time
-    that is recorded, as for a recording that is played again. Returns the last status. Raises InputError and
-    OutputError.
+    status.json is written five times a second and names the file of the latest samples (a Ring: time_s,
+    device_s, sequence, channels, columns of `derive`). about: entries for the recording's index. on_event:
+    called with events, and with "status" at each write. keep_time: record the source's clock as time, as for
+    a replayed recording. Returns the last status. Raises InputError and OutputError.
     """
     control = control or Control()
     clock = Clock()

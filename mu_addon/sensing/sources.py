@@ -32,7 +32,7 @@ class Source(Protocol):
     """A line that is opened, read until it raises Gone or Ended, closed, and perhaps opened again."""
 
     def open(self) -> str:
-        """Open the line and describe it in words; raises Gone if it is absent now, InputError for good."""
+        """Open the line and describe it; raises ConnectionLost if it is absent now, else InputError."""
 
     def read(self) -> bytes:
         """The bytes that have come, after at most a few hundredths of a second; raises Gone and Ended."""
@@ -89,7 +89,7 @@ def find(name: str, present: list[Port]) -> Port | None:
 
 
 class SerialLine:
-    """A serial port by pyserial; a USB device is found again in whatever socket it comes back.
+    """A serial port by pyserial; a USB device is found again in any socket.
 
     name: of the device file, or usb:VID:PID[:SERIAL]; baud: bits a second.
     """
@@ -102,7 +102,7 @@ class SerialLine:
         self._line: Any = None
 
     def open(self) -> str:
-        """Open the port for exclusive use and describe it in words.
+        """Open the port for exclusive use and describe it.
 
         Raises Gone where it is absent or cannot be opened, InputError where several devices fit or pyserial
         is missing.
@@ -181,7 +181,7 @@ class Replay:
         return b"".join(out)
 
     def close(self) -> None:
-        """Does nothing: no file is kept open."""
+        """Do nothing: no file is kept open."""
 
 
 def _lines(recordings: list[Recording]) -> Iterator[tuple[float, bytes]]:
@@ -241,7 +241,7 @@ class Simulated:
         return b"".join(out)
 
     def close(self) -> None:
-        """Does nothing: there is no line."""
+        """Do nothing: there is no line."""
 
 
 def _serial() -> Any:

@@ -68,7 +68,7 @@ def pairs_of(line: str) -> Pairs | None:
 
 
 def _pairs_until(line: str) -> tuple[Pairs | None, str]:
-    """The pairs of a line and nothing, or None and the rest that is not a pair or names one again."""
+    """The pairs of a line and "", or None and the rest that is not a pair or repeats a name."""
     line = line.translate(_SAME_SIGNS).removeprefix(">")
     if ";" in line:
         line = _DECIMAL_COMMA.sub(".", line)
@@ -106,9 +106,9 @@ def why_unread(line: str) -> str:
 
 
 def json_of(line: str) -> Pairs | None:
-    """Numbers by name of a JSON object, or None where the line is none.
+    """Numbers by name of a JSON object, or None for any other line.
 
-    Values that are neither number nor true or false are left out; None also for a name that comes twice.
+    Values that are neither number nor true or false are left out; None also for a repeated name.
     """
     if not line.startswith("{"):
         return None
@@ -130,7 +130,7 @@ def _named_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _readable(found: Pairs) -> Pairs | None:
-    """`found`, or None: nothing in it, a number beyond any float, a clock or running number beyond sense."""
+    """`found`, or None if it is empty or a number, a clock or a running number is out of range."""
     if not found or any(math.isinf(value) for value in found.values()):
         return None
     counts = [found[name] for name in NUMBERS if name in found]
@@ -148,7 +148,7 @@ def pairs_of_row(columns: list[str], row: list[float]) -> Pairs | None:
 
 
 def header_of(line: str) -> list[str] | None:
-    """Column names of a CSV header, or None where the line is none: every name valid and none twice."""
+    """Column names of a CSV header, valid and distinct, or None for any other line."""
     names = _cells(line)
     named = all(_NAME.match(name) for name in names) and len(set(names)) == len(names)
     return names if names and named else None

@@ -1,8 +1,8 @@
 """Rays of light through a guide: refraction, total reflection, absorption and rough walls, by Monte Carlo.
 
-At each surface a ray is reflected with Fresnel's probability for unpolarised light, else refracted; in air it
-goes on, and may come in again across a well. Its weight falls by Beer and Lambert inside. A rough wall tilts
-the normal by a Gaussian slope. What JUNCTION faces let through is lost in the struts.
+At each surface a ray is reflected with Fresnel's probability for unpolarised light, else refracted. In air it
+continues and may re-enter across a well. Its weight falls by Beer and Lambert inside. A rough wall tilts the
+normal by a Gaussian slope. Light that leaves through JUNCTION faces is lost in the struts.
 """
 
 from __future__ import annotations

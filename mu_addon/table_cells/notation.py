@@ -53,9 +53,9 @@ _SIMPLE = re.compile(r"[-+0-9.eE\n]*")
 class Numbers:
     """The numbers of a column's cells.
 
-    values (n,): nan where a cell is empty or no number; decimal: the sign; sure: the cells determine it, or
-    hold none; unreadable: mask of cells that are neither number nor empty; both: mask of those with one sign
-    for decimals and thousands.
+    values (n,): nan where a cell is empty or no number; decimal: the decimal sign; sure: the cells determine
+    it, or contain none; unreadable: mask of cells that are neither number nor empty; both: mask of cells with
+    one sign for decimals and thousands.
     """
 
     values: Array
@@ -150,7 +150,7 @@ def _simple(cells: Sequence[str]) -> Numbers | None:
 
 
 def without_units(cells: Sequence[str]) -> tuple[list[str], str]:
-    """Cells such as "12.5 N" without the unit that most of them have, and that unit; "" for none."""
+    """Cells such as "12.5 N" without the unit that most of them share, and that unit, "" if there is none."""
     found = [_WITH_UNIT.fullmatch(plain_signs(cell)) for cell in cells]
     units = [match[2] for match in found if match]
     filled = sum(1 for cell in cells if cell)

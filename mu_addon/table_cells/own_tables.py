@@ -19,7 +19,7 @@ _LONGEST = 1 << 26
 def own_text(path: Path, most: int = _LONGEST) -> str:
     r"""Text of a table, UTF-8, UTF-16 with its mark or Windows-1252; line ends as \n.
 
-    Raises OSError, and UnicodeDecodeError for what is not text.
+    Raises OSError, and UnicodeDecodeError if the file is not text.
     """
     data = file_bytes(path, most)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):

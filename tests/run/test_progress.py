@@ -237,7 +237,10 @@ def test_a_busy_machine_s_time_is_told_first(clock, monkeypatch):
     monkeypatch.setattr("mu_addon.run.progress.slowed_so_far", lambda: 3.0)
     stream = io.StringIO()
     Progress([terminal(stream, clock)], clock).plan([("mesh", 20.0)])
-    assert stream.getvalue() == "about 1 min 00 s beside other work, 20 s on two cores alone, 1 stage\n"
+    assert (
+        stream.getvalue()
+        == "about 1 min 00 s with other programs running, 20 s on two cores without, 1 stage\n"
+    )
 
 
 def test_a_stage_that_says_nothing_is_told_to_go_on(tmp_path, monkeypatch):

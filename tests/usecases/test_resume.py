@@ -157,7 +157,7 @@ def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
     keep_inputs(
         tmp_path, {"diagnose.toml": f'{diagnose.LAYOUT.header}\nexperiments_sha256 = "0"\n\n[data]\n'}
     )
-    with pytest.raises(InputError, match="does not say where the folder of measured data lies") as caught:
+    with pytest.raises(InputError, match="does not name the place of the folder of measured data") as caught:
         resume(tmp_path, RunContext(Progress()))
     assert "by its own command, with this folder as --out" in caught.value.remedy
 
