@@ -1,6 +1,6 @@
 """Units in series: each reduced to an elastic joint that its pressure drives, and their chain in equilibrium.
 
-`learn` makes a `Joint` of a unit from its own finite element model; `Chain` finds equilibria of several under
+`learn` makes a `Joint` of a unit from its finite element model; `Chain` finds equilibria of several under
 pressures, weight and a load at the tip, `reach_point` the pressures that bring the tip to a point. Units: mm,
 N, g, kPa.
 

@@ -42,7 +42,7 @@ class Loads:
 
     down (3,): direction of gravity, of length 1, or 0 without gravity. tip_mass_g hangs at the middle of the
     tip's plate. tip_force_N (3,) and tip_couple_N_mm (3,) keep their direction; a couple in space has no
-    potential, so that where it acts the tangent is not symmetric.
+    potential and makes the tangent unsymmetric.
     """
 
     down: Array = attrs.field(factory=lambda: np.zeros(3))
@@ -65,8 +65,8 @@ class ChainState:
     """An equilibrium of a chain of n units, in the frame of its base.
 
     pressures_kPa (n,); plates (n + 1, 4, 4): the base's frame and those of each unit's tip plate. eta (n, 6):
-    of the units, each in its own turned frame. used_range (n,): share of the joint's range. covariance (6,
-    6): of the tip's rotation in rad and place in mm, from the joints' errors.
+    of the units, each in its rotated frame. used_range (n,): share of the joint's range. covariance (6, 6):
+    of the tip's rotation in rad and place in mm, from the joints' errors.
     """
 
     pressures_kPa: Array
@@ -122,7 +122,7 @@ class Chain:
     # The potential and its derivatives.
 
     def potential(self, plates: Array, at: Sequence[JointAt], loads: Loads) -> float:
-        """Potential in mJ of plates (n + 1, 4, 4), without the tip's couple, which has none."""
+        """Potential in mJ of plates (n + 1, 4, 4), without the tip's couple, which has no potential."""
         total = 0.0
         down = np.asarray(loads.down, float) * GRAVITY_N_PER_G
         for link, joint, base, tip in zip(self.links, at, plates, plates[1:], strict=False):
@@ -211,8 +211,8 @@ class Chain:
     def newton(self, start: Array, pressures_kPa: Array, loads: Loads | None = None) -> ChainState:
         """The stable equilibrium at pressures (n,) in kPa from plates (n + 1, 4, 4) nearby.
 
-        Raises ConvergenceError where there is none, it is unstable, or a unit would be loaded beyond the
-        range that its joint was learned in.
+        Raises ConvergenceError if there is no equilibrium, it is unstable, or a unit is loaded beyond the
+        range of its joint.
         """
         loads = self.loads if loads is None else loads
         at = self.joints_at(pressures_kPa)
@@ -287,7 +287,7 @@ class Chain:
         )
 
     def _covariance(self, plates: Array, k: Array) -> Array:
-        """Covariance (6, 6) of the tip's plate by the errors of the joints, each unit's its own."""
+        """Covariance (6, 6) of the tip's plate by the errors of the joints, independent between units."""
         n = len(self.links)
         spread = np.zeros((6 * n + 6, 6 * n + 6))
         for i, link in enumerate(self.links):

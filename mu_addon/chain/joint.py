@@ -83,15 +83,15 @@ class Joint:
     """A unit between rigid plates, reduced to W(eta; p), a potential of relative motion and pressure.
 
     eta (6,) is the logarithm of the tip plate's motion relative to the base's: a constant strain times the
-    length, so that a uniform beam that follows Kirchhoff's and Reissner's laws has a quadratic W. With
-    eta0(p) where the plate bears no load, and y = (eta - eta0)/size, W is a polynomial of degree 2 to 4 in y
-    without terms of degree 0 and 1: it has no force where the unit is free. Between pressures every number is
-    a cubic spline (a parabola or line through three or two). Relative motion alone counts, so W is objective.
+    length. A uniform Kirchhoff-Reissner beam therefore has a quadratic W. With eta0(p) of the unloaded plate
+    and y = (eta - eta0)/size, W is a polynomial of degree 2 to 4 in y. It has no terms of degree 0 and 1, so
+    its force at eta0 is 0. Between pressures every number is a cubic spline (a parabola or line through three
+    or two). Relative motion alone counts, so W is objective.
 
     pressure_kPa (k,) ascending; eta0 (k, 6); size (6,), the range in rad and mm; coefficients (k, 203) in mJ
     of the products of EXPONENTS; centre (k, 3), centre_slope (k, 3, 6) and centre_bend (k, 3, 21): centre of
-    mass in mm to second order in y; mass_g; error (6, 6): mean square of the gradient's error at states that
-    took no part in the fit, in (mJ/rad, N)^2.
+    mass in mm to second order in y; mass_g; error (6, 6): mean square of the gradient's error at states held
+    out of the fit, in (mJ/rad, N)^2.
     """
 
     name: str
@@ -199,8 +199,8 @@ class JointAt:
 def fitted(states: Sequence[PlateState], free: PlateState, size: Array) -> dict[str, Array]:
     """Coefficients of a joint at one pressure, from its free state and others there.
 
-    Least squares of every state's gradient and stiffness, in the range's units, mirror images included; the
-    free state's own stiffness is met exactly. Returns coefficients, centre, centre_slope, centre_bend as in
+    Least squares of every state's gradient and stiffness, in the range's units, with mirror images; the free
+    state's stiffness is matched exactly. Returns coefficients, centre, centre_slope, centre_bend as in
     `Joint`.
     """
     quadratic = len(_PAIRS)

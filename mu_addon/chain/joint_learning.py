@@ -1,4 +1,4 @@
-"""A joint learned from the unit's own finite element model: free states, and loaded ones about them."""
+"""A joint learned from the unit's finite element model: free states, and loaded ones around them."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Learned:
 
     held_out: a row a state, with its pressure in kPa, the error of the load in N and N mm, and the
     placement's error in mm and degrees that it makes of the free tip. free_u: displacements (k, n, 3) of the
-    free states. missed: states that were not reached, in words.
+    free states. missed: states that were not reached, as text.
     """
 
     joint: Joint
@@ -104,9 +104,9 @@ def learn(
     """The joint of a unit at pressures (k,) in kPa, from equilibria of its whole mesh between rigid plates.
 
     At each pressure: the free state with its stiffness, and twelve or nine loaded ones, one a direction and
-    side; mirror images are free. Two corners of the range at every other pressure, and a free and a loaded
-    state between pressures, are held out and give the error. kept and keep: a cache by the state's name.
-    report: called with the share done and a few words. Raises ConvergenceError where a free state is not
+    side; mirror images are free. The error is that at held-out states: two corners of the range at every
+    other pressure, and a free and a loaded state between pressures. kept and keep: a cache by the state's
+    name. report: called with the share done and a text. Raises ConvergenceError where a free state is not
     there.
     """
     body = PlateBody(unit, mesh, density_g_per_ml)

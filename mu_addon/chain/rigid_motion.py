@@ -1,9 +1,9 @@
 """Rigid motions of space as 4 x 4 matrices, their logarithms, and how a logarithm changes with a motion.
 
 A motion g holds a rotation R and a translation t, x -> R x + t. Its logarithm eta = (omega, v), a rotation
-vector in radians and a velocity in mm, is the constant twist that leads to g in a unit of time; along a beam
-it is the constant strain, times the length. Twists are spatial: g' = [xi] g with xi = (omega, v), so that a
-point x moves by omega x + v. Source: Sonneville, Cardona, Bruels, Computer Methods in Applied Mechanics and
+vector in radians and a velocity in mm, is the constant twist that gives g in unit time. Along a beam it is
+the constant strain times the length. Twists are spatial: g' = [xi] g with xi = (omega, v), so that a point x
+moves by omega x + v. Source: Sonneville, Cardona, Bruels, Computer Methods in Applied Mechanics and
 Engineering 268 (2014); Murray, Li, Sastry, *A Mathematical Introduction to Robotic Manipulation*.
 """
 

@@ -38,10 +38,9 @@ _LONGEST_STEP = 0.15
 class PlateState:
     """One equilibrium of a unit between plates, in the frame of its base.
 
-    pressure_kPa; eta (6,): logarithm of the tip plate's motion from z = 0 to where it is, so that at rest it
-    is (0, 0, 0, 0, 0, height). gradient (6,): of the potential by eta, in mJ/rad and N; hessian (6, 6)
-    likewise, of the unit whose inside is in equilibrium. centre (3,): of mass in mm; centre_slope (3, 6): its
-    change with eta.
+    pressure_kPa; eta (6,): logarithm of the tip plate's motion from z = 0, at rest (0, 0, 0, 0, 0, height).
+    gradient (6,): of the potential by eta, in mJ/rad and N; hessian (6, 6) likewise, of the unit whose inside
+    is in equilibrium. centre (3,): of mass in mm; centre_slope (3, 6): its change with eta.
     """
 
     pressure_kPa: float
@@ -52,7 +51,7 @@ class PlateState:
     centre_slope: Array
 
     def mirrored(self) -> PlateState:
-        """The state of the unit seen in the plane x = 0, its own mirror plane."""
+        """The unit's state reflected in its mirror plane x = 0."""
         m = MIRROR
         return PlateState(
             self.pressure_kPa,
@@ -271,7 +270,7 @@ def placed(nodes: Array, height: float, eta: Array) -> Array:
 
 
 def spread(mesh: Mesh, u: Array, station: Array, before: Array, after: Array) -> Array:
-    """Displacements u (n, 3) of a mesh moved on as a plate goes from a logarithm (6,) to another.
+    """Displacements u (n, 3) of a mesh advanced as a plate moves from one logarithm (6,) to another.
 
     station (n,): each node's share, from base 0 to plate 1, of the constant strain of both. Sections of beams
     turn with it.

@@ -35,7 +35,7 @@ def tiled(
             "a mesh leaves the box it is to be repeated with", f"box {tuple(size)} mm", "give its whole box"
         )
     if min(counts) < 1:
-        raise MeshingError(f"there is nothing in {counts} copies", "tiling", "ask for one or more")
+        raise MeshingError(f"{counts} copies are no mesh", "tiling", "ask for one or more")
     nodes, tets = mesh.nodes, mesh.tets
     for axis, count in enumerate(counts):
         nodes, tets = _repeated(nodes, tets, axis, count, size[axis])

@@ -1,7 +1,7 @@
 """The resolved unit: the printed body itself as a finite-element mesh, strut by strut.
 
-`mesh_printed` meshes struts and wall each by itself and ties them where they meet; `mesh_of` gives that mesh,
-or the homogenised one, by the fidelity that the settings ask for. See docs/engineering/method.md.
+`mesh_printed` meshes struts and wall separately and ties them where they meet; `mesh_of` gives that mesh, or
+the homogenised one, by the fidelity that the settings ask for. See docs/engineering/method.md.
 
     >>> from mu_addon.resolved import strut_mesh
     >>> from mu_addon.design import load_preset

@@ -20,7 +20,7 @@ _SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 
 def box_grid(points: Array, solid: Array) -> Mesh:
     """Straight quadratic tetrahedra of a grid's boxes, which may be oblique.
 
-    points (a, b, c, 3): the grid in mm; solid (a - 1, b - 1, c - 1): mask of the boxes. Nothing is clamped.
+    points (a, b, c, 3): the grid in mm; solid (a - 1, b - 1, c - 1): mask of the boxes. No node is clamped.
     """
     number = np.arange(points[..., 0].size).reshape(points.shape[:3])
     points = points.reshape(-1, 3)
@@ -61,7 +61,7 @@ _EXACT = 1e-9
 
 
 def is_own_mirror_image(bar: Bar) -> bool:
-    """Return True if a waveguide is its own image in the plane x = 0, wells and seats included."""
+    """Return True if a waveguide with wells and seats is symmetric about the plane x = 0."""
     sides = [*np.cross(bar.directions, bar.normals), *(seat.body.axes[2] for seat in bar.seats)]
     return bool(
         (np.abs(bar.points[:, 0]) < _EXACT).all() and all(abs(side[0]) > 1.0 - _EXACT for side in sides)
@@ -71,8 +71,7 @@ def is_own_mirror_image(bar: Bar) -> bool:
 def bar_mesh(bar: Bar, half: bool, kept: list[Depth]) -> Mesh:
     """Quadratic tetrahedra of a bar less its wells; legs meet in the planes of its mitres.
 
-    half: keep only the part at x >= 0, of a bar that is its own mirror image. kept: where it counts, as in
-    `filled_outside`.
+    half: keep only the part at x >= 0 of a symmetric bar. kept: where it counts, as in `filled_outside`.
     """
     h, longest = bar.half, _LONGEST * 2.0 * bar.half
     leg_of = [int(_outside_legs(bar, well.centre[None])[0].argmin()) for well in bar.wells]
@@ -105,7 +104,7 @@ def bar_mesh(bar: Bar, half: bool, kept: list[Depth]) -> Mesh:
 def _section(bar: Bar, leg: int, place: float, up: Array, aside: Array, plane: Array) -> Array:
     """Points (a, b, 3) in mm of a leg's section in a plane of given normal, `place` mm from its start.
 
-    up (a,) and aside (b,): positions across the leg in mm, along its normal and beside it.
+    up (a,) and aside (b,): positions across the leg in mm, along its normal and its binormal.
     """
     way, normal = bar.directions[leg], bar.normals[leg]
     across = up[:, None, None] * normal + aside[None, :, None] * np.cross(way, normal)

@@ -1,7 +1,7 @@
-"""Struts of a resolved mesh as beams, wherever they are whole: away from wall, waveguide and cuts.
+"""Struts of a resolved mesh as beams where they are whole: away from wall, waveguide and cuts.
 
-A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of everything that
-struts stand on becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and
+A strut's mesh is swept in layers from its cell's corner to its centre. A layer clear of the parts that
+support struts becomes one beam of `fem.beams`, whose sections carry the layer's nodes. Feet, cut struts and
 their joints stay solid, so that struts act on the wall as solid ones do.
 """
 
@@ -21,7 +21,7 @@ from .octants import SweptNodes
 Array = np.ndarray[Any, Any]
 
 REACH = 0.3
-"""Layers nearer than this share of a junction's diameter to the parts that struts stand on stay solid."""
+"""Layers nearer than this share of a junction's diameter to the parts that support struts stay solid."""
 
 _WHOLE = 1.0 - 1e-9
 _GAUSS = np.polynomial.legendre.leggauss(6)
@@ -69,8 +69,8 @@ def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: f
     """A resolved mesh of swept struts with beams in place of the layers that are whole and far from walls.
 
     layers: of a strut's mesh, as in `strut_mesh`; clear (n,): distance of the struts' nodes in mm from the
-    parts that struts stand on; reach_mm: below which a layer stays solid. Rotation vectors are nodes added at
-    the end.
+    parts that support struts; reach_mm: distance below which a layer stays solid. Rotation vectors are nodes
+    added at the end.
     """
     parts = Layers(mesh, lattice_of(d), layers)
     whole = parts.whole(mesh, clear, reach_mm)
@@ -80,7 +80,7 @@ def with_beams(mesh: Mesh, d: Dimensions, layers: int, clear: Array, reach_mm: f
 def rotation_nodes(beams: Array, nodes: Array) -> tuple[Array, Array]:
     """The axis nodes (b,) of beams (e, 4), ascending, and the places (b, 3) in mm of their rotation vectors.
 
-    nodes (n, 3) in mm. Each rotation vector stands on one of its node's beams, a share of its length away.
+    nodes (n, 3) in mm. Each rotation vector's node is placed on one of its beams, a share of the length away.
     """
     own = np.unique(beams[:, 0::2])
     other = np.empty(len(nodes), int)
@@ -91,8 +91,8 @@ def rotation_nodes(beams: Array, nodes: Array) -> tuple[Array, Array]:
 class Layers:
     """The layers of the struts in a resolved mesh.
 
-    elements (k,): those of struts; strut, layer (k,): of each. Of each pair of a node and a strut that it
-    belongs to: node, its strut, twice its level in layers, and whether it lies on the axis.
+    elements (k,): those of struts; strut, layer (k,): of each. Of each pair of a node and its strut: node,
+    strut, twice its level in layers, and True if it is on the axis.
     """
 
     def __init__(self, mesh: Mesh, lattice: Lattice, layers: int) -> None:
@@ -188,7 +188,7 @@ class Layers:
 def whole_and_clear(mesh: Mesh, elements: Array, clear: Array, reach_mm: float) -> Array:
     """Mask (k,) of elements (k,) that are whole, without tied nodes, and no nearer than reach_mm to walls.
 
-    clear (n,): distance of the nodes in mm from the parts that struts stand on.
+    clear (n,): distance of the nodes in mm from the parts that support struts.
     """
     tied = np.zeros(len(mesh.nodes), bool)
     tied[mesh.tied] = True
@@ -198,10 +198,10 @@ def whole_and_clear(mesh: Mesh, elements: Array, clear: Array, reach_mm: float) 
 
 
 def free_joints(whole: Array, present: Array, ends: Array, count: int) -> Array:
-    """Layers (s, l) of those that are whole without the ones at joints that something solid reaches.
+    """Whole layers (s, l), without those at joints within reach of a solid part.
 
-    present (s,): struts that are there at all; ends (s, 2): joints of each, of `count`. A joint is one of
-    beams if all struts that are there are beams at it.
+    present (s,): struts that exist; ends (s, 2): their joints, of `count`. A joint is one of beams if all
+    struts that are there are beams at it.
     """
     found, free = whole.copy(), np.ones(count, bool)
     for end, layer in ((0, 0), (1, -1)):

@@ -39,8 +39,8 @@ class PrintedWaveguides:
 
     mesh: of `mesh_printed`, a half or a whole; paths: lattice nodes (h, 3) in mm of each; anchors (p, 3) in
     mm, nodes of the mesh; materials_of and model_of: a mesh's materials and model; settings: of Newton's
-    method; body: a closed surface that cuts the lattice in place of its box. Of the candidates' models the
-    last one used is kept: each takes as much memory as the unit's, and half as long as a state to build.
+    method; body: a closed surface that cuts the lattice in place of its box. Only the last candidate's model
+    is kept: a model takes as much memory as the unit's, and half a state's time to build.
     """
 
     unit: Unit
@@ -54,12 +54,12 @@ class PrintedWaveguides:
     _last: dict[int, Equilibrium] = attrs.field(factory=dict, init=False)
 
     def states(self, number: int, way: Sequence[State]) -> list[State]:
-        """A candidate's state, on its own mesh, at the pressure of the last of some states of Model A.
+        """A candidate's state, on its mesh, at the pressure of the last of some states of Model A.
 
-        way: Model A's states on one side of rest, in order of pressure. Where no start near the last one
-        leads to a state the candidate is followed from the nearest one before where one does, or from rest,
-        and there is a state for each of `way` from there on. The mesh of a candidate begins with the nodes of
-        the unit's. Raises ConvergenceError, and InputError for a candidate that cannot be printed.
+        way: Model A's states on one side of rest, in order of pressure. If no start near the last state
+        converges, the candidate is followed from the nearest earlier state that does, or from rest; then it
+        has a state for each of `way` from there on. The mesh of a candidate begins with the nodes of the
+        unit's. Raises ConvergenceError, and InputError for a candidate that cannot be printed.
         """
         path = self.paths[number]
         equilibrium = self._equilibrium(number)

@@ -46,8 +46,8 @@ _LOOSE = 1e-10
 def frame_zones(d: Dimensions, cache: Path | None = None) -> Zones:
     """Rigid zones about the joints of a lattice of any kind, by its solid cell without grading.
 
-    Those whose beams have the solid cell's C44 and C11 - C12, near those of half diagonals where these hardly
-    depend on them. cache: folder that keeps the cell's mesh. Kept for the process. Raises InputError for
+    Their beams have the solid cell's C44 and C11 - C12. Zones that hardly affect these stay near those of
+    half diagonals. cache: folder that keeps the cell's mesh. Kept for the process. Raises InputError for
     struts that do not fit a cell, and MeshingError.
     """
     return _frame_zones(*shape_of(d), cache)
@@ -91,8 +91,8 @@ def _frame_zones(kind: LatticeKind, junction: float, midspan: float, cache: Path
 class JointFactors:
     """Strain concentration factors of the joints of a kind of lattice, by their place in its cell.
 
-    places (k, 3): as `place_in_cell` gives them; stretched, bent (k,): as in
-    `ConcentrationFactors`; error (k,): the largest relative one, of all mean strains that load the joint.
+    places (k, 3): as of `place_in_cell`; stretched, bent (k,): as in `ConcentrationFactors`; error (k,): the
+    largest relative error over all mean strains that load the joint.
     """
 
     places: Array
@@ -226,7 +226,7 @@ def _unit_strains() -> Array:
 
 
 def _once(kind: LatticeKind) -> tuple[Array, Array]:
-    """Joints (e, 2), numbered by period, and rows (e,) of struts of which none is another's image."""
+    """Joints (e, 2), numbered by period, and rows (e,) of struts, one of each set of periodic images."""
     period = kind.divisions
     _, number = np.unique(kind.grid % period, axis=0, return_inverse=True)
     first, second = kind.struts.T

@@ -59,8 +59,8 @@ def graded_about_axes(d: Dimensions, mesh: Mesh) -> Mesh:
     """A mesh of uniform struts of any kind moved to graded ones.
 
     A node keeps its distance from its strut's axis in radii. Near a joint, where struts overlap, nodes also
-    move away from it by the joint's factor, so that all of its struts agree; beyond, less and less. Nodes in
-    the box's faces stay in them. Raises InputError for struts that fill their cell.
+    move away from it by the joint's factor, so that its struts agree. The factor fades out along the strut.
+    Nodes in the box's faces stay in them. Raises InputError for struts that fill their cell.
     """
     lattice, nodes = lattice_of(d), mesh.nodes
     widest = 2.0 * float(lattice.radii(np.linspace(0.0, 1.0, 33)).max())

@@ -1,10 +1,10 @@
 """Struts of a lattice of any kind as beams, where they are whole and away from the walls.
 
-The struts' mesh is not swept: an element belongs to the strut whose axis is nearest, in radii, and its volume
-to the layers that it reaches. A layer that is whole and clear of all that struts stand on becomes a beam
-between two sections of its own. Of elements that reach into such a layer only the part outside it resists;
-their nodes inside move with the sections. Struts on the envelope's faces, of which the box cuts half away,
-stay solid, and so do the joints that they end in.
+The struts' mesh is not swept. An element is assigned to the strut whose axis is nearest, in radii, and its
+volume to the layers that it reaches. A whole layer clear of the parts that support struts becomes a beam
+between two sections. Of elements that reach into such a layer only the part outside it resists; their nodes
+inside move with the sections. Struts on the envelope's faces, which the box halves, stay solid, and so do
+their joints.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class GraphLayers:
     def _flexible(self, strut: Array, layer: Array, zones: Zones) -> Array:
         """Integrals (e, 6) over the layers' sections, see `fem.beams.sections_of`.
 
-        Of struts in the mirror plane of a half mesh, half of which are there, twice as much.
+        Struts in the mirror plane of a half mesh count twice, as the mesh has half of them.
         """
         found = integrals(self.lattice, strut, self.lattice.struts[strut], layer, self.count, zones)
         return np.asarray(found * np.where(self.halved[strut], 2.0, 1.0)[:, None])
@@ -208,9 +208,9 @@ def with_graph_beams(
 ) -> Mesh:
     """A resolved mesh with beams in place of the layers of struts that are whole and far from walls.
 
-    layers: of a strut at most, fewer where one would be little longer than a rigid zone; clear (n,): distance
-    of the nodes in mm from the parts that struts stand on; reach_mm: below which a layer stays solid.
-    Sections and then their rotation vectors are nodes added at the end.
+    layers: at most, of a strut; fewer if a layer would be hardly longer than a rigid zone. clear (n,):
+    distance of the nodes in mm from the parts that support struts; reach_mm: distance below which a layer
+    stays solid. Sections and then their rotation vectors are nodes added at the end.
     """
     shortest = np.linalg.norm(np.diff(lattice.nodes[lattice.struts], axis=1), axis=2).min()
     rigid = max(zones.stretch, zones.bend) * 2.0 * lattice.node_radii.max()

@@ -25,9 +25,9 @@ def joint_stretch(
 ) -> PeakStretch | None:
     """The largest stretch in a joint under displacements u (n, 3) in mm; None where no beam ends in a joint.
 
-    d: dimensions of the lattice's box; cache: folder that keeps cells that are not swept. Of each strut's
-    end, of small strain: 1 + Ka N/(E A) + Kb M r/(E I) with the joint's concentration factors, where the
-    strut leaves the joint's rigid zone. exceeded: by 1 % of the ends.
+    d: dimensions of the lattice's box; cache: folder that keeps cells that are not swept. For each strut's
+    end where it leaves the joint's rigid zone, at small strain: 1 + Ka N/(E A) + Kb M r/(E I) with the
+    joint's concentration factors. exceeded: by 1 % of the ends.
     """
     from scipy.spatial import cKDTree
 

@@ -36,8 +36,8 @@ FEWER = ((4, 0.704), (2, 0.362), (1, 0.0))
 class Zones:
     """Rigid zones about a joint in junction diameters: in stretch, and in bending, twist and shear.
 
-    fewer: factor of the latter by the number of struts that meet, 1 where none is given. bulk_error: of the
-    infinite lattice's bulk modulus with these zones, against the solid cell's.
+    fewer: factor of the latter by the number of struts that meet, else 1. bulk_error: of the infinite
+    lattice's bulk modulus with these zones, relative to the solid cell's.
     """
 
     stretch: float
@@ -59,7 +59,7 @@ def zones_of(d: Dimensions) -> Zones:
 
 
 def shape_of(d: Dimensions) -> tuple[LatticeKind, float, float]:
-    """Kind and diameters in cells: a unit's scale changes nothing."""
+    """Kind and diameters in cells: the unit's scale has no effect."""
     return d.kind, round(d.junction_diameter / d.cell, 9), round(d.midspan_diameter / d.cell, 9)
 
 
@@ -82,9 +82,9 @@ def _zones(kind: LatticeKind, junction: float, midspan: float) -> Zones:
 class ConcentrationFactors:
     """Strain concentration factors: strain in a joint over its struts', by beam theory where they leave it.
 
-    stretched, bent: of struts that are one of both. A printed joint has sharp edges, where no mesh converges:
-    the strain that 1 % of its volume exceeds.
-    error: relative, of their sum in a lattice that is sheared, whose struts are both.
+    stretched, bent: of struts that are one of both. A printed joint has sharp edges, where no mesh converges,
+    so this is the strain that 1 % of its volume exceeds. error: relative, of the factors' sum in a sheared
+    lattice, whose struts are pulled and bent.
     """
 
     stretched: float

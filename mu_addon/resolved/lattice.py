@@ -112,7 +112,7 @@ def cuts(d: Dimensions, body: Body | None) -> list[Depth]:
 def clearance(d: Dimensions, points: Array) -> Array:
     """Distance (n,) in mm of points (n, 3) in mm from the actuator's outer profile, negative inside it.
 
-    To first order: along the normal of the profile at the point's own height.
+    To first order: along the profile's normal at the point's height.
     """
     z = np.clip(points[:, 2], 0.0, d.height)
     radius = np.hypot(points[:, 0], points[:, 1])

@@ -74,8 +74,8 @@ class PrintedMorph:
     def to(self, other: Unit, checked: bool = True) -> Mesh:
         """The mesh moved to the unit `other`, of as many chambers and cells of the same kind.
 
-        Another cell or scale first scales all of it. checked: test elements for inversion. Raises InputError
-        for struts that cannot be swept again, and MeshingError otherwise.
+        A change of cell or scale first scales the whole mesh. checked: test elements for inversion. Raises
+        InputError for struts that cannot be swept again, and MeshingError otherwise.
         """
         mesh, a, b = self.mesh, self.drawn.printed, other.printed
         if a == b:

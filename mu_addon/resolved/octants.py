@@ -1,4 +1,4 @@
-"""Struts that differ from octant to octant: graded ones, and those that a waveguide meets."""
+"""Struts that differ between octants: graded ones, and those that touch a waveguide."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _SLACK = 1e-9
 
 
 def is_thickening(d: Dimensions, bar: Bar) -> bool:
-    """Return True if a waveguide thickens any of the struts that it meets."""
+    """Return True if a waveguide thickens any strut that touches it."""
     return bool(_raised(lattice_of(d), bar).any())
 
 
 def thickened_nodes(d: Dimensions, bar: Bar, nodes: Array) -> Array:
-    """Nodes (n, 3) in mm of a lattice's struts, with those that a waveguide meets thickened as drawn.
+    """Nodes (n, 3) in mm of a lattice's struts, with those that touch a waveguide thickened as drawn.
 
     The struts are half diagonals of their cells, each alone in its octant (`strut_mesh`). Nodes between
     octants take the mean of their positions in the thickened ones.
@@ -69,7 +69,7 @@ def graded_nodes(d: Dimensions, nodes: Array) -> Array:
 
 
 class Places(NamedTuple):
-    """Nodes (p,), the struts (p,) they belong to, and their coordinates in these (`strut.placed`)."""
+    """Nodes (p,), their struts (p,), and their coordinates in these (`strut.placed`)."""
 
     node: Array
     strut: Array
@@ -79,9 +79,9 @@ class Places(NamedTuple):
 class SweptNodes:
     """Nodes (n, 3) in mm of the struts of a lattice of half diagonals, to be swept again with other radii.
 
-    Each node keeps its position along its octant's strut and, in radii, across it. Nodes between octants take
-    the mean of their positions in them: struts that meet have one radius at their node and nearly so beside
-    it, so that these are within rounding of each other but for steep gradings.
+    Each node keeps its position along its octant's strut and, in radii, across it. Nodes between octants get
+    the mean of their positions in them. Struts that meet have one radius at their node and nearly the same
+    near it, so the positions agree to rounding except for steep gradings.
     """
 
     def __init__(self, lattice: Lattice, nodes: Array) -> None:
@@ -176,7 +176,7 @@ def _radius(one: Lattice) -> Radius:
 
 
 def _thicker(one: Lattice, met: Array, half: float) -> Radius:
-    """Radius of the strut of a lattice of one that meets a waveguide (`strut_radii`)."""
+    """Radius of the single strut of a lattice, touching a waveguide (`strut_radii`)."""
     return lambda t: strut_radii(one, met, half, t)[0]
 
 
@@ -201,7 +201,7 @@ def in_replaced(d: Dimensions, bar: Bar, points: Array) -> Array:
 
 
 def _raised(lattice: Lattice, bar: Bar) -> Array:
-    """Return a mask (E,) of struts that are thicker somewhere beside a waveguide than without it."""
+    """Return a mask (E,) of struts that a waveguide thickens somewhere."""
     more = strut_radii(lattice, bar.met, bar.half, _STATIONS) - lattice.radii(_STATIONS)
     return np.asarray((more > 1e-9 * lattice.cell).any(axis=1))
 

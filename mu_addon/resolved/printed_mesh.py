@@ -30,9 +30,9 @@ Progress = Callable[[str, float], None]
 TIE_MM = 0.1
 """Struts' nodes this near the wall's outside are tied to it, too, for a cell of 12.5 mm and refinements to 1.
 
-Ties of nodes within the wall alone leave it free to dent between them: three chambers then bend by 5 to 10 %
-more than in a mesh that joins both (docs/engineering/method.md). The distance shrinks with finer elements;
-grown with coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -10 kPa, refine 0.5).
+Ties only of nodes within the wall let it dent between them: three chambers then bend by 5 to 10 % more than
+in a conforming mesh (docs/engineering/method.md). The distance shrinks with finer elements; grown with
+coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -10 kPa, refine 0.5).
 """
 
 
@@ -40,8 +40,8 @@ grown with coarser ones it would stiffen the feet (-19.2 for -20.7 degrees at -1
 class Sizes:
     """Element sizes of a resolved mesh; how they were chosen: docs/engineering/decisions.md.
 
-    Of the wall in mm for a cell of 12.5 mm, growing with it: along its meridian, and around its largest
-    radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.
+    Of the wall in mm for a cell of 12.5 mm, proportional to the cell: along its meridian, and around its
+    largest radius; through_wall: elements across it. Of struts rings and layers as in `strut_mesh`.
     """
 
     meridian_mm: float = 1.0
@@ -98,10 +98,10 @@ def mesh_printed(
     `with_graph_beams`), unless the settings ask for the fidelity "solid" or the wall's law has memory. The
     base is clamped, the inlet is left out.
 
-    settings: of it fidelity, fraction ("half" or "full") and `refine` count. cache: folder for the octants
-    of lattices other than body-centred. body: a closed surface
-    that cuts the lattice in place of its box. progress: called with a stage and the share done. sizes: of
-    elements before `refine` divides them. Raises InputError and MeshingError.
+    settings: fidelity, fraction ("half" or "full") and `refine` are used. cache: folder for the octants of
+    lattices other than body-centred. body: a closed surface that cuts the lattice in place of its box.
+    progress: called with a stage and the share done. sizes: of elements before `refine` divides them. Raises
+    InputError and MeshingError.
     """
     s = settings or MeshSettings()
     report = progress or (lambda stage, share: None)
@@ -152,7 +152,7 @@ def wall_grid(d: Dimensions, sizes: Sizes) -> WallGrid:
 
 
 def wall_mesh(d: Dimensions, sizes: Sizes) -> Mesh:
-    """Quadratic tetrahedra of a unit's wall and caps at x >= 0, base and tip those of its own end planes."""
+    """Quadratic tetrahedra of a unit's wall and caps at x >= 0; base and tip are its end planes."""
     return wall_of(wall_grid(d, sizes).membrane, d)
 
 

@@ -2,8 +2,8 @@
 
 A waveguide is held by the lattice at the joints of its path. Model A's tangent gives the response to forces
 and couples on every joint. A path is a chain of straight bars between joints displaced and rotated as in
-Model A, each with six modes of deformation, less the struts it replaces. The response is of first order about
-Model A; seats and thickened struts are left out, and joints are rigid.
+Model A. Each bar has six modes of deformation; the struts that it replaces are subtracted. The response is of
+first order about Model A; seats and thickened struts are left out, and joints are rigid.
 """
 
 from __future__ import annotations
@@ -130,9 +130,9 @@ def _moved_joints(
 ) -> tuple[Array, Array, sparse.csr_matrix]:
     """Positions (j, 3) in mm and rotations (j, 3, 3) of joints in a state, and the loads (3 n, 6 j) on them.
 
-    A joint moves by the mean of its nodes and rotates by their best fit (Kabsch); its loads, forces and
-    couples along x, y and z, are spread over them so that their work is on that motion. points (j, 3): joints
-    in mm at rest.
+    A joint moves by the mean of its nodes and rotates by their best fit (Kabsch). Its forces and couples
+    along x, y and z are distributed over the nodes so that their work is on that motion. points (j, 3):
+    joints in mm at rest.
     """
     place, turn = np.zeros((len(joints), 3)), np.zeros((len(joints), 3, 3))
     rows, columns, values = [], [], []
@@ -160,9 +160,9 @@ def _moved_joints(
 def _natural(frame: Array, length: float, place: Array, turn: Array) -> tuple[Array, Array]:
     """Deformation (6,) of a bar between two joints, and its derivatives (6, 12) by their motions.
 
-    Elongation in mm, twist, then the turns of both ends from the chord about the second axis and about the
-    third. frame (3, 3): the bar's axes at rest as rows; place (2, 3) in mm and turn (2, 3, 3) of the joints,
-    whose motions are three displacements and three rotations each.
+    Elongation in mm, twist, then the rotations of both ends from the chord about the second axis and about
+    the third. frame (3, 3): the bar's axes at rest as rows; place (2, 3) in mm and turn (2, 3, 3) of the
+    joints, whose motions are three displacements and three rotations each.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""Start of Newton's method: a unit's own state, and the waveguide bent through the joints of its path."""
+"""Start of Newton's method: the unit's state without a waveguide, and the waveguide bent to fit it."""
 
 from __future__ import annotations
 
@@ -59,9 +59,10 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
     """Displacements (m, 3) in mm of a mesh with a waveguide, from those of the unit without it, u (n, 3).
 
     unit, mesh: of `mesh_printed` and `with_waveguide`; path (h, 3): the waveguide's lattice nodes in mm.
-    Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes
-    Hermite's cubic from joint to joint of the path, each turned as its legs are; sections turn by the
-    rotation between both joints' and the least one onto the curve; beyond its ends the waveguide is rigid.
+    Nodes of thickened struts move with the deformation gradient around them. The waveguide's axis becomes a
+    cubic Hermite curve between the joints of the path, each rotated as its legs are. Sections rotate by the
+    interpolation of both joints' rotations and the least rotation onto the curve. Beyond its ends the
+    waveguide is rigid.
     """
     count = len(u)
     moved = u.copy()
@@ -80,8 +81,8 @@ def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:
 def eased(equilibrium: Equilibrium, start: Array, u: Array, reach_mm: float = np.inf) -> Array:
     """A start (m, 3) in mm of `started`, relaxed so that struts fit the waveguide that they are tied to.
 
-    equilibrium: of the unit with its waveguide; u (n, 3): the unit's own state in mm. In `started`, struts'
-    nodes that follow bar or seats move away from their neighbours, by tenths of a millimetre at large
+    equilibrium: of the unit with its waveguide; u (n, 3): state of the unit without it, in mm. In `started`,
+    struts' nodes that follow bar or seats move away from their neighbours, by tenths of a millimetre at large
     bending, and elements there may be inverted. Here the unit moves as a linear, undeformed one would. The
     waveguide is held, and so is all that is farther from it than reach_mm as drawn: walls and struts that
     touch there would cross.

@@ -1,9 +1,9 @@
 """One strut of a body-centred lattice, swept from junction to junction: an eighth of its cell.
 
-The half diagonal from a cell's corner to its centre fills the octant between them: of the eight struts that
-meet at either end, each has its own octant, and the planes between octants cut them where they merge. So a
-disc swept along the strut, its ends pressed onto the three planes of either corner, is the printed lattice
-exactly, fillets and all; mirror images of it are the whole lattice.
+The half diagonal from a cell's corner to its centre lies in the octant between them. Each of the eight struts
+that meet at an end has one octant, and the planes between octants cut them where they merge. A disc swept
+along the strut, its ends projected onto the three planes of either corner, is therefore exactly the printed
+lattice with its fillets; its mirror images make up the whole lattice.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Struts(Protocol):
 
     @property
     def junction_diameter(self) -> float:
-        """Diameter where struts meet."""
+        """Diameter at the junctions."""
 
     @property
     def midspan_diameter(self) -> float:
@@ -52,7 +52,7 @@ class Struts(Protocol):
 def strut_mesh(d: Struts, rings: int, layers: int) -> Mesh:
     """Quadratic tetrahedra of one octant [0, cell/2]^3 mm of a body-centred lattice, curved as its strut is.
 
-    rings: of elements from the strut's axis to its surface, six to the first; layers: along it. Nothing is
+    rings: of elements from the strut's axis to its surface, six to the first; layers: along it. No node is
     clamped. Raises InputError for a lattice of another kind, and for struts as wide as the octant.
     """
     half = d.cell / 2.0

@@ -53,10 +53,10 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     """The mesh of a printed unit with a waveguide, of `bar_of`.
 
     mesh: of `mesh_printed`, a half or a whole; its own nodes and elements come first, in their order. Nodes
-    of struts that the waveguide thickens are moved. Parts of struts within bar or seats count no longer, nor
-    do struts that the bar replaces; their nodes there follow the bar, as the seats do, and nodes within the
-    wall follow the wall. Raises InputError for a half mesh of a waveguide that is not its own mirror image,
-    MeshingError where elements are inverted.
+    of struts that the waveguide thickens are moved. Parts of struts within bar or seats, and struts that the
+    bar replaces, no longer count. Their nodes there follow the bar, as the seats do; nodes within the wall
+    follow the wall. Raises InputError for a half mesh of an asymmetric waveguide, MeshingError for inverted
+    elements.
     """
     half = "x" in mesh.symmetry
     if half and not is_own_mirror_image(bar):
@@ -134,7 +134,7 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
 
 
 def _thickened(mesh: Mesh, bar: Bar, d: Dimensions, body: Body | None) -> tuple[Mesh, Ties]:
-    """The mesh with struts thickened by the bar that they meet, and its nodes' ties to the wall."""
+    """The mesh with struts thickened by the bar that they touch, and its nodes' ties to the wall."""
     before = Ties(mesh.tied, mesh.tied_to, mesh.tied_weights)
     if not is_thickening(d, bar):
         return mesh, before
@@ -160,7 +160,7 @@ class Ties(NamedTuple):
 
 
 def tie(rows: Array, points: Array, to: Mesh, first: int = 0) -> Ties:
-    """Nodes (t,), at points (t, 3) in mm, that follow a mesh whose own nodes are numbered from `first` on."""
+    """Nodes (t,), at points (t, 3) in mm, that follow a mesh whose nodes are numbered from `first` on."""
     follows = embed(to, points)
     return Ties(rows, follows.nodes + first, follows.weights)
 

@@ -1,7 +1,7 @@
-"""Compute what is slow for a window in another process: a solid, a difference of runs, an embedding.
+"""Slow computations for a window, in another process: a solid, a difference of runs, an embedding.
 
-prepared.npz: of `solid` its `vertices`, `triangles` and `gates` (JSON); of `difference` by region the
-distance and `REGION_unknown`; of `embedding` nothing, since the motion keeps it.
+prepared.npz: for `solid` `vertices`, `triangles` and `gates` (JSON); for `difference` by region the distance
+and `REGION_unknown`; empty for `embedding`, which the motion's folder keeps.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ MODULES = {
 
 
 def use_case_of(folder: Path) -> UseCase[Any]:
-    """Use case of a folder's inputs; raises InputError where there is none."""
+    """Use case of a folder's inputs; raises InputError without one."""
     # Not the Path's own question, which raises for a name that the system refuses.
     there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]

@@ -28,11 +28,11 @@ FILES = {
 ASSUMED = (
     "Each unit is an elastic joint between rigid plates: end planes stay plane, and units act on each "
     "other by the motion of these planes alone. A joint's potential is a polynomial of degree four about "
-    "the unit's free state at each pressure, learned from its own finite element model without weight. "
-    "The weight of a unit acts at its centre of mass, which moves with both plates. No unit touches "
-    "another, inertia and air flow are neglected, and the material does not remember. The intervals hold "
-    "the error of the joints against the finite element model at states held out, and not that of the "
-    "mesh, the print or the resin."
+    "the unit's free state at each pressure, learned from its finite element model without weight. "
+    "The weight of a unit acts at its centre of mass, which moves with both plates. Units do not touch "
+    "each other. Inertia and air flow are neglected, and the material has no memory. The intervals "
+    "include the error of the joints against the finite element model at held-out states, not the errors "
+    "of mesh, print and resin."
 )
 
 
@@ -69,7 +69,7 @@ def _headline(run: Running) -> str:
     x, y, z = last.tip_mm
     words = f"At the end the tip is at ({x:.1f}, {y:.1f}, {z:.1f}) mm, turned by {last.angle_deg:.1f}°."
     if run.reach is not None:
-        words = f"The tip comes to {run.reach.miss_mm:.2g} mm from the target. " + words
+        words = f"The tip ends {run.reach.miss_mm:.2g} mm from the target. " + words
     mass = sum(found.joint.mass_g for found in run.learned)
     facts = [
         ("mass of the units", f"{mass:.0f} g"),

@@ -335,8 +335,8 @@ class Running:
     def places(self, state: ChainState) -> Array:
         """Positions (m, 3) in mm of the nodes of `whole_mesh` in a state of the chain, for display.
 
-        A unit's free state at its pressure, between base and plate moved on by the constant strain of both:
-        exact on the plates, about right between them.
+        A unit's free state at its pressure, advanced by the constant strain between its plates: exact on the
+        plates, approximate between them.
         """
         found = []
         parts = zip(self.job.units, self.meshes, self.learned, state.plates, strict=False)

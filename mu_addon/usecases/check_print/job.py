@@ -42,8 +42,8 @@ class Job:
     """Inputs of a check: a unit, or the bytes of an STL file, or a file checked against its unit.
 
     direction points away from the platform, in the part's frame. layers: heights in mm, above the part's
-    lowest point, of the layers to draw; evenly spaced without any. repair: first repair the file's surface
-    where there is only one way to.
+    lowest point, of the layers to draw, by default evenly spaced. repair: first repair the file's surface
+    where the repair is unambiguous.
     """
 
     printer: Printer
@@ -59,7 +59,7 @@ class Job:
     def __attrs_post_init__(self) -> None:
         if self.repair and self.stl is None:
             raise InputError(
-                "there is no file to repair", "--repair", "give --stl; a unit's own solid needs no repair"
+                "there is no file to repair", "--repair", "give --stl; the solid of a unit needs no repair"
             )
         if len(self.layers) > MOST_LAYERS or not all(0.0 <= z < _FARTHEST for z in self.layers):
             raise InputError(

@@ -189,7 +189,7 @@ def _orientation(builds: Sequence[Build]) -> str:
         rows.append(([name, *cells, "yes" if b.best_among else ""], k == 0))
     words = (
         f"{len(builds)} directions, pointing away from the platform: faces, edges and corners of a cube, "
-        "and eight tilted by 20 degrees from the best of these. They are ordered by, in this order: the "
+        "and eight tilted by 20 degrees from the best of these. Order of criteria: the "
         "part fits, no cup of 0.5 ml or more, least flat surface in chambers (supports there cannot be "
         "removed), fewest islands, least supported surface, least height. A direction is Pareto-optimal if "
         "no other is at least as good in all of these criteria and better in one."
@@ -261,7 +261,7 @@ def layer_pictures(found: Sequence[Slice]) -> str:
 
 
 def direction_name(direction: Sequence[float]) -> str:
-    """A direction in words: +z, +x−y, or `20° from +z toward −x`."""
+    """A direction as text: +z, +x−y, or `20° from +z toward −x`."""
     way = np.asarray(direction, float) / np.linalg.norm(direction)
     every = directions()
     k = int((every @ way).argmax())

@@ -90,7 +90,7 @@ def surface_of(job: Job) -> tuple[Vertices, Triangles]:
 def nominal_of(job: Job) -> tuple[Vertices, Triangles] | None:
     """The surface (n, 3), (m, 3) that a file is compared with: its unit's solid.
 
-    None without a unit, or with nothing else. Raises GateError.
+    None without a unit, or with a unit alone. Raises GateError.
     """
     if job.stl is None or job.unit is None:
         return None

@@ -1,4 +1,4 @@
-"""Charts of a diagnosis: measurement beside prediction, the residual, and the effects that explain it."""
+"""Charts of a diagnosis: measurement and prediction, the residual, and the effects that explain it."""
 
 from __future__ import annotations
 

@@ -88,9 +88,9 @@ def noise_of(words: Sequence[str]) -> dict[str, float]:
 class Job:
     """Inputs of a design of experiments.
 
-    measured: laid out as for `diagnose`; columns to be measured may hold any numbers. unit: the preset
-    without one. noise: standard deviation of a reading, by quantity. self_contact: of the unit's walls and
-    struts. settings: of its simulation, in place of the printed body's.
+    measured: laid out as for `diagnose`; columns to be measured may hold any numbers. unit: by default the
+    preset. noise: standard deviation of a reading, by quantity. self_contact: of the unit's walls and struts.
+    settings: of its simulation, in place of the printed body's.
     """
 
     measured: Measured

@@ -1,4 +1,4 @@
-"""Inputs of a diagnosis: measured data, and the unit they belong to."""
+"""Inputs of a diagnosis: measured data, and their unit."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ PRESET = "mu-1.0x"
 class Job:
     """Inputs of a diagnosis.
 
-    unit: of unit_pressure experiments and of blocks with counted cells, whatever its scale; the preset
-    `PRESET` without one. self_contact: of its walls and struts. settings: of the simulation, in place of the
-    printed body's. known: result of an earlier diagnosis, or None: its effects are in the model from the
-    start and stay; moduli and zeros are fitted anew.
+    unit: of unit_pressure experiments and of blocks with counted cells, at any scale; by default the preset
+    `PRESET`. self_contact: of its walls and struts. settings: of the simulation, in place of the printed
+    body's. known: result of an earlier diagnosis, or None: its effects are in the model from the start and
+    stay; moduli and zeros are fitted again.
     """
 
     measured: Measured
@@ -66,7 +66,7 @@ class Job:
 
     @property
     def body(self) -> str:
-        """What a unit is simulated as, in words; empty where none is."""
+        """How the unit is modelled, as text; empty if none is simulated."""
         if not bends(self.measured.experiments):
             return ""
         settings = self.unit_settings

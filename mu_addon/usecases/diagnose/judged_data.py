@@ -1,4 +1,4 @@
-"""Result of a diagnosis, and its curves: measured beside predicted."""
+"""Result of a diagnosis, and its curves: measured and predicted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = np.ndarray[Any, Any]
 class JudgedData:
     """A verdict with its simulator and data.
 
-    remarks: of the reader, in words. body: what a unit was simulated as, in words; empty without one.
+    remarks: of the reader. body: how the unit was modelled, as text; empty without a unit.
     """
 
     measured: Measured
@@ -39,7 +39,7 @@ class JudgedData:
 
     @property
     def after(self) -> Mapping[str, float]:
-        """Values of the extended model, or of the best attempt where nothing was named."""
+        """Values of the extended model, or of the best attempt if no cause was named."""
         return self.verdict.selection.chosen.values
 
     @property

@@ -32,7 +32,7 @@ TO_DO = {
     ),
     "force_nonlinearity": f"calibrate the load cell by dead weights up to its largest force; {_INSTRUMENT}",
     "geometry_as_typed": "measure the specimen and correct the height that was entered",
-    "step_change": "look up what was changed between these tests, and make the first one again",
+    "step_change": "find what was changed between these tests, and repeat the first one",
     "self_heating": "test slowly or with pauses, or measure the specimen's temperature",
     "force_drift": f"let the load cell warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_lag": f"switch off the load cell's filter, or test slower; {_INSTRUMENT}",
@@ -40,13 +40,13 @@ TO_DO = {
     "leak": "find the leak (soapy water at joints and inlet) and seal it, then measure again",
     "clogged_chamber": "drain and clean the unit, and look for cured resin in its necks; print with drains",
     "gravity": f"{_MODEL}, and give the direction in which the unit hangs by --orientation",
-    "contact": "remove what the unit touches, or simulate it with --obstacle",
+    "contact": "remove the obstacle, or simulate it with --obstacle",
     "angle_offset": f"set the camera's zero by a record at rest; {_INSTRUMENT}",
     "angle_drift": f"fix the camera, or follow a mark on the bench; {_INSTRUMENT}",
     "camera_scale": f"measure the scale by a ruler in the plane of the markers; {_INSTRUMENT}",
     "camera_tilt": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
     "camera_perspective": f"set the camera at right angles to the plane of bending; {_INSTRUMENT}",
-    "lens_distortion": f"calibrate the lens, or stand farther away; {_INSTRUMENT}",
+    "lens_distortion": f"calibrate the lens, or move the camera farther away; {_INSTRUMENT}",
     SLIP: (
         "leave this marker out from that moment on, or glue it again and repeat the later records; "
         f"{_INSTRUMENT}"
@@ -55,17 +55,17 @@ TO_DO = {
     "clock_offset": f"record with one clock, or shift the records by the offset; {_INSTRUMENT}",
     "seating": "preload the specimen until its faces are in full contact; the simulation is not at fault",
     "frame_compliance": "subtract the machine's compliance, found with a rigid block, or use an extensometer",
-    "led_drift": f"let the light source warm up, or measure it beside the signal; {_INSTRUMENT}",
+    "led_drift": f"let the light source warm up, or measure it with the signal; {_INSTRUMENT}",
     "ambient_light": f"shield the waveguide from light, or subtract a dark reading; {_INSTRUMENT}",
     "waveguide_play": "remove the play of the waveguide in its channel, or of the stage, and record again",
     "optical_nonlinearity": "calibrate the sensor over the whole range of bending",
-    "batch_variation": "print and test the specimens of one batch, or give that specimen its own modulus",
-    THICKNESS: "measure the struts of each specimen, and give each design its own unit file",
+    "batch_variation": "print and test the specimens in one batch, or give that specimen another modulus",
+    THICKNESS: "measure the struts of each specimen, and write one unit file for each design",
     "mesh_error": "simulate with a finer mesh, --refine",
 }
 
 
 def what_to_do(effects: tuple[str, ...]) -> str:
-    """Remedies for these causes, a sentence each; empty where there is none."""
+    """Remedies for these causes, a sentence each; empty without any."""
     sentences = (TO_DO[name] for name in effects)
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the verdict in a sentence, and the evidence for it."""
+"""The report of a diagnosis: the verdict in a sentence, and its evidence."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FILES = {
     "unit.toml": "parameters of the unit",
     "verdict.json": "the verdict and its figures",
     "model.toml": "the extended model: `simulate`, `place` and `homogenize` take it with --model",
-    "residuals.csv": "every measured value beside the predictions of both models",
+    "residuals.csv": "every measured value with the predictions of both models",
     "summary.json": "all results of this run as numbers",
     "log.ndjson": "log of this run",
 }

@@ -74,8 +74,8 @@ def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
 def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | None:
     """Judge the model by measured data; writes verdict.json, model.toml, residuals.csv, report.html.
 
-    Where the folder holds this program's verdict on these inputs, nothing is repeated, and None is returned.
-    Raises InputError, OutputError.
+    If the folder holds this program's verdict on these inputs, return None without repeating it. Raises
+    InputError, OutputError.
     """
     measured, unit, progress = job.measured, job.subject, context.progress
     for remark in measured.remarks:
@@ -163,7 +163,7 @@ def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) ->
 
 
 def _known_before(job: Job, simulator: Composite) -> list[str]:
-    """Effects in the model from the start, in words, and those that these experiments do not show."""
+    """Effects in the model from the start, as text, and those that these experiments do not show."""
     if job.known is None:
         return []
     effects = {
@@ -182,7 +182,7 @@ def _known_before(job: Job, simulator: Composite) -> list[str]:
 
 
 def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
-    """Resin's modulus that corresponds to the fitted modulus of a computed block, in words."""
+    """Resin's modulus that corresponds to the fitted modulus of a computed block, as text."""
     fitted = model.nuisances.get(lattice_compression.MODULUS.name)
     if fitted is None or model.lattice is None or unit is None:
         return []
@@ -195,7 +195,7 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
 
 
 def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
-    """Readings that drove the model with less noise than they have, in words."""
+    """Readings that drove the model after smoothing, as text."""
     noise: dict[str, float] = {}
     stepped: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
@@ -209,8 +209,8 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
             else:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
     return [
-        f"the noise of {column}, up to {sd:.2g}, was averaged out over straight stretches, and no "
-        "effect is named for what remains of it"
+        f"the noise of {column}, up to {sd:.2g}, was averaged over straight stretches; no effect "
+        "is named for the rest"
         for column, sd in noise.items()
     ] + [
         f"{column} was read in steps of {step:.2g}; the model takes straight lines between the changes"
@@ -219,7 +219,7 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
 
 
 def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
-    """Fitted values of the base model at a bound, in words."""
+    """Fitted values of the base model at a bound, as text."""
     values = verdict.selection.base.values
     return [
         f"in the fit without effects, {readable(p.name)} is at its bound, {values[p.name]:.3g} ({p.source})"
@@ -232,7 +232,7 @@ def _bounds_met(verdict: Verdict, simulator: Composite) -> list[str]:
 def _stages(progress: Progress) -> Iterator[Callable[[str], None]]:
     """Stages of the run from the engine's messages.
 
-    All trials of effects are one stage: their number is not known before, so that its share goes by the
+    All trials of effects are one stage. Their number is unknown beforehand, so its share is estimated by the
     clock.
     """
     with ExitStack() as stack:

@@ -26,7 +26,7 @@ LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 24.0
 BY_CHAMBERS = 1.6
 """Power of their number by which a printed unit's seconds grow: measured with three and six."""
 BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
-"""Stages of a unit's simulation in a diagnosis: by itself, at each effect's first sizes, at the others."""
+"""Stages of a unit's simulation: without effects, at each effect's first sizes, at the others."""
 SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
 """Shares of the seconds; the last stage is left out where no effect is in question."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
@@ -68,7 +68,7 @@ def simulators_of(
     settings: UnitSettings | None = None,
     stage: str = BASE,
 ) -> tuple[dict[str, Simulator], list[str]]:
-    """Simulators by kind of experiment, and remarks on what was not simulated or was assumed.
+    """Simulators by kind of experiment, and remarks on omissions and assumptions.
 
     The unit and blocks of its lattice are simulated by finite elements; the runs are kept in the folder
     `cache`. stage: name of the unit's simulation among the run's stages.
@@ -98,7 +98,7 @@ def _of_a_unit(
     settings: UnitSettings | None,
     stage: str,
 ) -> tuple[dict[str, Simulator], list[str]]:
-    """Simulators of the kinds in `OF_A_UNIT`, and what could not be simulated, in words."""
+    """Simulators of the kinds in `OF_A_UNIT`, and the reasons why others could not be simulated."""
     from ...evidence.unit_fem import blocked_responses, unit_responses
 
     kinds = {e.kind for e in experiments}

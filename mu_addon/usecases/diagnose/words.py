@@ -1,4 +1,4 @@
-"""A diagnosis in words: its verdict in a sentence, parameters with intervals, what to measure next."""
+"""A diagnosis as text: its verdict in a sentence, parameters with intervals, the next measurement."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _parts(title: Effect | str) -> list[str]:
 
 
 def alternatives(effects: Sequence[Effect | str]) -> str:
-    """Effects of which one is the cause, those of one owner together: "a or b of specimen B; or c"."""
+    """Alternative causes, those of one owner together: "a or b of specimen B; or c"."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for effect in effects:
         name, *owner = _parts(effect)
@@ -97,7 +97,7 @@ def between(low: float, high: float) -> str:
 
 
 def sized(verdict: Verdict, cause: Cause) -> str:
-    """Parameters of a cause with their intervals in words."""
+    """Parameters of a cause with their intervals, as text."""
     if cause.effect.name == SLIP:
         return _slipped(verdict, cause)
     sizes = []
@@ -157,7 +157,7 @@ def in_a_table(verdict: Verdict) -> bool:
 
 
 def sentence(verdict: Verdict) -> tuple[str, str]:
-    """The verdict in words: its headline, and one plain sentence; without values that are `in_a_table`."""
+    """The verdict as text: its headline, and one sentence, without values if they are `in_a_table`."""
     found, tabled = verdict.selection, in_a_table(verdict)
     if verdict.kind == "named":
         sizes = [
@@ -208,7 +208,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
 
 
 def _limits(verdict: Verdict) -> str:
-    """Sizes that would have been detected, of what the data show least, and what they hide, in words."""
+    """Smallest detectable sizes of the least visible effects, and the hidden effects, as text."""
     visible, hidden = [], []
     for s in best_seen(verdict.seen).values():
         p = s.effect.parameters[0]
@@ -297,7 +297,7 @@ def _far(verdict: Verdict) -> str:
 
 
 def _near(verdict: Verdict) -> str:
-    """The nearest single effect and its share of the misfit, in words."""
+    """The nearest single effect and its share of the misfit, as text."""
     if verdict.nearest is None or verdict.nearest[1] < LEAST_SHARE:
         return "No single effect takes a tenth of the misfit."
     title, share = verdict.nearest
@@ -305,7 +305,7 @@ def _near(verdict: Verdict) -> str:
 
 
 def _what_remains(verdict: Verdict) -> str:
-    """Remaining structure of the misfit, beside an effect that takes nearly all of it."""
+    """Remaining structure of the misfit when an effect explains nearly all of it."""
     rest = listed([readable(n) for n in verdict.selection.left])
     return (
         f"It takes {100 * verdict.share_taken:.4g} % of the misfit (of χ² beyond noise). What remains "
@@ -315,7 +315,7 @@ def _what_remains(verdict: Verdict) -> str:
 
 
 def advice(verdict: Verdict) -> str:
-    """Next measurement, in words; without a rigid chamber if an experiment has one."""
+    """Next measurement, as text; without a rigid chamber if an experiment has one."""
     words = _asked(verdict)
     if any(_RIGID.search(f"{e.name} {e.specimen or ''}") for e in verdict.experiments):
         for asked, instead in _INSTEAD.items():
@@ -357,7 +357,7 @@ def _asked(verdict: Verdict) -> str:
 
 
 def to_do(verdict: Verdict) -> str:
-    """Next action, in words; empty if nothing was named."""
+    """Next action, as text; empty if no cause was named."""
     if verdict.kind == "none":
         trust = f"Trust the simulation for experiments like these{_with_moduli(verdict)}"
         return f"{trust}, and set the load cell to zero before each test." if verdict.zeros else f"{trust}."
@@ -369,7 +369,7 @@ def to_do(verdict: Verdict) -> str:
 
 
 def _with_moduli(verdict: Verdict) -> str:
-    """Fitted factor of a unit's moduli, without which the simulation misses, in words; empty near 1."""
+    """Fitted factor of a unit's moduli, as text; empty near 1."""
     key = MODULUS.name
     factor = verdict.selection.base.values.get(key, 1.0)
     low, high = verdict.intervals.get(key, (1.0, 1.0))

@@ -89,7 +89,7 @@ class Job:
 
 @attrs.frozen
 class _Settings:
-    """Content of export.toml beside the unit and its resin."""
+    """Content of export.toml, apart from unit and resin."""
 
     resin: str
     path: str = ""

@@ -292,7 +292,7 @@ def _mismatch(name: str, what: str) -> OutputError:
 
 
 def export(job: Job, folder: Path, context: RunContext) -> None:
-    """Write a unit's files in a folder of its own; raises InputError, GateError and OutputError."""
+    """Write a unit's files in the run's folder; raises InputError, GateError and OutputError."""
     Export(job, folder, context).run()
 
 

@@ -1,6 +1,6 @@
 """Sheets filled in at the bench, CSV with an empty last column: the gauge's sizes and a printer's limits.
 
-From the gauge's sheet, or a unit's own [print], comes the print offset.
+The print offset comes from the gauge's sheet or the unit's [print].
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _sheet_text(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _sheet_rows(path: Path, remedy: str) -> list[tuple[str, dict[str, str]]]:
-    """Rows of a filled sheet, each with its location in words; raises InputError with the remedy."""
+    """Rows of a filled sheet, each with its location; raises InputError with the remedy."""
     try:
         rows = own_rows(own_lines(own_text(path, _LONGEST)))
     except (OSError, UnicodeDecodeError) as error:
@@ -92,7 +92,8 @@ def read_sheet(path: Path) -> dict[str, tuple[float, float, float]]:
 def compensation_offsets(unit: Unit, source: str | None) -> tuple[tuple[float, float], str]:
     """Offsets in mm, in the plane and along z, to subtract from a drawing, and their source.
 
-    source: None for nothing, "unit" for the unit's [print], else the gauge's filled sheet. Raises InputError.
+    source: None for no compensation, "unit" for the unit's [print], else the gauge's filled sheet. Raises
+    InputError.
     """
     if source is None:
         return (0.0, 0.0), ""
@@ -122,7 +123,7 @@ def limit_sheet(parts: Sequence[LimitPart]) -> str:
 
 
 def measured_limits(path: Path) -> dict[str, Limit]:
-    """The limits that a filled sheet gives, by name and in their units; empty rows give none.
+    """The limits in a filled sheet, by name and in their units; empty rows are left out.
 
     Raises InputError, also where no row is filled in.
     """

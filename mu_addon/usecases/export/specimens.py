@@ -302,9 +302,10 @@ def _page(unit: Unit, resin: Material, rows: list[dict[str, Any]]) -> str:
         "the offset.</p>"
     )
     limits = (
-        "<p>Parts named limit-... have a row of features from too fine to safe, the first beside the notched "
-        "corner. Write into limits.csv which was made, with all safer ones. Then <code>run.py check --limits "
-        "limits.csv</code> goes by these instead of what is published or assumed.</p>"
+        "<p>Parts named limit-... have a row of features from too fine to safe, the first next to the "
+        "notched corner. Write into limits.csv the finest feature that was printed, if all safer ones were, "
+        "too. Then <code>run.py check --limits limits.csv</code> uses these limits in place of published or "
+        "assumed ones.</p>"
     )
     return page(
         "Specimens",

@@ -28,7 +28,7 @@ LAYOUT = FolderLayout(
 class Job:
     """Inputs of a fit. laws: all of them without names.
 
-    held_out_modes: modes that no law is fitted to, beside the experiments whose role is "held_out".
+    held_out_modes: modes left out of every fit, in addition to experiments with the role "held_out".
     """
 
     measured: Measured

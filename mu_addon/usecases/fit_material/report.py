@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FILES = {
     "fit.toml": "inputs of this run",
     "material.toml": "the chosen law as a material file for simulations",
-    "fit.csv": "every measured value beside the prediction of every law",
+    "fit.csv": "every measured value with the prediction of every law",
     "parameters.csv": "parameters with their intervals",
     "errors.csv": "error of each law on each coupon",
     "fit_*.svg": "one chart per mode",

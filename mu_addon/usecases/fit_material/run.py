@@ -31,9 +31,9 @@ FIT_S = 1.0
 class Fitting:
     """Coupons and the laws fitted to them.
 
-    unseen: share by which each law misses a mode when fitted without it; apart: how far laws differ in modes
-    that were not tested, see `disagreement`; compressibility: share by which kappa moves the chosen law's
-    stress at the end of its range.
+    unseen: relative error of each law in a mode left out of its fit; apart: difference of the laws in
+    untested modes, see `disagreement`; compressibility: relative change of the chosen law's stress by kappa
+    at the end of its range.
     """
 
     measured: Measured

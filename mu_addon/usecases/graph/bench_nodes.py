@@ -63,7 +63,7 @@ def _calibrate(call: Call) -> Order:
     places = tuple(v.folder if isinstance(v, Measured) else Path(v) for _, v in call.inputs["bending"])
     if not places:
         raise InputError(
-            "nothing to calibrate from is linked", "bending", "link recordings, or measured data"
+            "no data for the calibration are linked", "bending", "link recordings, or measured data"
         )
     job = calibrate.Job(
         places,

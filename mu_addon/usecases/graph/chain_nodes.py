@@ -39,7 +39,9 @@ def _chain(call: Call) -> Order:
     turns = _numbers(s["turns_deg"], "turns_deg") or [0.0] * len(designs)
     if len(turns) != len(designs):
         raise InputError(
-            f"{len(turns)} turns for {len(designs)} units", "turns_deg", "give one for each unit, or none"
+            f"{len(turns)} turns for {len(designs)} units",
+            "turns_deg",
+            "give one for each unit, or leave it empty",
         )
     reach = _numbers(s["reach_mm"], "reach_mm")
     if reach and len(reach) != 3:

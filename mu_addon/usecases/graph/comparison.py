@@ -40,7 +40,7 @@ class Comparison:
     angles: tuple[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]], ...] = ()
 
     def remark(self) -> str:
-        """Number of studies, and their largest angles less that of the first, in a few words."""
+        """Number of studies, and their largest angles minus the first's, as text."""
         angles = self.results.get("angle_highest_deg", ())
         more = [
             f"{difference(angles[0], a):+.1f}" for a in angles[1:] if is_number(a) and is_number(angles[0])
@@ -111,7 +111,7 @@ _NO_RESULT = ("status", "versions", "seconds", "experiments", "noise", "remarks"
 
 
 def _flat(summary: Mapping[str, Any], before: str = "") -> Row:
-    """Numbers and words of a summary, names joined by dots."""
+    """Numbers and texts of a summary, names joined by dots."""
     found: Row = {}
     for key, value in summary.items():
         if not before and key in _NO_RESULT:

@@ -52,7 +52,7 @@ def _ancestors(names: Iterable[str]) -> set[str]:
 def _sources(step: Step) -> tuple[str, ...]:
     """Steps that a step's node is linked to: those before it, and those whose parameters it also reads.
 
-    What comes through another of them is linked once.
+    A part that passes through another step is linked once.
     """
     known = _ancestors(step.after)
     more = [

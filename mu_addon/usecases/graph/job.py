@@ -58,7 +58,7 @@ def file_name(node: str) -> str:
 
 
 def job_of_file(path: Path, wanted: tuple[str, ...] = (), node_reports: bool = False) -> Job:
-    """The job of a tree's file, whose relative file names are resolved beside it; raises InputError."""
+    """The job of a tree's file, with file names relative to its folder; raises InputError."""
     tree = with_absolute_paths(read_tree(path), definitions(), path.absolute().parent)
     return Job(tree, wanted, node_reports)
 

@@ -70,7 +70,7 @@ def optimize_nodes() -> tuple[Definition, ...]:
                 setting(
                     "file",
                     "",
-                    "design.toml of targets and freedoms; the linked unit and its body stand for its own",
+                    "design.toml of targets and freedoms; the linked unit and body replace those in it",
                     path=FILE,
                 ),
                 setting("proposed", 1, "which of the proposed units", low=1, high=6),
@@ -78,7 +78,7 @@ def optimize_nodes() -> tuple[Definition, ...]:
             ),
             order=_optimize,
             read=_proposed,
-            muting="the unit passes on as it is",
+            muting="the unit is passed on unchanged",
             mute=lambda call: {"unit": call.inputs["unit"]},
             remark=_remark,
         ),

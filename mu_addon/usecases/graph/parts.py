@@ -80,7 +80,7 @@ def _name_of(section: Any) -> str:
 
 @cache
 def described() -> dict[str, Description]:
-    """Every parameter of a unit by `section.name`, the scale by its own name."""
+    """Every parameter of a unit by `section.name`, the scale by its name."""
     found = {f"{_name_of(s)}.{d.name}": d for s in SECTIONS for d in describe(s)}
     return {"scale": SCALE, **found}
 
@@ -91,7 +91,7 @@ def first_choosing(name: str) -> str:
 
 
 def part_of(step: Step, call: Call) -> Part:
-    """Part joined from the linked parts and the node's own settings; InputError where two differ."""
+    """Part joined from the linked parts and the node's settings; InputError where two differ."""
     parameters: dict[str, Any] = {}
     chosen: dict[str, str] = {}
     origin: dict[str, str] = {}
@@ -163,6 +163,6 @@ def known_path(unit: Unit, path: str) -> str:
 
 
 def rest() -> tuple[str, ...]:
-    """Parameters that no step owns: of material, wall and printer."""
+    """Parameters outside the steps: of material, wall and printer."""
     owned = {path for step in STEPS.values() for path in step.own}
     return tuple(path for path in described() if path not in owned and path != "scale")

@@ -38,8 +38,8 @@ def plan_of(
 ) -> Plan:
     """Nodes still to be run, in order, with the seconds of each.
 
-    states: of the tree's latest refresh; wanted: nodes asked for, all if empty; folder: of the tree's runs,
-    whose last evaluation has each node's seconds; order_of: order of a node where it is known, for its plan.
+    states: of the tree's latest refresh; wanted: requested nodes, all if empty; folder: of the tree's runs,
+    with each node's seconds; order_of: order of a node if known, for its plan.
     """
     order, _ = tree.ordered()
     needed = tree.upstream(tuple(wanted) or tree.nodes)

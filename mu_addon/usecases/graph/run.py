@@ -1,4 +1,4 @@
-"""`graph`: evaluates the nodes asked for, computing only those not yet cached."""
+"""`graph`: evaluates the requested nodes and computes only those that are not cached."""
 
 from __future__ import annotations
 

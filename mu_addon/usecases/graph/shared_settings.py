@@ -20,5 +20,5 @@ QUICK_REFINE = Setting(mesh.REFINE._replace(default=0.5))
 
 
 def of_orders(name: str, module: str = "orders") -> Callable[..., Any]:
-    """A function of `orders`, or of another module beside it, which is imported on the first call."""
+    """A function of `orders` or a sibling module, imported on the first call."""
     return lambda *given: getattr(import_module(f".{module}", __package__), name)(*given)

@@ -173,7 +173,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "check",
             "Check Print",
             PRINT,
-            "whether the unit can be printed, and its best build direction",
+            "printability of the unit, and its best build direction",
             (_TAKES_UNIT,),
             (Output("check", "print check", "findings"),),
             (
@@ -213,7 +213,7 @@ def study_nodes() -> tuple[Definition, ...]:
             (_TAKES_UNIT,),
             (Output("gripper", "gripper", "the gripper"),),
             (
-                setting("path", "alpha4", "path of the waveguides where the unit has none"),
+                setting("path", "alpha4", "path of the waveguides if the unit has none"),
                 *map(Setting, (*describe(Fingers), *describe(Plate))),
             ),
             make=_gripper,

@@ -1,8 +1,8 @@
 """One finger of a gripper that closes on a cube, holds, lifts and releases it, with friction.
 
-Gripper and cube are symmetric about the middle plane, and the unit about x = 0: half of one finger and the
-rigid cube in the middle are the whole. The base is clamped: the plate's own give is left out, and so are the
-fingers' weight and the air between them. The gripper hangs, tips down: gravity pulls along +z.
+Gripper and cube are symmetric about the middle plane, and the unit about x = 0, so half of one finger and the
+rigid cube are modelled. The base is clamped. The plate's compliance, the fingers' weight and the air between
+them are neglected. The gripper hangs, tips down: gravity pulls along +z.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class Grip:
 
     friction: the lower end of known values. beyond_mm: assumed, the tips' edges then meet both cubes near the
     middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see `Obstacle`.
-    step_s: longest time between instants.
+    step_s: longest interval between instants.
     """
 
     friction: float = FRICTION.field()
@@ -110,9 +110,9 @@ OF_FIDELITY: dict[str, dict[str, Any]] = {HOMOGENISED: {}, RESOLVED: _OF_STRUTS,
 class Lift:
     """A cube without support in the closed grasp.
 
-    held: True if friction carries the weight; sag_mm: how far it has then sunk, else nan. normal_N: of one
-    finger on the cube, at the plateau. pull_mm (p,) and pull_N (p,): way and force when the cube is pulled
-    down, of both fingers together.
+    held: True if friction carries the weight; sag_mm: displacement at that balance, else nan. normal_N: of
+    one finger on the cube, at the plateau. pull_mm (p,) and pull_N (p,): displacement and force of both
+    fingers when the cube is pulled down.
     """
 
     held: bool
@@ -145,10 +145,10 @@ class Grasp:
 
     u (k, n, 3): displacement of the half mesh in mm; backbone (k, p, 3): the anchors, in the finger's frame;
     cube_mm (k, 3): the cube's middle in that frame. normal_N (k,): toward the other finger; down_N (k,):
-    along +z, friction except for the pressure of edges. sticking (k,): share of the touching area that does
-    not slide; slid_mm (k,): the farthest that a point has slid so far; deepest_mm (k,): the error of the gap;
-    lost_mJ (k,): dissipated by friction, of one finger; volume_mm3 (k,): of its cavity; snapped_mm (k,): how
-    far a node moved where parts of the finger snapped on the way to an instant, else 0.
+    along +z, friction except for the pressure of edges. sticking (k,): share of the contact area that does
+    not slide; slid_mm (k,): largest slip of a point so far; deepest_mm (k,): the error of the gap; lost_mJ
+    (k,): dissipated by friction, of one finger; volume_mm3 (k,): of its cavity; snapped_mm (k,): largest
+    displacement of a node in a snap before an instant, else 0.
     """
 
     cube: Cube
@@ -237,9 +237,9 @@ def grasp(
 ) -> Grasp:
     """Close a finger on a cube phase by phase, in time order, and lift the cube.
 
-    mesh and materials: of the gripper's unit, the half mesh, homogenised or resolved. on_instant is told the
-    share done. newton: settings that suit the mesh; self_contact: of the finger's parts. Raises InputError
-    for a cube that does not fit, ConvergenceError where an instant has no equilibrium.
+    mesh and materials: of the gripper's unit, the half mesh, homogenised or resolved. on_instant: called with
+    the share done. newton: settings for the mesh; self_contact: of the finger's parts. Raises InputError for
+    a cube that does not fit, ConvergenceError where an instant has no equilibrium.
     """
     grip = grip or Grip()
     model = Model(mesh, threads=threads)
@@ -277,7 +277,7 @@ class _Hand:
         self.at: list[Array] = []
 
     def pose(self, time_s: float) -> Pose:
-        """Pose of the cube: it comes from below while the fingers open, and sinks as it is lifted.
+        """Pose of the cube: it rises from below while the fingers open, and sags as it is lifted.
 
         A cube that friction cannot carry stays on its support: its fall is not followed.
         """
@@ -347,9 +347,9 @@ class _Hand:
 def lifted(equilibrium: Equilibrium, obstacle: Obstacle, state: State, cube: Cube, friction: float) -> Lift:
     """Position of a cube in a closed grasp without support: where friction balances its weight.
 
-    state: converged and committed. The cube is pulled down step by step, each state committed, so that slip
-    accumulates, until the friction stops growing or drops; the balance with the weight is then found within
-    `BALANCE` of it. The obstacle is restored.
+    state: converged and committed. The cube is pulled down step by step with accumulating slip, until the
+    friction stops growing or drops. The balance with the weight is then found to within `BALANCE`. The
+    obstacle is restored.
     """
     normal = 2.0 * float(obstacle.contact(state.u).normal_N[1])
     if not obstacle.friction:

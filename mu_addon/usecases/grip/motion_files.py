@@ -1,6 +1,6 @@
 """The motion of a grasp for display, one folder a cube.
 
-- motion/: one finger in its own frame, as of a study (`motion_files`), each instant a separate state
+- motion/: one finger in its frame, as of a study (`motion_files`), each instant a separate state
 - finger.pvd and its .vtu files: the half mesh, for ParaView
 - gripper.npz: both fingers in the gripper's frame: `rest_mm` (2, v, 3), `triangles` (t, 3), `membrane` (t,),
   whether a triangle is the membrane's; `time_s` (k,), `cube_mm` (k, 3), the cube's middle, `cube_side_mm`;
@@ -76,7 +76,7 @@ def write_grasp(folder: Path, gripper: Gripper, mesh: Mesh, materials: Materials
 def write_halves(folder: Path) -> list[tuple[Array, Array, Array]]:
     """Write the motion of both fingers cut open, of their halves at x <= 0. Raises InputError, OutputError.
 
-    Returns of each vertices at rest (v, 3) in mm, triangles (t, 3), and whether each is the membrane's (t,).
+    Returns for each the vertices at rest (v, 3) in mm, triangles (t, 3), and a mask (t,) of the membrane's.
     """
     motion, data = read_motion(folder), read_npz(folder / "gripper.npz")
     if data is None or "placement" not in data:
@@ -100,7 +100,7 @@ def write_halves(folder: Path) -> list[tuple[Array, Array, Array]]:
 
 
 def even(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Times at even steps that meet the least step of `time_s` (k,), and values (k, ...) between linearly."""
+    """Times at even steps, at most the least of `time_s` (k,), and values (k, ...) interpolated linearly."""
     step = float(np.diff(time_s).min())
     count = min(MOST_SAMPLES, round(float(time_s[-1] - time_s[0]) / step) + 1)
     time = np.linspace(time_s[0], time_s[-1], count)

@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 SHIPPED = "protocols/gripper.csv"
 NAMES = ("i", "ii", "iii", "iv", "v")
 WORDS = {"i": "opening", "ii": "closing", "iii": "holding", "iv": "lifting", "v": "releasing"}
-"""What the hand does in a phase, in a word."""
+"""Action of the hand in a phase."""
 MEANING = {
     "i": "open by vacuum; the cube is placed between the tips",
     "ii": "close",

@@ -192,7 +192,7 @@ def _light(run: Gripping) -> str:
         )
     about = (
         "Computed by ray tracing through the deformed waveguide of the chosen path. The loss is positive "
-        "and relative to the light at rest. Both fingers are modelled alike, so their signals are equal. "
+        "and relative to the light at rest. Both fingers have the same model, so their signals are equal. "
         "The optical constants of the resin are assumed: no published values were found."
     )
     return f"<p>{escape(words)}</p><p>{escape(about)}</p>" + figure(

@@ -82,7 +82,7 @@ class Gripping:
             self.follow_light()
 
     def design(self) -> None:
-        """Write the printable part as STL and 3MF, the latter read back."""
+        """Write the printable part as STL and 3MF, and check the 3MF by reading it."""
         with self.progress.stage("solid", 6.0):
             found = self.solid = build_gripper(self.job.gripper, self.job.quality)
             write_bytes(self.folder / "gripper.stl", stl_bytes(found.vertices, found.triangles))

@@ -136,7 +136,7 @@ def frictions_of(name: str) -> tuple[Friction, ...]:
 
 
 def resin_of(name: str | None, unit: Unit) -> Resin:
-    """The resin of a name in the library or of a file; the unit's own without one. Raises InputError."""
+    """The resin of a name in the library or of a file, by default the unit's. Raises InputError."""
     if not name:
         return Resin.of_unit(unit, load_material(USUAL_RESIN))
     path = Path(name)

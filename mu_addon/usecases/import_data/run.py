@@ -1,6 +1,6 @@
 """Import of files of test machines and data loggers into a folder of measured data.
 
-Missing information is asked for; until it is given only the page on what was read is written.
+Missing information is asked for; without it only the page on the read files is written.
 """
 
 from __future__ import annotations
@@ -38,9 +38,8 @@ def import_files(
 ) -> tuple[Proposal, ...]:
     """Import the experiments of files into a folder of measured data; fills `context.summary`.
 
-    ask: answers a question; without it open questions raise InputError, after the page on what was read was
-    written. show: gets the page as lines of a terminal before questions. dry: write the page only, and report
-    open questions.
+    ask: answers a question; without it open questions raise InputError, after the page is written. show: gets
+    the page as lines of a terminal before questions. dry: write the page only, and report open questions.
     """
     given = dict(answers)
     remarks: list[Remark] = []
@@ -77,7 +76,7 @@ def import_files(
 
 
 def write_page(found: Understood, folder: Path) -> None:
-    """Write the page on what was read; raises OutputError."""
+    """Write the page on the read files; raises OutputError."""
     write_text(folder / PAGE, page_of(found, folder.name))
 
 
@@ -167,7 +166,7 @@ def _quoted(text: str) -> str:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """Lines on what was read, and on what is open in a dry run."""
+    """Lines on the read files, and on open questions in a dry run."""
     lines = [*summary["understood"], f"how the files were read, with pictures: {summary['report']}"]
     if summary.get("dry_run"):
         lines += [f"open: {question}" for question in summary["questions"]] + [

@@ -45,7 +45,7 @@ KEYS = (
 
 @attrs.frozen
 class Understood:
-    """Experiments in files, and in words the tables and lines that belong to none."""
+    """Experiments in files, and descriptions of tables and lines outside them."""
 
     proposals: tuple[Proposal, ...]
     left_out: tuple[str, ...]

@@ -2,8 +2,8 @@
 
 request.json: `number` of the latest request, whose study is in `asked/NUMBER`, `pressure_kPa`, found first,
 and `fields`, whether stress and stretch are asked for. bent.json: `number` of the request that it answers,
-`folder` of the motion, `states` as pairs of kPa and degrees, `error` of the angle as a share, `finished`, and
-`trouble` where no shape was found.
+`folder` of the motion, `states` as pairs of kPa and degrees, relative `error` of the angle, `finished`, and
+`trouble` if no shape was found.
 """
 
 from __future__ import annotations
@@ -28,13 +28,12 @@ LAYOUT = FolderLayout(
     "live.toml", "# Shapes of a unit while it is designed.", (REQUEST, BENT, ASKED, CELLS, "shape-*")
 )
 LEVELS = ((0.35, 0.09), (0.5, 0.03), (1.0, 0.0))
-"""Refinements in their order, and the error of each level's angle as a share of that at a refinement of 1, of
-Simulate: a little more than the largest found (docs/engineering/decisions.md)."""
+"""Refinements in order, each with its relative error of the angle (docs/engineering/decisions.md)."""
 
 
 @attrs.frozen
 class Job:
-    """A process without inputs of its own: they come with each request."""
+    """A process without fixed inputs: they come with each request."""
 
     def texts(self) -> dict[str, str]:
         """Text of live.toml, by its name."""
@@ -50,7 +49,7 @@ def read_job(folder: Path) -> Job:
 def trouble_of(study: Study) -> str:
     """Reason why a study's unit is not bent live, or ""."""
     if study.obstacles:
-        return "beside obstacles a unit is bent by Simulate only"
+        return "with obstacles, only Simulate bends a unit"
     if study.in_time:
         return "a wall with memory is bent by Simulate only"
     return ""

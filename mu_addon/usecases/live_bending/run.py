@@ -1,4 +1,4 @@
-"""Bend a printed unit under pressure at once, coarsely and then finer, in a process that waits for changes.
+"""Bend a printed unit under pressure, coarsely first and then finer, in a process that waits for changes.
 
 Between two designs it keeps mesh, model and states, from which the next one starts. Without self-contact, so
 for pressures above 0 only: suction closes walls.
@@ -91,7 +91,7 @@ class _Drawn:
 
 @attrs.frozen(eq=False, slots=False)
 class _Solved:
-    """A unit on a mesh made for it or moved to it: its states by pressure in kPa, and their fields."""
+    """A unit on a new or morphed mesh: its states by pressure in kPa, and their fields."""
 
     study: Study
     drawn: _Drawn
@@ -125,7 +125,7 @@ class LiveBending:
         return self._seen[1]
 
     def step(self) -> bool:
-        """Answer the latest request as far as no newer one comes; return False if there is none."""
+        """Answer the latest request until a newer one comes; return False if there is none."""
         request = self.request()
         number = int(request.get("number", 0))
         if number <= self._number:
@@ -158,7 +158,7 @@ class LiveBending:
             time.sleep(LOOK_S)
 
     def _level(self, study: Study, refine: float, error: float, first_kPa: float, fields: bool) -> None:
-        """Bend the unit on a mesh of one refinement, the first pressure first, and tell of every state."""
+        """Bend the unit on a mesh of one refinement, the first pressure first, and report every state."""
         self._look()
         study = attrs.evolve(study, mesh=attrs.evolve(study.mesh, refine=refine))
         before = self._levels.get(refine)
@@ -225,7 +225,7 @@ class LiveBending:
         return body.reach(in_MPa(pressure), below)
 
     def _tell(self, found: _Solved, error: float, finished: bool) -> None:
-        """Write the states found so far, and what there is to read."""
+        """Write the states found so far, and the list of files to read."""
         self._shape += 1
         folder = self.folder / f"shape-{self._shape}"
         states = tuple(found.states[p] for p in sorted(found.states))

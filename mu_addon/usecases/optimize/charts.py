@@ -100,10 +100,10 @@ def course(found: Optimised) -> str:
 def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None = None) -> str:
     """SVG of a unit cut along its plane of bending, all units at one scale: wall, chambers, struts, envelope.
 
-    Struts are those of the half cell on one side of the plane, at their own thickness. body: in place of the
+    Struts of the half cell on one side of the plane are drawn at their thickness. body: in place of the
     lattice's box.
 
-    widest_mm, tallest_mm: size of the largest unit to be shown beside it.
+    widest_mm, tallest_mm: size of the largest unit in the comparison.
     """
     with canvas(1.15, 1.15 * tallest_mm / widest_mm) as (drawn, svg):
         _half_section(drawn, unit, widest_mm, tallest_mm, body)
@@ -158,7 +158,7 @@ def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float, b
 
 
 def _strut_outlines(d: Dimensions) -> list[Array]:
-    """Outlines of the struts beside the plane of bending: y and z in mm of each in turn."""
+    """Outlines of the struts next to the plane of bending: y and z in mm of each in turn."""
     lattice = lattice_of(d)
     rows = struts_beside_section(lattice)
     first, last = (lattice.nodes[lattice.struts[rows, end]][:, None, 1:] for end in (0, 1))

@@ -11,8 +11,7 @@ if TYPE_CHECKING:
 MOST_CHECKED = 6
 """Most units of a front that are simulated again on a finer mesh: its ends and some evenly between."""
 _A_STATE_S, _BY_REFINEMENT = {False: 6.5, True: 76.0}, {False: 2.3, True: 1.8}
-"""Seconds of a state with its slopes at a refinement of 1, and the exponent of the refinement: by whether the
-body is the printed one."""
+"""Seconds of a state with slopes at a refinement of 1, and the refinement's exponent; True: printed body."""
 _CHECKED, _APART = 1.2, 3.0
 """Factors on that of a unit that is checked, and of walls and struts that are kept apart."""
 
@@ -27,8 +26,8 @@ def search_plan(
 ) -> Plan:
     """Stages of a search among so many units, with the expected seconds of each on two cores.
 
-    settings: of the search's mesh; check_refine: refinement of the check of its proposals, of which there is
-    one with fewer than two objectives; states: of a unit, under the targets' pressures.
+    settings: of the search's mesh; check_refine: refinement of the check of its proposals, a single one with
+    fewer than two objectives; states: of a unit, under the targets' pressures.
     """
     checked = min(MOST_CHECKED, units) if objectives > 1 else 1
 

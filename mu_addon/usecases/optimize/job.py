@@ -1,4 +1,4 @@
-"""The inputs of an optimisation: design.toml, the unit beside it, and an extended model."""
+"""The inputs of an optimisation: design.toml, unit.toml in its folder, and an extended model."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def job_from(
     unit: Unit | None = None,
     body: Body | None = None,
 ) -> Job:
-    """The job of a design file and a model's; unit, body: in place of the file's own. Raises InputError."""
+    """The job of a design file and a model; unit, body: in place of the file's. Raises InputError."""
     try:
         text = file_text(file, _LONGEST)
     except OSError as error:
@@ -83,7 +83,7 @@ def read_job(folder: Path) -> Job:
 def mechanics_of(
     design: Design, model: ExtendedModel | None, refine: float | None = None
 ) -> tuple[Mechanics, list[str]]:
-    """Mechanics of the design's units, and the effects of the model left out, in words.
+    """Mechanics of the design's units, and the effects of the model left out, as text.
 
     refine: of the mesh, by default the search's. Raises InputError where the unit cannot have the model.
     """

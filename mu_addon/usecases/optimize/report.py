@@ -93,7 +93,7 @@ def _units(found: Optimised) -> str:
         for n, f in enumerate(found.design.freedoms)
     ]
     head = [("freedom", ""), ("start", "n"), *((str(p.place), "n") for p in found.proposals)]
-    return f'<div class="triple">{html}</div>' + table("Each lies beside as proposed-N.toml.", head, rows)
+    return f'<div class="triple">{html}</div>' + table("Each is saved as proposed-N.toml.", head, rows)
 
 
 def _state(p: Proposal) -> str:

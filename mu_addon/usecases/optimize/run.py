@@ -36,8 +36,8 @@ from .worker import asked_of, several
 class Proposal:
     """A proposed unit: its rank from 1, its design's number, and its results.
 
-    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: in words. choice: path and
-    resin, as far as they were free, by the freedom's name.
+    values (q,): on the search's mesh; checked: on a finer one; changes, reasons: as text. choice: path and
+    resin, if they were free, by the freedom's name.
     """
 
     place: int
@@ -53,7 +53,7 @@ class Proposal:
 
 @attrs.frozen(eq=False)
 class Optimised:
-    """Result of an optimisation: the search, its proposals, the outcome in words, and its cost.
+    """Result of an optimisation: the search, its proposals, a text on the outcome, and its cost.
 
     computed: units simulated by this run; model_a: Model A's, those of earlier runs in the folder included.
     """

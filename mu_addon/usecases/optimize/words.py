@@ -36,7 +36,7 @@ def outcome(found: Found, targets: Sequence[Target]) -> str:
     if found.in_the_way:
         words += f" Without {' or '.join(found.in_the_way)} the others can be met."
     elif len(missed) > 1:
-        words += " No single target stands in the way: leaving out any one of them is not enough."
+        words += " No single target is the obstacle: leaving out any one of them is not enough."
     return words
 
 
@@ -52,7 +52,7 @@ def verdict(checked: Sequence[Verified]) -> str:
 
 
 def changes(freedoms: Sequence[Freedom], start: Sequence[Any], design: Sequence[Any]) -> list[str]:
-    """Each freedom that changed, in words, the largest change over its range first."""
+    """Each freedom that changed, as text, the largest change over its range first."""
 
     def size(i: int) -> float:
         f = freedoms[i]

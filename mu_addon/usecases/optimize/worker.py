@@ -37,7 +37,7 @@ class Task:
 
 @lru_cache(maxsize=4)
 def _prepared(files: tuple[tuple[str, str], ...]) -> Job:
-    """The job of a run's own texts, which hold its unit, resins, body and model; raises InputError."""
+    """The job of a run's input texts, with unit, resins, body and model; raises InputError."""
     with tempfile.TemporaryDirectory(prefix="mu-optimize-") as name:
         folder = Path(name)
         for file, text in files:

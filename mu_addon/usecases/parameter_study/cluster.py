@@ -43,7 +43,7 @@ class Processes:
     def results(
         self, tasks: Sequence[Task], work: Work, warn: Callable[[str], None]
     ) -> Generator[tuple[int, dict[str, Any]]]:
-        """Return as `Cluster.results`; raises what `work` raises, and MuError where a process dies."""
+        """As `Cluster.results`; raises the errors of `work`, and MuError if a process dies."""
         yield from each(work, tasks, self.workers, "parameter study")
 
     def close(self) -> None:
@@ -205,7 +205,7 @@ class Cluster:
 
 
 def _quieten() -> None:
-    """Silence Dask's tracebacks at shutdown, of tasks that nobody waits for."""
+    """Silence Dask's tracebacks at shutdown, of abandoned tasks."""
     for name in list(logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -18,8 +18,8 @@ MOST_LEVELS = 8
 class Effect:
     """Mean figure (b,) and its standard error (b,) by groups of an input's values.
 
-    places (b,): mean values of a numeric input; labels: texts of one that is not. share: of the figure's
-    variance that the groups explain, corrected for their number, 0 .. 1; nan where it is undetermined.
+    places (b,): mean values of a numeric input; labels: texts of another input. share: of the figure's
+    variance that the groups explain, corrected for their number, 0 .. 1; nan if undetermined.
     """
 
     places: Array

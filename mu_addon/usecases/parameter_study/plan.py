@@ -30,9 +30,9 @@ from .variable import FILE, Inputs, Variable, changed_inputs, variable
 def sample(method: str, count: int, dimensions: int, seed: int, before: Array | None = None) -> Array:
     """Points (count, d) in [0, 1)^d, the first of them `before` (n, d), made by the same method and seed.
 
-    sobol: a scrambled Sobol sequence, whose longer beginnings contain the shorter. latin_hypercube: n points
-    lie in n strata of every axis; points added go into empty strata, so that twice (three times ...) as many
-    points are a Latin hypercube again (Sallaberry, Helton, Hora 2008).
+    sobol: a scrambled Sobol sequence; more points extend it. latin_hypercube: n points lie in n strata of
+    every axis. Added points fill empty strata, so that twice (three times ...) as many points are again a
+    Latin hypercube (Sallaberry, Helton, Hora 2008).
     """
     from scipy.stats import qmc
 
@@ -91,7 +91,7 @@ class Plan:
     """A sweep: the study that is varied, its variables, and how its points are chosen.
 
     folder: of sweep.toml and the files that it names. memory_MB, minutes: limits of one study. minimize,
-    maximize: columns of the table that Pareto fronts are drawn of.
+    maximize: columns of the table, the objectives of Pareto fronts.
     """
 
     inputs: Inputs
@@ -201,7 +201,7 @@ def read_plan_of_run(folder: Path) -> Plan:
 
 
 def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | None = None) -> Plan:
-    """The sweep of a document; files: where those lie that its variables name, its own folder without."""
+    """The sweep of a document; files: folder of the files that its variables name, by default its own."""
     for key in document:
         if key not in (*_KEYS, RUN):
             raise InputError(
@@ -245,9 +245,9 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
 
 
 def _as_printed(document: dict[str, Any]) -> dict[str, Any]:
-    """The document with the fidelity that its studies have where it names none.
+    """The document with the default fidelity of its studies added, if it names none.
 
-    A file that names a mesher, has linear elements or varies what only a continuum has is homogenised.
+    A file is homogenised if it names a mesher, has linear elements or varies a setting of the continuum.
     """
     simulate, place, vary = (document.get(name, {}) for name in ("simulate", "place", "vary"))
     # What is no table is refused later, by name.
@@ -285,7 +285,7 @@ def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, 
             raise InputError(
                 f"a parameter study does not take {key}",
                 f"{where}, [{stage}]",
-                "leave it out; unit and protocol stand at the top of the file",
+                "leave it out; unit and protocol are named at the top of the file",
             )
     return dict(found)
 

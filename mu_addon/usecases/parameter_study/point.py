@@ -65,7 +65,7 @@ def version() -> str:
 
 
 def run_point(task: Task) -> dict[str, Any]:
-    """Result of a study or its failure, as plain data; never raises for a study's own failure.
+    """Result or failure of a study, as plain data; a failing study raises nothing.
 
     status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; also its seconds,
     memory_MB and worker. Raises MuError where this worker is of another version, and OutputError where it has

@@ -45,7 +45,7 @@ def column_names(rows: Sequence[Row]) -> list[str]:
 
 
 def cell(value: Any) -> Any:
-    """A value as a cell of the table: lists as words, None as an empty cell."""
+    """A value as a cell of the table: lists as text, None as an empty cell."""
     if value is None:
         return ""
     if isinstance(value, list | tuple):

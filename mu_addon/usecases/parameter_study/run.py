@@ -157,7 +157,7 @@ class Run:
         self.write()
 
     def found(self) -> Found:
-        """The table, as far as it is known."""
+        """The table of the results so far."""
         rows = [self._row(point) for point in self.points]
         inputs = tuple(v.name for v in self.plan.variables)
         known = ("point", "status", *inputs, *LAST)

@@ -69,9 +69,9 @@ class Sweeps:
 
 @attrs.frozen
 class Job:
-    """Inputs of a calibration, read and checked as it is made. Raises InputError.
+    """Inputs of a calibration, read and checked on construction. Raises InputError.
 
-    data: folders of measured data or recordings; channel: the column of the light, needed where there are
+    data: folders of measured data or recordings; channel: the column of the light, required if there are
     several; dark: the column of the dark level, or volts; angles: CSV of time_s, angle_deg for a recording
     without marks of angles ("angle 30").
     """
@@ -266,8 +266,7 @@ def _of_recording(
 def _marked(recording: Recording, time_s: Array) -> Array:
     """Angles (n,) in degrees held after marks that state them, nan elsewhere.
 
-    Only those after the last mark "sweep", which starts a guided sweep: an earlier one, failed by a loose
-    cable or wrong angles, is left out.
+    Only those after the last mark "sweep", which starts a guided sweep: earlier, failed sweeps are left out.
     """
     angle = np.full(len(time_s), math.nan)
     marks = [m for m in recording.messages if m.get("event") == "mark"]

@@ -1,7 +1,7 @@
 """Measured data from a recording and a calibration: the angle by the sensor against the pressure.
 
 Rows are means over equal spans of time. The angle's standard deviation is half the calibration's 95 %
-interval over 1.96: the error of the map as a whole, which averaging does not reduce.
+interval over 1.96: the error of the map, which averaging does not reduce.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ _SIGMAS_OF_95 = 1.959964
 
 @attrs.frozen
 class Job:
-    """Inputs of a measured motion, read as it is made. Raises InputError.
+    """Inputs of a measured motion, read on construction. Raises InputError.
 
-    recording: its folder; calibration: its file; pressure: channel of the gauge, in kPa after `zero` of it is
-    subtracted and it is multiplied by `kPa_per_unit`; rate_hz: rows a second.
+    recording: its folder; calibration: its file; pressure: channel of the gauge; kPa = (reading - `zero`) *
+    `kPa_per_unit`; rate_hz: rows a second.
     """
 
     recording: Path

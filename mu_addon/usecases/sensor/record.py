@@ -60,7 +60,8 @@ def read_job(folder: Path) -> Job:
 
 
 def record(job: Job, folder: Path, context: RunContext) -> Path:
-    """Record into a new folder within the run's, and return it. Recordings of stopped runs stay beside it.
+    """Record into a new folder within the run's, and return it. Recordings of stopped runs stay in its
+    folder.
 
     Raises InputError, OutputError, and MuError where the recording was stopped early.
     """

@@ -63,8 +63,8 @@ def stream(
     """Record a source into `folder`, reporting events; Ctrl-C ends it cleanly.
 
     show: gets the status five times a second, and events. keep_time: see run_session. calibration: a file
-    whose map is shown beside the voltages. controlled: lines on standard input ask for "pause", "resume",
-    "stop" and "mark WORDS", as Blender does; its end ends the session. Raises InputError and OutputError.
+    whose angles are shown beside the voltages. controlled: lines on standard input request "pause", "resume",
+    "stop" and "mark WORDS", as from Blender; its end ends the session. Raises InputError and OutputError.
     """
     control = Control()
     if controlled:
@@ -126,7 +126,7 @@ def require_samples(status: Mapping[str, Any], folder: Path) -> None:
 
 @contextmanager
 def ctrl_c_stops(control: Control) -> Iterator[None]:
-    """Context in which Ctrl-C or SIGTERM ends a stream, which has no end of its own, cleanly."""
+    """Context in which Ctrl-C or SIGTERM ends a stream cleanly; it has no other end."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,7 +1,7 @@
 """Channels of the last seconds for drawing: minimum and maximum in every pixel column.
 
-Each sample is processed once, on arrival, so that drawing costs the same at 10 Hz and at 10 kHz, and a spike
-of one sample still shows.
+Each sample is processed once, on arrival, so that drawing takes equal time at 10 Hz and 10 kHz and shows a
+spike of one sample.
 """
 
 from __future__ import annotations

@@ -219,10 +219,10 @@ class CandidatePool:
     def solve(
         self, tasks: Sequence[tuple[Sequence[State], int]]
     ) -> Iterator[tuple[int, list[Moved] | ConvergenceError]]:
-        """Number of each finished task, and the results of its part's jobs, or why there are none.
+        """Number of each finished task, and the results of its part's jobs, or the reason of its failure.
 
         A task: Model A's states on one side of rest, in order of pressure, and a part. Its jobs are solved at
-        the last of these, and possibly at all of them on the way. The same for any `workers`.
+        the last of these, and possibly at all before it. The same for any `workers`.
         """
         if self.workers == 1:
             for number, (way, part) in enumerate(tasks):
@@ -236,5 +236,5 @@ class CandidatePool:
             yield numbers[done], _found_or_why(partial(self._pool.result, done))
 
     def close(self) -> None:
-        """End the processes at once, without waiting for results that nobody reads."""
+        """End the processes at once, without waiting for their results."""
         self._pool.close()

@@ -54,8 +54,8 @@ class CandidateSolver:
     """Candidates through a protocol's distinct pressures (s,) in kPa.
 
     Solutions are kept in the cache. Close it, also when Model A failed. whole: displacements of the whole
-    mesh are also kept, for display. A pressure that one candidate does not reach, and those beyond it, are
-    compared for none: `not_reached` says which, and why.
+    mesh are also kept, for display. A pressure that one candidate does not reach is left out of the
+    comparison, and so are those beyond it: `not_reached` lists them with reasons.
     """
 
     def __init__(
@@ -269,7 +269,7 @@ class CandidateSolver:
     def _along_paths(
         self, distinct: Array, still: Array, compared: Array, before: dict[int, Array]
     ) -> dict[int, Array]:
-        """Differences (jobs, p, 3) in mm at all pressures compared but 0, each job along its whole path.
+        """Differences (jobs, p, 3) in mm at all compared pressures except 0, each job along its whole path.
 
         At 0, where weight alone acts and every path begins, they keep their earlier values.
         """
@@ -377,10 +377,9 @@ def solve_candidates(
 ) -> tuple[list[Evaluation], dict[str, Any]]:
     """Evaluation of every candidate on a mesh against its Model A, and the summary's figures on it.
 
-    under_way: a solver that was given Model A's states as they were found; verify: see
-    `CandidateSolver.evaluations`. shown: also keep the paths' motion in this folder, for this mesh of the
-    study, which is the same or the half of it, which takes what `solving`, a share, leaves. Raises
-    ConvergenceError.
+    under_way: a solver that received Model A's states during the simulation; verify: see
+    `CandidateSolver.evaluations`. shown: folder for the paths' motion, and the study's mesh, which is this
+    one or half of it. solving: share of the stage without that motion. Raises ConvergenceError.
     """
     if job.in_time:
         found, not_reached = evaluations(job, cache, mesh, trajectory, candidates, on_progress)

@@ -33,10 +33,10 @@ def evaluations(
 ) -> tuple[list[Evaluation], list[str]]:
     """Evaluation of every candidate against Model A's motion.
 
-    It compares the instants until the first that a candidate does not reach; also says which those are.
+    It compares the instants until the first that a candidate does not reach, and lists the others.
 
-    None of the shortcuts of `candidates_by_pressure` holds where a state depends on those before it:
-    every candidate is solved through all instants, and kept in the cache. Raises ConvergenceError.
+    The shortcuts of `candidates_by_pressure` are invalid if a state depends on earlier ones. Every candidate
+    is solved through all instants and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)
     points, radius = anchor_points(unit), unit.dimensions.inclusion_radius

@@ -82,7 +82,7 @@ def _inputs(runs: Sequence[Run]) -> list[Row]:
 
 
 def _setting(run: Run, stage: str, keys: Sequence[str]) -> Any:
-    """Value of nested keys in a run's study.toml; None where it has none."""
+    """Value of nested keys in a run's study.toml; None if it has none."""
     found: Any = run.tables.get(stage, {})
     for name in keys:
         found = found.get(name) if isinstance(found, dict) else None

@@ -30,7 +30,7 @@ PRINTED_S = {
 }
 """The same of a printed body, where they differ."""
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
-"""Seconds that a stage takes on any mesh, of those that depend on it."""
+"""Seconds of a stage that are independent of the mesh, for stages that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
 SOLVING = {"Model A": (0.8, 0.88), "candidates": (0.45, 0.97)}
 """Share of a stage's time until its last equilibrium, of a homogenised unit and of a printed body."""
@@ -65,7 +65,7 @@ def expected_bytes(job: Job, nodes: int) -> int:
 
 
 def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = True) -> list[str]:
-    """Names of the stages that a study goes through."""
+    """Names of a study's stages."""
     names = ["solid", *(["mesh", "Model A"] if simulate else [])]
     if place:
         names += ["candidates", *(["mesh check"] if mesh_check else []), "map", "light"]

@@ -43,10 +43,9 @@ _OTHER_KIND = "its parameters are of another kind of experiment than a whole uni
 
 @attrs.frozen
 class Extended:
-    """A unit with an extended model in it; applied, left_out: parts of the model, in words.
+    """A unit with an extended model applied; applied, left_out: parts of the model, as text.
 
-    effects: those that are no parameter of a unit and belong in its simulation. kept: the model with these
-    effects alone.
+    effects: those of the simulation, not of a unit's parameters. kept: the model with these effects alone.
     """
 
     unit: Unit
@@ -72,9 +71,9 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
     """The unit with a model in it. Raises InputError where the unit breaks a rule, or an effect its bounds.
 
     overcure moves the print's surfaces, skin_cure gives it a skin, wall_thickness changes its wall, and
-    moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is of the lattice as
-    drawn at 1.0x, so the unit gets that of its own scale. Effects that no parameter of a unit stands for are
-    for its simulation, see `NamedEffects`, but those of a kind of experiment that is not a whole unit.
+    moduli that were fitted take the place of the unit's. A fitted modulus of the lattice is that of the drawn
+    lattice at 1.0x, so the unit gets the modulus at its scale. Effects without a parameter of the unit go
+    into its simulation, see `NamedEffects`, except effects of experiments on something else than a unit.
     """
     applied: list[str] = []
     left_out: list[str] = []
@@ -104,7 +103,7 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
             applied.append(words)
         elif not name.startswith(OF_THE_MODEL):
             left_out.append(
-                f"{readable(name)} ({fitted.value:.4g}) belongs to the test bench, not to the unit"
+                f"{readable(name)} ({fitted.value:.4g}) is an effect of the test bench, not of the unit"
             )
     named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in beside.items()}
     effects = NamedEffects(named, where=f"{origin}, [effect]")

@@ -51,7 +51,7 @@ MOST_PATHS = 200_000
 def sensitivity_map(study: Study) -> Array | None:
     """dJ_hat (m,) in mm by each element's relative stiffening, from Model A on, as `sensitivity.vtu`.
 
-    Over the pressures at which the unit is stable; None, and no file, where it is at none.
+    Over the pressures at which the unit is stable; None, and no file, without any.
     """
     assert study.mesh is not None
     with study.progress.stage("map"):
@@ -201,7 +201,7 @@ def _is_printable(study: Study, points: Array) -> bool:
 def _response(study: Study, stable: Trajectory, graph: Graph, monitor: Probe) -> Response:
     """The response that ranks paths: of bars between joints as printed, else of stiffened elements.
 
-    stable: Model A's motion as far as it is.
+    stable: Model A's motion so far.
     """
     assert study.mesh is not None
     job, unit = study.job, study.job.unit

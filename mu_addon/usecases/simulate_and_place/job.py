@@ -51,7 +51,7 @@ GRASP = "protocols/grasp.csv"
 class Job:
     """Inputs of a study. times: samples k of the protocol; stations: j along the backbone.
 
-    The 13 samples of the grasp protocol are 1 s or 10 kPa apart and meet each of its corners.
+    The 13 samples of the grasp protocol are 1 s or 10 kPa apart and include each of its corners.
     """
 
     unit: Unit
@@ -94,7 +94,7 @@ class Job:
                 raise InputError(what, where, remedy)
 
     def _refusals(self) -> Iterator[tuple[bool, str, str, str]]:
-        """Pairs of settings that exclude each other: whether they are given, what, where and what to do."""
+        """Pairs of settings that exclude each other: True if both are given, then what, where and remedy."""
         places, simulates = "place" in self.stages, "simulate" in self.stages
         without, one = "the search of the whole lattice does not support", "leave one of them out"
         graph = places and self.paths == "graph"
@@ -270,11 +270,11 @@ class Job:
         return {**self.texts(), **files, NAME: compose(tables, {**self._run, **run})}, True
 
     def obstacles_text(self) -> str:
-        """obstacles.obj: the rigid bodies that the unit may touch; empty where there are none."""
+        """obstacles.obj: the rigid bodies that the unit may touch; empty without any."""
         return to_obj(self.obstacles) if self.obstacles else ""
 
     def mesh_settings(self, settings: MeshSettings) -> MeshSettings:
-        """Settings of a mesh: of the whole unit where an obstacle is not its own mirror image."""
+        """Settings of a mesh: of the whole unit if an obstacle is not symmetric."""
         if not self.obstacles or mirrored(self.obstacles):
             return settings
         return attrs.evolve(settings, fraction="full")
@@ -391,12 +391,12 @@ def _built(kind: Any, values: dict[str, Any], where: str) -> Any:
 
 
 def grasp() -> Protocol:
-    """The protocol that comes with the package."""
+    """The default protocol."""
     return read_protocol(asset_root() / GRASP)
 
 
 def protocol_of(path: str | Path | None) -> Protocol:
-    """The protocol in a CSV file, or the one that comes with the package. Raises InputError."""
+    """The protocol in a CSV file, or the default one. Raises InputError."""
     return grasp() if path is None else read_protocol(Path(path))
 
 
@@ -423,10 +423,10 @@ def require_paths_inside(unit: Unit, body: Body, stages: Sequence[str], paths: s
 def obstacles_for(
     unit: Unit, files: Sequence[tuple[str | Path, float | None]], own: Body | None = None
 ) -> tuple[RigidBody, ...]:
-    """Rigid bodies from files, each with its friction or None for the assumed one, beside a unit.
+    """Rigid bodies next to a unit, from files, each with its friction or None for the assumed one.
 
-    own: the unit's body where it is not the lattice's box. Raises InputError, also where a body stands in
-    the unit at rest.
+    own: the unit's body, if it is not the lattice's box. Raises InputError, also if a body overlaps the unit
+    at rest.
     """
     found = [RigidBody(read_body(file), FRICTION.default if mu is None else mu) for file, mu in files]
     require_beside(found, unit.dimensions, own)

@@ -1,4 +1,4 @@
-"""The light signal of each candidate path: its change with bending, beside the deviation."""
+"""The light signal of each candidate path: its change with bending."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
     """Anchors' numbers and waveguide of every candidate path; one without room for it is left out with a
     warning.
 
-    Raises InputError where there is room for none.
+    Raises InputError if no path has room.
     """
     unit = study.job.unit
     found, why = {}, None

@@ -34,8 +34,8 @@ def solve_model_a(
 ) -> tuple[Trajectory, ContactHistory | None]:
     """Motion of a model at samples of time (k,) in s and pressure (k,) in kPa, and contacts with obstacles.
 
-    on_progress: called with the finished share and words on each state, before on_state is called with it.
-    Raises ConvergenceError.
+    on_progress: called with the finished share and a text on each state, before on_state. Raises
+    ConvergenceError.
     """
     if job.in_time:
         return _in_time(job, cache, model, samples, on_progress, on_state)

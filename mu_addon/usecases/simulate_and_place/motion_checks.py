@@ -1,4 +1,4 @@
-"""Checks for doubtful results of a study: each gives figures for the summary, and warnings in words."""
+"""Checks for doubtful results of a study: each gives figures for the summary, and warnings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HOMOGENISED = (
 
 
 def doubts_of_job(job: Job) -> Iterator[str]:
-    """Warnings on what the settings of a simulation leave out."""
+    """Warnings on the omissions of a simulation's settings."""
     # Uniform samples miss the protocol's extremes.
     corners, samples = job.protocol.pressure_kPa, job.supplied_kPa
     for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):

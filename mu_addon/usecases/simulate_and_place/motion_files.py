@@ -47,7 +47,7 @@ IMAGE = "image_"
 # Of a state, at the nodes of each region's surface. Stresses are Cauchy's.
 FIELDS = ("von_mises_kPa", "largest_principal_stress_kPa", "largest_stretch", "smallest_stretch")
 CONTACT_PRESSURE = "contact_pressure_kPa"
-"""Pressure of self-contact of a state, between pieces of the unit's own surface."""
+"""Pressure of self-contact of a state, between pieces of the unit's surface."""
 # A path's motion is written only where its own file is named so.
 _NOT_PATHS = ("mesh", MODEL_A, "sensitivity")
 
@@ -176,7 +176,7 @@ class Motion:
         return found
 
     def _between(self, found: dict[str, Array], key: str) -> Array | None:
-        """A path's differences at all of Model A's states, or None if its file has none of that name."""
+        """A path's differences at all of Model A's states, or None if its file lacks that name."""
         if key not in found:
             return None
         known = found["state_kPa"]

@@ -1,4 +1,4 @@
-"""Effects named by measured data that a simulation of the unit can contain beside its parameters."""
+"""Effects named by measured data that are part of a simulation, not parameters of the unit."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ _NONE: Values = MappingProxyType({})
 class NamedEffects:
     """Parameters of each effect by name, and the direction of gravity about x: at 0 the tip hangs down.
 
-    Effects of `STATIC` change the model, those of `IN_TIME` the effective pressure. An effect whose size, its
-    first parameter, is at its null is none, and left out. Raises InputError for an unknown name or parameter
-    and for a value out of bounds. where: a table's name, for that error.
+    Effects of `STATIC` change the model, those of `IN_TIME` the effective pressure. An effect whose first
+    parameter, its size, is at its null is left out. Raises InputError for an unknown name or parameter and
+    for a value out of bounds. where: a table's name, for that error.
     """
 
     values: Values = attrs.field(default=_NONE)
@@ -167,7 +167,7 @@ class NamedEffects:
         return (self.tables,) if self else ()
 
     def words(self) -> list[str]:
-        """Each effect in words."""
+        """Each effect as text."""
         return [_in_words(name, given) for name, given in self.values.items()]
 
     def materials(self, base: Materials, mesh: Mesh) -> Materials:
@@ -221,8 +221,7 @@ def parameters_of(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | No
 def law_within(name: str, given: Iterable[str]) -> tuple[Parameter, ...] | None:
     """Law of a unit's effect whose parameters are all among those given; None without one.
 
-    Parameters of another kind of experiment may be beside them; of several laws the one with most parameters
-    is taken.
+    Parameters of other kinds of experiment are ignored; of several laws the one with most parameters is used.
     """
     names = set(given)
     whole = [law for law in _laws(name) if {p.name for p in law} <= names]
@@ -234,7 +233,7 @@ def _null(name: str) -> float:
 
 
 def _in_words(name: str, given: Mapping[str, float]) -> str:
-    """An effect in words, its size included."""
+    """An effect with its size, as text."""
     if name == "viscoelasticity" and "share" in given:
         return f"all moduli relax by {given['share']:.1%}, with a time constant of {given['time_s']:.3g} s"
     if name == "viscoelasticity" and "spread_share" in given:

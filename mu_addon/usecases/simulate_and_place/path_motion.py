@@ -33,8 +33,8 @@ def keep_motion(
 ) -> None:
     """Write the motion of every path whose displacement a sweep on a mesh has kept. Raises OutputError.
 
-    own: the study's mesh; mesh: the same, or that of the whole body of which it is a half. on_progress:
-    called with the finished share.
+    own: the study's mesh; mesh: the same, or the whole body's if that is a half. on_progress: called with the
+    finished share.
     """
     unit = job.unit
     image = images(own, mesh)

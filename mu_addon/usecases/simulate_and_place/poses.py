@@ -1,8 +1,8 @@
 """The simulated unit at a measured bending angle, interpolated between Model A's states.
 
-Under pressure alone the elastic unit has one state a pressure. Where its angle rises with pressure from rest,
-an angle belongs to one state. Beyond the first turn it would belong to two, so that the twin shows nothing
-there. Between two states displacements go straight, as the motion on the timeline does.
+Under pressure alone the elastic unit has one state a pressure. While its angle rises with pressure from rest,
+each angle has one state. Beyond the first turning point it would have two, so the twin shows nothing there.
+Between two states displacements go straight, as the motion on the timeline does.
 """
 
 from __future__ import annotations

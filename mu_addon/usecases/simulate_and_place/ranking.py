@@ -88,7 +88,7 @@ def mesh_change_mm(
     """Largest change of any path's J_hat in mm on a coarser mesh.
 
     instants: those of the fine mesh that the coarse one was solved at; the relative change of the deviation
-    there stands for that of J_hat. Raises ConvergenceError if none of them is compared on both.
+    there is used as that of J_hat. Raises ConvergenceError if none of them is compared on both.
     """
     change = 0.0
     for found in coarse:

@@ -80,7 +80,7 @@ def _headline(r: ReportData) -> str:
         "Left: the unit cut open along the plane in which it bends, inlet below, with anchors P1 to "
         f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
         + (", with its mean deviation in mm." if found is not None else "."),
-        "Section of the unit, and the candidate paths beside it"
+        "Section of the unit, and the candidate paths"
         + (f"; the chosen path {chosen} runs through anchors {path.anchors}." if chosen else "."),
     )
     return f'{html}<div class="lead">{section}{pictures}</div>'

@@ -45,7 +45,7 @@ FILES = {
     "deviation.csv": "deviation and rank of every path",
     "delta.npz": "deviation over time and length of every path, mm",
     "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
-    "signals.csv": "light signal of each path beside its deviation",
+    "signals.csv": "light signal of each path, and its deviation",
     "paths.csv": "every path of the lattice: length, predicted and, where it was solved, exact deviation",
     "motion": "displacement, stress and stretch of every state, with and without a sensor, for display",
     "summary.json": "all results of this run as numbers",
@@ -76,7 +76,7 @@ def write_report(study: Study, stopped: str = "") -> None:
 
 
 def _panel_pictures(study: Study) -> None:
-    """Write pictures of the study's answers for panels, beside its motion."""
+    """Write pictures of the study's results for panels, into its folder of the motion."""
     from .charts import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
@@ -89,7 +89,7 @@ def _panel_pictures(study: Study) -> None:
 
 
 def _of_model(study: Study) -> list[str]:
-    """Changes that an extended model made to the unit, and those that were left out, in words."""
+    """Changes that an extended model made to the unit, and those that were left out, as text."""
     model = study.context.summary.get("model", {})
     return [
         *(f"Applied from the extended model: {words}." for words in model.get("applied", ())),
@@ -183,7 +183,7 @@ def _parameters(study: Study) -> list[Parameter]:
 
 
 def _effect_words(effects: NamedEffects) -> list[str]:
-    """Other effects on the unit, in words."""
+    """Other effects on the unit, as text."""
     turned = (
         [f"gravity turned {effects.orientation_deg:g}° about x, 0 being the tip down"]
         if effects.has_gravity
@@ -193,7 +193,7 @@ def _effect_words(effects: NamedEffects) -> list[str]:
 
 
 def _effects(effects: NamedEffects) -> list[Parameter]:
-    """Size of every effect beside the unit's parameters, and the direction of gravity if it matters."""
+    """Sizes of effects that are no parameters of the unit, and the direction of gravity if it matters."""
     rows = [
         Parameter(f"effects.{name}.{p.name}", given[p.name], p.unit, f"the model given: {words}")
         for (name, given), words in zip(effects.values.items(), effects.words(), strict=True)
@@ -268,9 +268,9 @@ def _pictures(study: Study) -> tuple[SideView | None, list[Picture]]:
 
 
 def _painted(study: Study, field: str, low: float, least: float, word: str) -> PaintedStates | None:
-    """The states of least and largest pressure painted by a field from `low` on; None where there is none.
+    """The states of least and largest pressure painted by a field from `low` on; None without such a field.
 
-    least: by how much the scale exceeds `low` at least; word: what the field is called.
+    least: smallest extent of the scale above `low`; word: name of the field.
     """
     from ...report.heatmaps import field_colors
     from ...report.unit_pictures import motion

@@ -20,7 +20,7 @@ from .study_file import LAYOUT
 
 
 def simulate_and_place(job: Job, folder: Path, context: RunContext) -> Study:
-    """Run a study's stages in its own folder, and report the finished ones."""
+    """Run a study's stages in its folder, and report the finished ones."""
     study = Study.begun(job, folder, context)
     context.report = lambda stopped: write_report(study, stopped)
     run_stages(study)

@@ -13,7 +13,7 @@ from .motion_files import Motion, Skin
 Array = np.ndarray[Any, Any]
 
 FARTHEST = 0.05
-"""Share of the other mesh's largest extent beyond which points outside of it are not compared."""
+"""Points farther outside the other mesh than this share of its extent are not compared."""
 _LEAST_SHARE = 0.5
 """Least share of the points in or near the other mesh; with less, the units are not comparable."""
 

@@ -83,7 +83,7 @@ class Study:
 
     @classmethod
     def begun(cls, job: Job, folder: Path, context: RunContext) -> Study:
-        """A study in a folder already its own; its inputs are in the summary.
+        """A study in a folder that is already the run's; its inputs are in the summary.
 
         Raises OutputError if the disk has too little room.
         """
@@ -232,7 +232,7 @@ class Study:
         return self.trajectory
 
     def _solving(self, stage: str) -> float:
-        """Share of a stage's time until its last equilibrium; the rest goes into tables, fields and files."""
+        """Share of a stage's time until its last equilibrium; the rest is for tables, fields and files."""
         assert self.mesh is not None
         homogenised, printed = SOLVING[stage]
         return printed if self.mesh.resolved else homogenised
@@ -247,14 +247,14 @@ class Study:
             self._ahead.reached(state)
 
     def _keep_partial_motion(self) -> None:
-        """Write the motion found before a failure; summary.json says that it is partial."""
+        """Write the motion found before a failure; it is partial in summary.json."""
         if self.mesh is not None and self.states:
             start = [] if self.job.in_time or self.job.effects.has_gravity else [rest(self.mesh)]
             states = [*start, *self.states]
             self.context.summary["angle_deg"] = write_motion(self.folder, self.job, self.mesh, states)
 
     def _write_motion(self, model: Model, trajectory: Trajectory) -> None:
-        """Write the tables of a finished motion, and look for what makes it doubtful."""
+        """Write the tables of a finished motion, and check it for doubtful results."""
         job, folder, mesh, states = self.job, self.folder, model.mesh, trajectory.solved
         summary = self.context.summary
         summary["angle_deg"] = write_motion(folder, job, mesh, states)

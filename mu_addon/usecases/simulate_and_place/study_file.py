@@ -63,7 +63,7 @@ def compose(tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any] = Ma
 
 
 def read(folder: Path) -> Tables | None:
-    """The tables of a folder's study.toml by stage, or None where there is none.
+    """The tables of a folder's study.toml by stage, or None without the file.
 
     Raises InputError for one that cannot be used, or that another version of this program wrote.
     """
@@ -74,7 +74,7 @@ def read(folder: Path) -> Tables | None:
 
 
 def read_run(folder: Path) -> dict[str, Any]:
-    """The table [run] of a folder's study.toml; empty where there is none. Raises InputError."""
+    """The table [run] of a folder's study.toml; empty without it. Raises InputError."""
     found = parse_toml(_text(folder / NAME), str(folder / NAME)).get(RUN, {})
     if not isinstance(found, dict):
         raise InputError(f"{RUN} is not a table", str(folder / NAME), f"write it as [{RUN}]")

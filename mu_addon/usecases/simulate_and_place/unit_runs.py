@@ -1,9 +1,9 @@
-"""The runs of one unit: every study made of it, each in a separate folder.
+"""The runs of one unit: every study of it, each in a separate folder.
 
-A unit has a home folder. Its runs lie in `runs/` there, each named by the hash of its inputs, so that the
-same inputs find the same folder again and other inputs never touch it. A study in the home folder itself, and
-what its next study has set aside in `stale/`, are of an older version, and are listed with the others. What
-the user calls a run, and whether it is starred, is in its folder's `label.toml`.
+A unit has a home folder. Its runs are in `runs/` there, each named by the hash of its inputs: the same inputs
+find the same folder, and other inputs never change it. A study in the home folder itself, and what its next
+study has set aside in `stale/`, are of an older version, and are listed with the others. A run's name and
+star are in its folder's `label.toml`.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Run:
 
     @property
     def found(self) -> str:
-        """Progress of the run in words."""
+        """Progress of the run, as text."""
         if "chosen" in self.summary:
             return "ranking complete"
         # The figures of the solver come with the last state.
@@ -247,7 +247,7 @@ def read_run(folder: Path) -> Run:
 
 
 def best_of(found: Sequence[Run], design: str) -> Run | None:
-    """Run whose results are shown for a design: the best of those made of it, or else the latest of all.
+    """Run whose results are shown for a design: the best of its runs, or else the latest of all.
 
     Complete before incomplete, printed struts before a homogenised lattice, a finer mesh before a coarser
     one, a ranking before the motion alone, then the latest. A run that has just begun is shown only if there
@@ -264,8 +264,8 @@ def best_of(found: Sequence[Run], design: str) -> Run | None:
 def place_of(home: Path, job: Job) -> tuple[Path, Job]:
     """Folder of a unit's home in which a job is run, and the job with the name that its unit has there.
 
-    A run from the same inputs shares it, also with fewer or more stages: finished stages are kept, and a new
-    name makes no result stale.
+    Runs of the same inputs share it, also with fewer or more stages: finished stages are kept, and renaming
+    makes no result stale.
     """
     own = _tables(job.tables(), job.unit)
     for run in runs(home):
@@ -333,7 +333,7 @@ def _own(run: Run) -> list[Path]:
 def move_home(old: Path, new: Path) -> bool:
     """Move a unit's whole home to another path; return False while a run works in it.
 
-    Nothing is moved where there is something already. Raises OutputError.
+    An existing folder is not replaced. Raises OutputError.
     """
     if not old.is_dir() or new.exists():
         return False

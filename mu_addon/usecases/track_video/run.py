@@ -57,8 +57,7 @@ class MarkerSettings:
     """Settings of the markers for a tracker.
 
     pixels: position of each by name in the first frame, right and down from the upper left corner; kind: one
-    of `MARKER_KINDS`; pattern_px: side of the square that is compared; search_px: of the one that is
-    searched.
+    of `MARKER_KINDS`; pattern_px: side of the compared square; search_px: side of the searched square.
     """
 
     pixels: Mapping[str, tuple[float, float]]
@@ -71,7 +70,7 @@ class MarkerSettings:
 class Bench:
     """Setup of a video: the view, the markers, the clock, and keys of the experiment.
 
-    fps: frames a second, the clip's own where it is None; starts_s: the pressure's clock at the first frame.
+    fps: frames a second, None for the clip's; starts_s: the pressure's clock at the first frame.
     """
 
     view: View
@@ -96,7 +95,7 @@ class Filmed:
 
 
 def read_bench(path: Path) -> Bench:
-    """Read a TOML file that describes a video; raises InputError with line and what to do."""
+    """Read a TOML file that describes a video; raises InputError with line and remedy."""
     try:
         text = file_text(path)
     except (OSError, UnicodeDecodeError) as error:
@@ -230,8 +229,8 @@ def read_pressure(path: Path) -> tuple[Array, Array]:
 def filmed(tracks: Tracks, bench: Bench, pressure: tuple[Array, Array], where: str = "") -> Filmed:
     """An experiment from followed markers and the pressure (time in s, kPa) of the same time.
 
-    Frames outside the pressure's record are left out. Raises InputError for a clip without a clock, one that
-    does not meet the record, and a view that does not fit.
+    Frames outside the pressure's record are left out. Raises InputError for a clip without a clock or outside
+    the record's time, and a view that does not fit.
     """
     remarks = list(tracks.remarks)
     fps = bench.fps if bench.fps is not None else tracks.fps

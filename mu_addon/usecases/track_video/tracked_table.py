@@ -1,4 +1,4 @@
-"""Tables of tracked markers: our own, and those that other trackers export.
+"""Tables of tracked markers: in this program's layout, and as exported by other trackers.
 
 A table has either a column of x and one of y for each marker, or a row for each marker and frame. The
 markers are named by the titles (`NAME right_px`, `NAME x`, `NAME.x`), the row above them (DeepLabCut) or a
@@ -59,8 +59,8 @@ _LAYOUTS = (
 class _Layout:
     """Position of everything in a table.
 
-    heading: its row among the lines; markers: columns of x and y by name, "" where the rows have names;
-    likelihood: its column by name; own: the layout that this program writes.
+    heading: row of the titles; markers: columns of x and y by name, "" if the rows have names; likelihood:
+    its column by name; own: True for this program's layout.
     """
 
     heading: int
@@ -75,7 +75,7 @@ class _Layout:
 def read_pixels(path: Path) -> Tracks:
     """Markers in a table of pixels; raises InputError with line and remedy.
 
-    Our own layout has `NAME right_px` and `NAME down_px`, one row a frame, empty where a marker was lost;
+    This program's layout has `NAME right_px` and `NAME down_px`, one row a frame, empty if a marker was lost;
     time_s, if present, is the time of each. Tables of other trackers need x to the right and y downward.
     """
     try:
@@ -139,7 +139,7 @@ def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tupl
 
 
 def _above(row: Sequence[str], k: int) -> str:
-    """Name in a row above column k, at the left of it where the cell is empty."""
+    """Name in a row above column k, or to the left if that cell is empty."""
     return next((row[n] for n in range(min(k, len(row) - 1), 0, -1) if row[n]), "")
 
 
@@ -153,7 +153,7 @@ def _paired(
             raise InputError(
                 f"two columns hold the {'xy'[axis]} of {name or 'a marker without a name'}",
                 where,
-                "give each marker a name of its own, in the titles or the row above",
+                "give each marker a different name, in the titles or the row above",
             )
         columns[name][axis] = k
     for name, axes in columns.items():
@@ -256,7 +256,7 @@ class _Table:
                 Remark(
                     f"{(~kept).sum()} rows without {layout.titles[layout.id]} were left out",
                     self.where,
-                    "assign them to a track where they belong to one",
+                    "assign them to a track",
                 )
             )
         ids = {name: m for m, name in enumerate(dict.fromkeys(name for name in names if name))}
