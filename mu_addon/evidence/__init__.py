@@ -1,8 +1,9 @@
-"""Evidence: measured data against the model: what is wrong, how sure, and what correcting it gains.
+"""Evidence: measured data against the model: causes of the misfit, their significance, and the gain by
+correcting them.
 
 `diagnose` takes experiments and a `Simulator` of them and returns a `Verdict`: the effects that explain the
 misfit, those that cannot be told apart, the gain on data held out, and the experiment to make next. An
-`Effect` is a mechanism with parameters that leave the model as it is at their null.
+`Effect` is a mechanism with parameters that leave the model unchanged at their null.
 """
 
 from typing import TYPE_CHECKING

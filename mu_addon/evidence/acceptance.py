@@ -1,4 +1,4 @@
-"""Acceptance of an effect: significant, better on left-out data, and nothing simpler that explains more."""
+"""Acceptance of an effect: significant, better on left-out data, and no simpler cause explains more."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ALONE = 0.9
 
 
 def accepted(fitter: Fitter, found: Selection, less: Fit, more: Fit, p: float) -> bool:
-    """Return True if the last effect of a model may be named beside a model without it.
+    """Return True if the last effect of a model may be named, compared with a model without it.
 
     p: probability that noise alone gains as much, over all effects and owners tried. No value may lie at a
     bound, left-out data must be predicted better, and neither a step change nor a curved gauge may explain
@@ -45,14 +45,14 @@ def accepted(fitter: Fitter, found: Selection, less: Fit, more: Fit, p: float) -
 
 
 def of_the_law(less: Fit, more: Fit, taken: float) -> bool:
-    """Return True if an effect gains as little beside others as an error of their own law would."""
+    """Return True if an effect gains as little beside others as an error of their laws would."""
     return more.names[-1] != NUMERICS and less.chi2 - more.chi2 < LAW**2 * taken
 
 
 def doubts(
     fitter: Fitter, table_base: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0
 ) -> str:
-    """Reason to doubt a fit's effects although they fit, in words; empty without one.
+    """Reason to doubt a fit's effects although they fit, as text; empty without one.
 
     margin: see `sudden`.
     """
@@ -62,7 +62,7 @@ def doubts(
 
 
 def _too_large(chosen: Fit) -> str:
-    """Effect whose size would exceed its bound, in words; empty if there is none."""
+    """Effect whose size would exceed its bound, as text; empty if there is none."""
     for e in chosen.effects:
         if value_at_a_bound(e.parameters[0], chosen.values[e.keys[0]]):
             return f"{e.name} would have to be larger than its bound allows"
@@ -70,7 +70,7 @@ def _too_large(chosen: Fit) -> str:
 
 
 def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 0.0) -> str:
-    """Sudden change that explains more than the chosen effects, in words; empty if there is none.
+    """Sudden change that explains more than the chosen effects, as text; empty if there is none.
 
     By Akaike's criterion; its moment counts as one parameter besides its sizes. margin: of chi squared, by
     which the effects must be better.
@@ -89,7 +89,7 @@ def sudden(table: Sequence[Dependence], base: Fit, chosen: Fit, margin: float = 
 
 
 def too_far(fitter: Fitter, fit: Fit) -> str:
-    """Excess of a fit's error over any noise that the readings show, in words; empty without one."""
+    """Excess of a fit's error over any noise that the readings show, as text; empty without one."""
     found = excess(fitter.record, fitter.record.values - fitter.predict(fit.values))
     if found is None:
         return ""
@@ -100,11 +100,11 @@ def too_far(fitter: Fitter, fit: Fit) -> str:
 
 
 def loss(fitter: Fitter, less: Fit, more: Fit) -> float:
-    """Rise in chi squared of experiments left out in turn, of a model over one with an effect more.
+    """Rise in chi squared of experiments left out one by one, of a model over one with one more effect.
 
     An experiment with most of the information on the effects is left out in parts. Prior knowledge counts as
-    an experiment. Of an effect that differs among owners every second quarter of the records is left out, as
-    each owner's value is in its own records alone.
+    an experiment. For an effect that differs among owners every second quarter of the records is left out,
+    since only an owner's records determine its value.
     """
     if more.effects[-1].among:
         lost, folds = 0.0, _quarters(fitter)

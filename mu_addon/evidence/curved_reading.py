@@ -1,4 +1,4 @@
-"""Test of whether a curved gauge explains more than the chosen effects."""
+"""Test: does a curved gauge explain more than the chosen effects?"""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ ONE_EFFECT = 9.2
 
 
 def curved_reading(fitter: Fitter, base: Fit, chosen: Fit) -> str:
-    """Readings that would explain more than the effects if their gauge were curved, in words; else empty.
+    """Readings that would explain more than the effects if their gauge were curved, as text; else empty.
 
-    A channel's reading is taken as y + a |y| + b y**2 of its prediction y without effects: a change of slope
-    at zero, and one with size. Both sizes are fitted with the nuisances, and compared with the chosen effects
-    by Akaike's criterion; several effects that act on one curve imitate most others.
+    A channel's reading is modelled as y + a |y| + b y**2 of its prediction y without effects: a change of
+    slope at zero, and a change with size. Both sizes are fitted with the nuisances and compared with the
+    chosen effects by Akaike's criterion. Several effects on one curve imitate most others.
     """
     if chosen is base:
         return ""
@@ -46,7 +46,7 @@ def curved_reading(fitter: Fitter, base: Fit, chosen: Fit) -> str:
 def _chi2(fitter: Fitter, base: Fit, rows: Array) -> float:
     """Chi squared of the base model with curved readings in some rows (N, 1), 1 there and 0 elsewhere.
 
-    inf where the nuisances that belong to them have no prediction.
+    inf if there is no prediction at their nuisances.
     """
     values, curved, found = dict(base.values), fitter.curved, math.inf
     known = np.zeros((len(fitter.known), 2 + len(curved)))

@@ -1,4 +1,4 @@
-"""Detection limits of effects, by data made with them: what the base model leaves of each."""
+"""Detection limits of effects, by simulated data: the misfit that the base model leaves of each."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ LEFT, RAISED = 0.8, 1.4
 def at_bounds(fitter: Fitter, values: Mapping[str, float], found: Sequence[Sensitivity]) -> list[Sensitivity]:
     """The same sensitivities, with `at_bounds` computed for effects not visible to first order.
 
-    The base model is fitted to the prediction at each bound of the size, and `at_bounds` is the root of the
-    chi squared left (no unit) beyond that without the effect. Bounds without a solution are skipped.
+    The base model is fitted to the prediction at each bound of the size. `at_bounds` is the root of the chi
+    squared (no unit) in excess of that without the effect. Bounds without a solution are skipped.
     """
     judged, plain = [], _missed(fitter, values, values)
     for s in found:
@@ -41,10 +41,10 @@ def with_true_limits(
 ) -> list[Sensitivity]:
     """The same sensitivities, the limit of each effect's best shape at least where data made with it differ.
 
-    To first order nuisances absorb an effect as much as a small one; a large one they may follow further, as
-    another modulus does a thinner wall. The base model is fitted to the prediction with the effect of its
-    limit, of either sign, and the limit raised until that leaves `LEFT` of its delta chi squared; to infinity
-    beyond the effect's bounds. values: of the nuisances, by name and in their units.
+    The first-order limit assumes that nuisances absorb the same share at every size. They may absorb more of
+    a large effect, as another modulus does of a thinner wall. The base model is fitted to the prediction with
+    the effect at its limit, of either sign. The limit is raised until `LEFT` of its delta chi squared
+    remains, or to infinity beyond the effect's bounds. values: of the nuisances, by name and in their units.
     """
     best = {id(s) for s in best_seen(found).values()}
     judged, plain = [], _missed(fitter, values, values)
@@ -65,9 +65,9 @@ def with_true_limits(
 
 
 def _missed(fitter: Fitter, values: Mapping[str, float], truth: Mapping[str, float]) -> float:
-    """Chi squared of the base model's fit, from values, to the prediction of others; inf where there is none.
+    """Chi squared of the base model's fit, started at values, to the prediction of others; inf without a fit.
 
-    Without noise, so that of the values themselves it is what these cost by prior knowledge.
+    Without noise: for the values themselves it is their cost by prior knowledge.
     """
     try:
         imagined = attrs.evolve(fitter.record, values=fitter.predict(truth))

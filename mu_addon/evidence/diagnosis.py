@@ -1,4 +1,4 @@
-"""A diagnosis: its steps in order, each from where it stands to where it stands then, and its verdict."""
+"""A diagnosis: its steps in order, each from one state of the diagnosis to the next, and its verdict."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ ROUNDS = 3
 
 @attrs.frozen(eq=False)
 class Diagnosis:
-    """Where a diagnosis stands: the data that count, their noise (in the fitter), and what explains them.
+    """State of a diagnosis: the data in use, their noise (in the fitter), and their explanation.
 
-    again: see `drive.denoised_drives`. set_aside: readings left out, and other remarks, in words. seen:
+    again: see `drive.denoised_drives`. set_aside: texts on readings left out, and other remarks. seen:
     sensitivities of the effects. graded: the causes are named although structure is left
     (`main_causes.mainly`).
     """
@@ -91,11 +91,11 @@ class Diagnosis:
         return verdict_kind(self.chosen, self.fitter.curved, self.graded)
 
     def without(self, experiments: Sequence[Experiment], words: Sequence[str]) -> Diagnosis:
-        """With experiments from which readings were taken, and these in words."""
+        """With experiments from which readings were removed, and these as text."""
         return attrs.evolve(self, experiments=tuple(experiments), set_aside=(*self.set_aside, *words))
 
     def under(self, fitter: Fitter, progress: Progress, found: Selection | None = None) -> Diagnosis:
-        """With another fitter: effects are selected anew, or those of a selection are judged again."""
+        """With another fitter: effects are selected again, or those of a selection are judged again."""
         seen = _seen(fitter, fitter.fit())
         chosen = reselected(fitter, seen, found) if found else select(fitter, seen, progress)
         return attrs.evolve(self, fitter=fitter, seen=seen, chosen=chosen)
@@ -126,7 +126,7 @@ def begun(experiments: Sequence[Experiment], simulator: Composite, progress: Pro
 
 
 def under_quieter_noise(now: Diagnosis, progress: Progress) -> Diagnosis:
-    """Select anew while the noise around the causes is much quieter.
+    """Select again while the noise around the causes is much smaller.
 
     Around the base model a large cause differs from its slope: it had counted as noise, which hides a second
     cause, or another first one.
@@ -143,7 +143,7 @@ def under_quieter_noise(now: Diagnosis, progress: Progress) -> Diagnosis:
 
 
 def without_lone_readings(now: Diagnosis, progress: Progress) -> Diagnosis:
-    """Set aside readings that stand alone beside causes: beside a large misfit they are not seen."""
+    """Set aside isolated readings once causes are in the model: a large misfit hides them."""
     if now.chosen.causes and now.kind == "unexplained":
         simulator = now.fitter.simulator
         fewer, words = without_unpredicted_readings(now.experiments, simulator, now.chosen.chosen.values)
@@ -185,7 +185,7 @@ def under_renewed_noise(now: Diagnosis, progress: Progress) -> Diagnosis:
 
 
 def without_outlying_readings(now: Diagnosis, progress: Progress) -> Diagnosis:
-    """Set aside outliers where nothing else is left then; unchanged where there were more faults."""
+    """Set aside outliers if no other structure is left; unchanged if there are more faults."""
     later = now
     for _ in range(ROUNDS):
         found, simulator = later.chosen, later.fitter.simulator
@@ -203,8 +203,8 @@ def without_outlying_readings(now: Diagnosis, progress: Progress) -> Diagnosis:
 def under_bursts(now: Diagnosis, progress: Progress) -> Diagnosis:
     """Judge causes, or a misfit, under noise that comes in bursts or grows with load; unchanged without.
 
-    Such noise is largest where laws of the material differ most. Causes that are significant under it stay,
-    and so does a misfit that is structure both beside all causes and beside none.
+    Such noise is largest where laws of the material differ most. Causes that are significant under it stay. A
+    misfit stays if it has structure both with all causes and with none.
     """
     found, simulator, unexplained = now.chosen, now.fitter.simulator, now.kind == "unexplained"
     if now.graded or not (unexplained or found.causes):
@@ -231,7 +231,7 @@ def under_bursts(now: Diagnosis, progress: Progress) -> Diagnosis:
 
 
 def with_what_explains_most(now: Diagnosis, progress: Progress) -> Diagnosis:
-    """Name what takes most of an unexplained misfit; fast errors of its law would pass for bursts."""
+    """Name the cause of most of an unexplained misfit; fast errors of its law would look like bursts."""
     if now.kind == "unexplained" and not _of_no_size(now.fitter, now.chosen):
         most = mainly(now.fitter, now.chosen)
         now = attrs.evolve(now, chosen=most, graded=True) if most else now
@@ -271,8 +271,8 @@ def diagnose(
 
     experiments: from `measured.read_folder`; those with the role "held_out" are used for the gain alone.
     simulator: of their kinds. progress: called with the step in progress. Noise is estimated first and the
-    residuals whitened; every effect of the library is then fitted as a rival, and one is named only where it
-    is significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
+    residuals are whitened. Then every effect of the library is fitted as a rival. One is named only if it is
+    significant, predicts left-out experiments better and leaves no structure. Raises InputError where no
     experiment can be predicted, and where `require_plausible` does.
     """
     now = begun(experiments, simulator, progress)
@@ -343,8 +343,8 @@ def noise_of(
     """White and slow noise of a record, by group of series in its channel's unit (see `noise.estimate`).
 
     values: of nuisances and effects by key, in their units, around which the noise is estimated; those of the
-    base model's fit where None. Changes by any effect of the library, and by those of `effects`, do not count
-    as noise; nor does what exceeds a stated accuracy.
+    base model's fit where None. Changes by effects of the library and of `effects` do not count as noise, nor
+    does a deviation beyond a stated accuracy.
     """
     if values is None:
         rough = Fitter(measured, simulator, {g: _rough(measured, g) for g in measured.groups})
@@ -363,7 +363,7 @@ def _rough(measured: Record, group: str) -> Source:
 
 
 def _seen(fitter: Fitter, base: Fit) -> list[Sensitivity]:
-    """Sensitivity to each effect of the library beside the base model's values."""
+    """Sensitivity to each effect of the library at the base model's values."""
     curved = {p.name: base.values[p.name] for p in fitter.curved}
     return at_bounds(fitter, curved, sensitivities(fitter, curved))
 
@@ -374,10 +374,10 @@ def _noise_around(now: Diagnosis) -> dict[str, Source]:
 
 
 def _of_no_size(fitter: Fitter, found: Selection) -> str:
-    """Reason why a misfit is none, in words: as small as the scatter, with no cause but a record's zero.
+    """Reason to dismiss a misfit, as text: as small as the scatter, with no cause but a record's zero.
 
-    Slow noise differs from record to record, as zeros do; none depends on how a unit is turned, which is read
-    at rest, and none alternates.
+    Slow noise differs between records, as zeros do. It neither depends on a unit's orientation, which is read
+    at rest, nor alternates.
     """
     left = fitter.record.values - fitter.predict(found.base.values)
     drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)

@@ -53,9 +53,9 @@ def denoised(time_s: Array, values: Array, sd: float | None = None) -> Array:
     """Readings (n,), in their unit, freed of white noise by local straight lines; corners are kept.
 
     time_s (n,): times in s. sd: standard deviation of the noise in the unit of the readings, that of
-    `reading_noise` where it is None. At each sample a line is fitted to windows before it, after it and
-    around it, each as wide as agrees with all narrower ones; the three estimates are averaged with weights of
-    one over their variances. Source: Goldenshluger and Nemirovski 1997 (intersecting confidence intervals).
+    `reading_noise` where it is None. At each sample a line is fitted to windows before, after and around it,
+    each as wide as is consistent with all narrower ones. The three estimates are averaged with inverse
+    variances as weights. Source: Goldenshluger and Nemirovski 1997 (intersecting confidence intervals).
     """
     sd = reading_noise(time_s, values) if sd is None else sd
     weight, total = np.zeros(len(values)), np.zeros(len(values))
@@ -111,13 +111,13 @@ def _lines(time_s: Array, values: Array, before: int, after: int) -> tuple[Array
 def denoised_drives(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[Experiment] | None]:
-    """The experiments with their drives freed of gauge noise (`denoised`), and a copy with noise added anew.
+    """The experiments with denoised drives (`denoised`), and a copy with noise added again.
 
     Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
-    `FEWEST` rows and finite values. The copy holds the same drives with as much simulated noise, denoised
-    again, so that the misfit of a model driven by it to data made with the first list is due to the gauge's
-    noise alone. A drive in steps of a display is freed of them (`between_steps`), and its copy stays as read.
-    The copy is None where no drive is noisy.
+    `FEWEST` rows and finite values. The copy has the same drives with equal simulated noise, denoised again.
+    A model driven by it misfits data of the first list only by the gauge's noise. A drive in steps of a
+    display is freed of them (`between_steps`), and its copy stays as read. The copy is None where no drive is
+    noisy.
     """
     rng = np.random.default_rng(0)
     found, again = [], []

@@ -56,7 +56,7 @@ LIBRARY = {
     "pressure_gain": ("the pressure gauge has a gain error", "a dead load, or a second gauge"),
     "pressure_nonlinearity": (
         "the gauge's reading is not proportional to the pressure, by at most 5 % of its largest",
-        "the gauge beside another one, in steps up to the largest pressure",
+        "the gauge and a second one on the same pressure, in steps up to the largest",
     ),
     "pressure_drift": (
         "the zero of the pressure gauge drifts while it records",
@@ -64,7 +64,7 @@ LIBRARY = {
     ),
     FORCE_SCALE: (
         "the force is scaled: load cell, section as typed, clamping or specimen",
-        "a dead weight on the load cell, the section measured, the specimen clamped anew",
+        "a dead weight on the load cell, the section measured, the specimen clamped again",
     ),
     "force_nonlinearity": (
         "the load cell's reading is not proportional to the force, by at most 5 % of its largest",
@@ -91,7 +91,7 @@ LIBRARY = {
     "contact": ("the unit touches an obstacle", "the same protocol away from every obstacle"),
     "angle_offset": ("the camera's zero angle differs from the unit's", "a record at rest"),
     "angle_drift": (
-        "the camera turns slowly about its own axis",
+        "the camera rotates slowly about its optical axis",
         "a mark on the bench, in the same picture",
     ),
     "camera_scale": ("the scale of the camera's picture is wrong", "a ruler in the plane of the markers"),
@@ -101,8 +101,7 @@ LIBRARY = {
         "a square of known sides in the plane of bending",
     ),
     "camera_perspective": (
-        "the camera does not look at right angles to the plane of bending, so that what is nearer to it "
-        "looks larger",
+        "the camera does not look at right angles to the plane of bending, so that nearer parts look larger",
         "a square of known sides in the plane of bending; the camera from farther away",
     ),
     "lens_distortion": (
@@ -111,7 +110,7 @@ LIBRARY = {
     ),
     SLIP: (
         "a marker slips on the unit's surface at one moment and stays there",
-        "a mark drawn beside the marker; the marker glued anew, and the records after that moment again",
+        "a mark drawn next to the marker; the marker glued again, and the records after that moment repeated",
     ),
     "inertia": (
         "the unit's mass swings after each change of pressure",
@@ -135,14 +134,14 @@ LIBRARY = {
     ),
     BATCH: (
         "the modulus of one specimen, or its section as typed, differs from that of the others",
-        "another specimen in its place, its height and section measured, clamped anew",
+        "another specimen in its place, its height and section measured, clamped again",
     ),
     THICKNESS: (
         "the struts of a specimen are not as thick as drawn, or not those that were drawn",
         "struts of each specimen measured under a microscope, each specimen weighed",
     ),
     GEOMETRY: (
-        "a specimen's height is not what was typed, which scales its strain",
+        "a specimen's height differs from the entered one, which scales its strain",
         "the specimen measured with a calliper",
     ),
     STEP: (
@@ -177,8 +176,8 @@ SHOWN_BY = {
     ("gravity", "unit_pressure"): "one protocol in three orientations",
     ("gravity", "beam_deadweight"): "the beam upside down",
     ("frame_compliance", "beam_deadweight"): "one load on beams of two lengths",
-    ("pressure_gain", "unit_pressure"): "a second gauge beside the first",
-    ("pressure_gain", "pressure_hold"): "a second gauge beside the first",
+    ("pressure_gain", "unit_pressure"): "a second gauge on the same pressure",
+    ("pressure_gain", "pressure_hold"): "a second gauge on the same pressure",
     ("pressure_offset", "pressure_hold"): "the gauge open to the air before and after",
     (
         "temperature_drift",
@@ -190,7 +189,10 @@ SHOWN_BY = {
     ("gravity", "unit_pose"): "a full turn about x at two pressures",
     ("pressure_offset", "blocked_force"): "the gauge open to the air before and after",
     ("seating", "blocked_force"): "the tip run up to the load cell until it reads, before any pressure",
-    ("frame_compliance", "blocked_force"): "a dead weight hung from the load cell, its stand watched",
+    (
+        "frame_compliance",
+        "blocked_force",
+    ): "a dead weight hung from the load cell, the deflection of its stand measured",
     ("viscoelasticity", "blocked_force"): "the tip blocked at a larger gap, held for two decades of time",
     ("overcure", "unit_pressure"): "the wall of a unit cut open",
     ("wall_thickness", "unit_pressure"): "the wall of a unit cut open",
@@ -203,9 +205,9 @@ class Parameter:
     """A parameter of a model that can be fitted: unit, bounds, source, and `null`, where it has no effect.
 
     low, high, null and starts are in `unit`. starts: values from which a fit begins. linear: the prediction
-    is affine in it, with one slope whatever the other values are. spread: standard deviation of prior
+    is affine in it, with a slope independent of the other values. spread: standard deviation of prior
     knowledge, in `unit`; inf without any. experiment: name of the only experiment whose prediction depends on
-    it; empty where any may. plausible: range for a real specimen, in `unit`; a value beyond suggests that a
+    it; empty for any. plausible: range for a real specimen, in `unit`; a value beyond suggests that a
     column's unit or sign is wrong. Raises InputError where low is not below high, or the null or a start is
     out of bounds.
     """
@@ -259,11 +261,11 @@ class Effect:
     """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
 
     parameters: the first is its size, whose null switches the effect off exactly; the others give its shape.
-    mechanism, reveals: in words, of `LIBRARY` and `SHOWN_BY` where not given. whose: the one specimen or
-    experiment that has it, "specimen B"; empty for all. among: owners with separate sizes, "specimen";
-    spread: their standard deviation, in the parameters' unit, with its 95 % interval. refines: a law with
-    more freedom than another one of its name, fitted only in its place. tried: number of alternatives in the
-    data that its starts were chosen from. Raises InputError for a name not in `LIBRARY`.
+    mechanism, reveals: texts, by default of `LIBRARY` and `SHOWN_BY`. whose: the one specimen or experiment
+    that has it, "specimen B"; empty for all. among: owners with separate sizes, "specimen"; spread: their
+    standard deviation, in the parameters' unit, with its 95 % interval. refines: a law with more freedom than
+    another of its name, fitted only in its place. tried: number of alternatives among which its starts were
+    chosen. Raises InputError for a name not in `LIBRARY`.
     """
 
     name: str
@@ -294,7 +296,7 @@ class Effect:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size comes first.
+        """Keys of its parameters in the values of a prediction, "effect.parameter"; the size is first.
 
         Of one specimen's effect "effect.parameter of specimen B".
         """
@@ -303,7 +305,7 @@ class Effect:
 
     @property
     def title(self) -> str:
-        """Its name, with its specimen or experiment if it belongs to one."""
+        """Its name, with its specimen or experiment if it has one."""
         if self.among:
             return f"{self.name} among {self.among}s"
         return f"{self.name}{OF}{self.whose}" if self.whose else self.name

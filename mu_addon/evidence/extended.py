@@ -22,7 +22,7 @@ from .verdict import Verdict
 class Fitted:
     """A fitted value with its standard deviation and the ends of its 95 % interval, all in `unit`.
 
-    An empty unit means a pure number; what is not known is nan.
+    An empty unit means a pure number; an unknown value is nan.
     """
 
     value: float
@@ -47,7 +47,7 @@ class ExtendedModel:
 
     @property
     def values(self) -> dict[str, float]:
-        """Values for a simulator's `predict`: by "effect.parameter" or nuisance, each in its own unit."""
+        """Values for a simulator's `predict`: by "effect.parameter" or nuisance, each in its unit."""
         return {**{n: f.value for n, f in self.nuisances.items()}, **self.of_effects}
 
     @property
@@ -74,7 +74,7 @@ class ExtendedModel:
             "nuisance": nuisances or None,
             "lattice": Commented(lattice, (words,)) if lattice else None,
         }
-        return toml_text(values, "Effects that measured data named, with what each parameter is known to.")
+        return toml_text(values, "Effects named by measured data, with the accuracy of each parameter.")
 
 
 def stacked(before: ExtendedModel, found: ExtendedModel) -> ExtendedModel:
@@ -104,7 +104,7 @@ def extended_model(verdict: Verdict, nuisances: Iterable[Parameter] = ()) -> Ext
     """The model of a verdict: the base with the named effects, or alone where none is named.
 
     nuisances: of the simulator, which give their units. Those that these data do not determine are left out.
-    Intervals are the verdict's 95 % ones, nan where it has none.
+    Intervals are the verdict's 95 % intervals, nan where it has none.
     """
     found = verdict.selection
     fit = found.chosen if verdict.names else found.base
@@ -129,9 +129,8 @@ def extended_model(verdict: Verdict, nuisances: Iterable[Parameter] = ()) -> Ext
 def load_model(path: Path) -> ExtendedModel:
     """Read a model.toml.
 
-    Raises InputError where the file cannot be read or is not TOML, without a verdict, where a table is none,
-    for an effect that `LIBRARY` lacks, for a parameter with a value that is no finite number and for an
-    unusable table [lattice].
+    Raises InputError if the file cannot be read, is not TOML or lacks a verdict; for a table of another type,
+    an effect that `LIBRARY` lacks, a parameter without a finite value and an unusable table [lattice].
     """
     try:
         text = file_text(path)

@@ -78,9 +78,9 @@ class Fitter:
     """Fits models to one record of N values by generalised least squares under given noise.
 
     sources: noise by group of series. kept (N,) bool: values that count, all by default. whitening: of the
-    record by these sources, if already computed. Attributes: curved, nuisances that are not linear; known,
-    those of them with prior knowledge; zeros_basis (N, z), orthonormal whitened columns that span the linear
-    nuisances (zeros of channels).
+    record by these sources, if already computed. Attributes: curved, nonlinear nuisances; known, those with
+    prior knowledge; zeros_basis (N, z), orthonormal whitened columns that span the linear nuisances (zeros of
+    channels).
     """
 
     def __init__(
@@ -209,12 +209,12 @@ class Fitter:
     ) -> Fit:
         """Minimise chi squared over the nuisances and the parameters of `effects`, from one start.
 
-        start: values by key; where one is missing, the first start of its parameter, else its null. fixed:
-        values by key that are held; holding one costs its deviation from prior knowledge. Values are in the
-        parameters' units. reached: chi squared of a fit from another start; one that is not expected to fall
-        below it is ended. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
-        finite-difference derivatives and at most `ITERATIONS` steps. Values without a prediction
-        (`possible`) count as infinitely bad; raises what the prediction does where the start is one.
+        start: values by key, by default the first start of a parameter, else its null. fixed: values by key
+        that are held; a held value costs its deviation from prior knowledge. Values are in the parameters'
+        units. reached: chi squared of a fit from another start; a fit that is not expected to fall below it
+        ends. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with finite-difference
+        derivatives and at most `ITERATIONS` steps. Values without a prediction (`possible`) count as
+        infinitely bad; raises the prediction's error if the start is one.
         """
         start, fixed = start or {}, dict(fixed or {})
         free: list[tuple[str, Parameter]] = [(p.name, p) for p in self.curved]
@@ -312,7 +312,7 @@ class Fitter:
     def best(self, effects: Sequence[Effect], starts: Sequence[Mapping[str, float]]) -> Fit:
         """The fit of least chi squared among those from each of the starts (see `fit`), one or more.
 
-        Of infinite chi squared where no start has a prediction; `Composite.refused` then says why.
+        Of infinite chi squared where no start has a prediction; `Composite.refused` has the reason.
         """
         best, why = None, ""
         for start in starts:
@@ -353,8 +353,8 @@ def _step(gram: Array, gradient: Array, damping: float, x: Array, low: Array, hi
 def interval(fitter: Fitter, fit: Fit, key: str, rise: float = 3.84) -> tuple[float, float]:
     """Confidence interval (low, high) of a fitted value, in its parameter's unit, by profile likelihood.
 
-    The ends are where chi squared, all else fitted anew, has risen by `rise` (3.84: 95 %), or the parameter's
-    bounds if those come first or the value has no finite standard deviation.
+    At the ends chi squared, with all else fitted again, has risen by `rise` (3.84: 95 %). The ends are the
+    parameter's bounds if these are nearer or the value has no finite standard deviation.
     """
     p = next(
         (p for e in fit.effects for name, p in zip(e.keys, e.parameters, strict=True) if name == key),

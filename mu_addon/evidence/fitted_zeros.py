@@ -28,7 +28,7 @@ class FittedZeros:
 def fitted_zeros(fitter: Fitter, base: Fit) -> FittedZeros | None:
     """The zeros of a fit without effects whose loss would make its error `LARGER` times as large; else None.
 
-    Known zeros alone: those of which something was known before, one an experiment.
+    Known zeros alone: those with prior knowledge, one an experiment.
     """
     zeros = [p for p in fitter.known if p.experiment and "zero_" in p.name]
     if not zeros:

@@ -23,9 +23,9 @@ TOGETHER = " with "
 class Cause:
     """One effect of the chosen model.
 
-    p_value: probability that noise alone lets any effect of the library gain as much. loss: rise of chi
-    squared when the effect is taken away and the rest fitted anew. rivals: titles of effects whose fit in its
-    place is not distinguishable, best first.
+    p_value: probability that by noise alone any effect of the library gains as much. loss: rise of chi
+    squared when the effect is removed and the rest fitted again. rivals: titles of effects whose fit in its
+    place is indistinguishable, best first.
     """
 
     effect: Effect
@@ -40,9 +40,9 @@ class Selection:
 
     singles: the fit of every single effect, best first. p_best: p-value (a probability) of the best single
     effect. doubted: why a model was not accepted, else empty. table: `strict_table` of the chosen model's
-    residual. table_base: `dependence_table` of the base model; by the strict tests where nothing is wrong.
-    wider: fits of effects of one owner, or that differ among owners. excused: why structure that is left does
-    not count, in words.
+    residual. table_base: `dependence_table` of the base model; by the strict tests if no cause was found.
+    wider: fits of effects of one owner, or that differ among owners. excused: reason why remaining structure
+    does not count.
     """
 
     base: Fit

@@ -25,7 +25,7 @@ class Errors:
 
     low95, high95: 95 % interval of before - after, by bootstrap. permuted, black_box: residuals of the base
     with the effects' changes taken from the wrong experiments, and with as many arbitrary correction terms as
-    the effects have parameters. All are in `unit` and nan where there is no such model. unit: last part of a
+    the effects have parameters. All are in `unit`, and nan without such a model. unit: last part of a
     column's name, or "spreads" for records whose uncertainty is given.
     """
 
@@ -56,8 +56,8 @@ class Gain:
 
     fit and held_out are of one quantity: the first that an effect concerns and that clearly improves, an
     angle before markers. by_quantity: fitted and held-out errors of every group of series ("unit_pressure
-    angle"), None where nothing of it was held out. refused: reasons, by name, why held-out experiments
-    without a prediction are left out.
+    angle"), None if it has no held-out data. refused: reasons, by name, why held-out experiments without a
+    prediction are left out.
     """
 
     fit: Errors

@@ -33,10 +33,10 @@ def hypotheses(
 ) -> list[Fit]:
     """Each seed with one of some effects more, each set of effects once, best first.
 
-    Fitted are effects that promise more than `PROMISING` beside a seed, the most promising first; of one
-    mechanism and of a camera's faults a model has one. most: of the fits of a seed; all where it is None.
+    Effects that promise more than `PROMISING` beside a seed are fitted, the most promising first. A model has
+    one effect of a mechanism and one of a camera's faults. most: number of fits of a seed, None for all.
     known: fits of others, best first, with which they are ranked; an effect that promises less than
-    `HALF_WAY` of the way to the first of them is not fitted.
+    `HALF_WAY` of the gain to the first of them is not fitted.
     """
     found = {frozenset(e.keys for e in fit.effects): fit for fit in known}
     reach = known[0].chi2 if known else math.inf
@@ -91,7 +91,7 @@ def promise(fitter: Fitter, fit: Fit, effect: Effect) -> float:
 
 
 def beside(fitter: Fitter, others: Sequence[Effect], effect: Effect, values: Mapping[str, float]) -> Fit:
-    """The best fit of an effect beside others, from each of its starts and the others' values by key."""
+    """The best fit of an effect added to others, from each of its starts and the others' values by key."""
     return fitter.best([*others, effect], [{**values, **start} for start in effect.starts()])
 
 
@@ -101,15 +101,15 @@ def ranked(fits: Iterable[Fit]) -> list[Fit]:
 
 
 def cost(fit: Fit) -> float:
-    """Akaike's criterion plus `by_search`: of models that fit alike the one with fewer parameters leads."""
+    """Akaike's criterion plus `by_search`: of equally good fits the one with fewer parameters is first."""
     return fit.chi2 + 2.0 * len(fit.keys) + by_search(fit)
 
 
 def by_search(fit: Fit) -> float:
     """Chi squared that noise gives a model's effects by the search among alternatives for their starts.
 
-    The best of m chi squareds exceeds g with at most m times the probability of one (Bonferroni), which in
-    the tail falls as exp(-g/2): m alternatives are worth 2 ln m.
+    The best of m chi squareds exceeds g with at most m times the probability of one (Bonferroni). In the tail
+    this falls as exp(-g/2), so m alternatives are worth 2 ln m.
     """
     return sum(2.0 * math.log(e.tried) for e in fit.effects)
 
@@ -117,8 +117,8 @@ def by_search(fit: Fit) -> float:
 def refined(fitter: Fitter, fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Fit:
     """A fit with a law of more freedom for one of its effects where that fits better; else itself.
 
-    Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and its law is chosen by the data, anew with
-    every effect added.
+    Better by `RIVAL_DELTA_CHI2`: the mechanism is the same, and the data choose its law again with every
+    added effect.
     """
     for law in fitter.simulator.refinements:
         for i, e in enumerate(fit.effects):
@@ -138,10 +138,10 @@ def by_all_laws(
     progress: Callable[[str], None] = lambda _: None,
     every: bool = False,
 ) -> list[Fit]:
-    """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked anew.
+    """A pool of fits, best first, with laws of more freedom where they fit better (`refined`), ranked again.
 
-    Refined are the first and, where structure is left with it or it lies at a bound, or for `every`, the next
-    `SEEDS` mechanisms that have such laws: the right mechanism may gain little by its first law.
+    The first is refined. If it leaves structure or lies at a bound, or for `every`, the next `SEEDS`
+    mechanisms with such laws are refined as well: the right mechanism may gain little by its first law.
     """
     found = [refined(fitter, pool[0], progress), *pool[1:]]
     if not every and not at_a_bound(found[0]) and not structure(strict_table(fitter, found[0])):

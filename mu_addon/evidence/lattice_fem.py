@@ -1,4 +1,4 @@
-"""Response of the lattice itself to a print offset, from virtual tests of blocks of it between plates."""
+"""Response of the lattice to a print offset, from virtual tests of blocks between plates."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _silent(what: str, share: float) -> None:
 
 
 def shipped(block: Block) -> OffsetResponse | None:
-    """The block's response that comes with the program, or None."""
+    """The block's response in the program's data, or None."""
     key = block.key()
     for name in asset_names(SHIPPED):
         kept = parse_toml(file_text(asset_file(SHIPPED, "response", name)), name)
@@ -151,8 +151,8 @@ def printed(print_: Printing) -> tuple[float, float]:
 def block_of(experiment: Experiment, unit: Unit) -> Block | None:
     """The block of a unit's lattice that an experiment compressed; None where it gives no count of cells.
 
-    Struts are the unit's, or straight ones of the experiment's own diameter. Plates hold the faces where the
-    experiment does not say. Raises InputError for a block that is no cube, and for struts that cannot be.
+    Struts are the unit's, or straight ones of the experiment's diameter. By default plates hold the faces.
+    Raises InputError for a block that is no cube, and for struts that cannot be.
     """
     if experiment.cells is None:
         return None
@@ -170,7 +170,7 @@ def block_of(experiment: Experiment, unit: Unit) -> Block | None:
 
 
 def to_compute(experiments: Sequence[Experiment], unit: Unit) -> int:
-    """Number of blocks whose response does not come with the program; raises what `block_of` raises."""
+    """Number of blocks whose response is not in the program's data; raises the errors of `block_of`."""
     blocks = {block_of(e, unit) for e in experiments if e.kind == KIND} - {None}
     return sum(shipped(block) is None for block in blocks if block is not None)
 
@@ -183,9 +183,9 @@ def scalings(
 ) -> tuple[dict[str, Scaling], list[str]]:
     """Response of each compressed block's stiffness and mass to printing, by name of the experiment.
 
-    Also returns the modelling assumptions, in words. All moduli are relative to that of the first block as
-    drawn at 1.0x; the unit's own print offset and skin come before any effect's. Experiments without a count
-    of cells have no entry. Raises what `block_of` and `response` raise.
+    Also returns the modelling assumptions, as text. All moduli are relative to that of the first block as
+    drawn at 1.0x. The unit's print offset and skin are applied before any effect's. Experiments without a
+    count of cells have no entry. Raises the errors of `block_of` and `response`.
     """
     blocks = {e.name: block_of(e, unit) for e in experiments if e.kind == KIND}
     distinct = list(dict.fromkeys(b for b in blocks.values() if b is not None))

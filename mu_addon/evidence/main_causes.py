@@ -27,11 +27,11 @@ GRADED, CLEAR = 0.9, 4.0
 def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     """Selection of the effects that take most of a misfit, though structure is left; None without.
 
-    Their law may be another than the library's. Several: see `_mainly_several`. A single one, of all, of one
-    owner or among owners, must take `GRADED` of the misfit, have no value at a bound but its null, and do
-    better than a step change; one of all must predict left-out experiments better and rest on no single
-    experiment. Others that leave less than `APART` times as much, or `CLEAR` times where it takes less than
-    `MAINLY`, are its rivals; one that takes `MAINLY` has none that take less.
+    Their law may be another than the library's. Several: see `_mainly_several`. A single effect, of all, of
+    one owner or among owners, must take `GRADED` of the misfit, have no value at a bound except its null, and
+    fit better than a step change. An effect of all must also predict left-out experiments better and not
+    depend on a single experiment. Its rivals leave less than `APART` times as much misfit, or `CLEAR` times
+    if it takes less than `MAINLY`. An effect that takes `MAINLY` has no rivals that take less.
     """
     if _mainly_several(fitter, found):
         return found
@@ -104,8 +104,8 @@ def _plain(fitter: Fitter, found: Selection) -> bool:
 def _mainly_several(fitter: Fitter, found: Selection) -> bool:
     """Return True if several causes take most of a misfit (`_plain`), though structure is left.
 
-    No other effect in the place of one comes within `CLEAR` times the residual. None has a value at a bound
-    or rests on a single experiment.
+    No other effect in its place leaves less than `CLEAR` times the residual. None has a value at a bound or
+    rests on a single experiment.
     """
     base, chosen = found.base, found.chosen
     if found.doubted or at_a_bound(chosen) or not _plain(fitter, found):

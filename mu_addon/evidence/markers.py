@@ -19,11 +19,11 @@ Array = np.ndarray[Any, Any]
 
 @attrs.frozen(eq=False)
 class Marker:
-    """A marker's measured position at rest (3,), the material point (3,) that stands for it, both in mm.
+    """A marker's measured position at rest (3,) and its material point (3,), both in mm.
 
     The frame is that of DESIGN section 2: z along the axis from the inlet, x = 0 the plane of bending, +y the
-    side with more lattice. axes: measured coordinates; without x, the marker is taken to lie in the
-    plane. distance_mm: between the two, over the measured coordinates.
+    side with more lattice. axes: measured coordinates; without x, the marker is assumed to lie in the plane.
+    distance_mm: between the two, over the measured coordinates.
     """
 
     number: int
@@ -37,8 +37,7 @@ def attached(mesh: Mesh, experiments: Sequence[Experiment], farthest_mm: float) 
     """Markers of experiments of one scale, each on the nearest point of the undeformed mesh.
 
     farthest_mm: largest distance admitted, in mm. Raises InputError for a marker farther than that from the
-    unit, for one that lies farther than that from its place in another of the experiments, and where
-    `at_rest` does.
+    unit or from its position in another experiment, and the errors of `at_rest`.
     """
     every = at_rest(experiments)
     found = []

@@ -1,4 +1,4 @@
-"""Choice of the next experiment: the one, of those a bench can make, that best separates the rivals."""
+"""Choice of the next experiment: the possible one that best separates the rivals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FURTHER_mm = 2.0
 
 @attrs.frozen
 class Proposal:
-    """An experiment in words, the effects that it separates, and the expected difference in chi squared.
+    """An experiment as text, the effects that it separates, and the expected difference in chi squared.
 
     expected: least difference between any two of the rival fits (no unit).
     """
@@ -38,9 +38,9 @@ class Proposal:
 def propose_experiment(fitter: Fitter, found: Selection, seen: Sequence[Sensitivity]) -> Proposal | None:
     """The experiment that best separates the effects still in doubt; None where no cause has a rival.
 
-    Variations of those already made are tried. Best is the largest expected chi squared between the two rival
-    fits that are nearest to each other, nuisances held. Below 1 the proposal is what the rival effects'
-    library entries recommend.
+    Variations of the measured experiments are tried. Best is the largest expected chi squared between the two
+    rival fits that are nearest to each other, nuisances held. Below 1 the proposal is taken from the library
+    entries of the rival effects.
     """
     rivals = [c for c in found.causes if c.rivals]
     if not rivals:

@@ -36,8 +36,8 @@ class Whitening:
 
     sources: noise by group; groups: those to whiten, all by default. Block means of white plus first-order
     noise have, after an AR(1) difference within each clock, a tridiagonal covariance, which is factored by
-    its band. log_dets: logarithm of the covariance's determinant, by group. Values of known spread are in
-    units of it already and stay.
+    its band. log_dets: logarithm of the covariance's determinant, by group. Values of known spread are
+    already in units of it and stay unchanged.
     """
 
     def __init__(self, record: Record, sources: Mapping[str, Source], groups: Sequence[str] = ()) -> None:
@@ -175,10 +175,10 @@ def _block(count: Array, step: Array) -> tuple[Array, Array]:
 def estimate(record: Record, residual: Array, columns: Sequence[Array]) -> dict[str, Source]:
     """White and slow noise of each group of series, by restricted maximum likelihood.
 
-    residual (N,): of the base model, in the record's units. columns: of each series an array (b, k), each
-    column with a free size in that series: nothing in their span counts as noise, so that an effect neither
-    swells the noise nor is whitened away; the restricted likelihood accounts for the degrees of freedom
-    spent. Groups of known spread are left out.
+    residual (N,): of the base model, in the record's units. columns: for each series an array (b, k), each
+    column with a free size in that series. Their span does not count as noise, so that an effect neither
+    increases the noise nor is whitened away. The restricted likelihood accounts for these degrees of freedom.
+    Groups of known spread are left out.
     """
     found = {}
     for group in record.groups:
@@ -338,10 +338,10 @@ def _source(x: Array, sample_s: float, longest_s: float, size: float = 1.0) -> S
 def span(record: Record, signatures: Array) -> list[Array]:
     """Orthonormal columns (b, k) for each series that span the smooth changes by causes, known or not.
 
-    signatures (N, m): changes of the prediction by effects and nuisances. Beside them stand a constant, a
-    linear drift of timed series, and the harmonics of a cycle that the record repeats. Directions with less
-    than a hundredth of a signature's size are left out, and never more than a fifth of a timed series (half
-    of one without a clock) is spent.
+    signatures (N, m): changes of the prediction by effects and nuisances. The columns also include a
+    constant, a linear drift of timed series, and the harmonics of a repeated cycle. Directions with less than
+    a hundredth of a signature's size are left out. At most a fifth of a timed series (half of one without a
+    clock) is spent.
     """
     found = []
     for s in record.series:

@@ -23,12 +23,12 @@ NAME = "outlier"
 def without_outliers(
     experiments: Sequence[Experiment], fitter: Fitter, fit: Fit, tests: int
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without readings whose residual exceeds chance, and these readings in words.
+    """The experiments without readings whose residual exceeds chance, and a text on these readings.
 
     By a normal deviate each, at the rate at which `residuals.structure` sees an outlier among so many tests.
-    Unchanged where a series has more of them than `MOST_WRONG`, and where readings are off as by a clock
-    offset or a lag: by no more than the prediction changes there, and more than one in `TIMES_MORE` of those
-    that change as fast.
+    Unchanged if a series has more of them than `MOST_WRONG`, or if they look like a clock offset or a lag:
+    each is off by at most the prediction's change there, and so is more than one in `TIMES_MORE` of the
+    readings that change as fast.
     """
     from scipy.stats import norm
 
@@ -82,7 +82,7 @@ def _where_it_is_fast(fitter: Fitter, fit: Fit, series: Sequence[Series], off: A
 
 
 def _alone(i: int, at: slice, change: Array, left: Array) -> bool:
-    """Return True if readings beside i, where the prediction changes as fast, are right: it is not late.
+    """Return True if readings next to i, where the prediction changes as fast, are right: i is not late.
 
     at: the series; change (N,), left (N,): the prediction's change from sample to sample, and the residual.
     """

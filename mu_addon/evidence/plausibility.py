@@ -43,7 +43,7 @@ def _refuse(fitter: Fitter, p: Parameter, fitted: float) -> None:
     unit = f" {p.unit}" if p.unit else ""
     remedy = f"check its unit and that of every length; a value from {low:g} to {high:g}{unit} is expected"
     if np.corrcoef(predicted, read)[0, 1] < AGAINST:
-        remedy = "its sign is opposite to what it should be: check its direction, or that of the strain"
+        remedy = "its sign is wrong: check its direction, or that of the strain"
     else:
         for factor in FACTORS:
             if low <= implied * factor <= high:

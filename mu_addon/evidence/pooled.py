@@ -32,10 +32,10 @@ RISE = 3.84
 class Spread:
     """Standard deviation of values between owners, in their parameter's unit, by restricted likelihood.
 
-    For values of one sign it is their root mean square, that of the full normal distribution. low95, high95:
-    profile interval. gain: of -2 log L over no spread at all; a further fall of chi squared is the cost of
-    the values' freedom. values (j,): of each owner, the most likely ones, drawn toward their common mean (of
-    one sign: toward 0) by as much as the data leave them uncertain.
+    For values of one sign it is their root mean square, as of the full normal distribution. low95, high95:
+    profile interval. gain: of -2 log L over no spread; a further fall of chi squared is the cost of the
+    values' freedom. values (j,): most likely value of each owner, shrunk toward their mean (of one sign:
+    toward 0) according to its uncertainty.
     """
 
     value: float
@@ -53,9 +53,9 @@ def spread_of(slopes: Array, residual: Array, most: float, one_sign: bool = Fals
     anyway; residual (n,): whitened, with every value at 0. Values are normal about 0 with a standard
     deviation s: the residual's covariance is I + s^2 Z Z^T, and -2 log L = log det(I + s^2 G) - s^2 b^T (I +
     s^2 G)^-1 b with G = Z^T Z, b = Z^T r (Harville, J. Am. Stat. Assoc. 72 (1977) 320). most: largest
-    standard deviation that is tried. one_sign: no value is below 0; the likelihood is that above times the
-    probability of this by the values' posterior (the product of each one's own, which is exact where owners
-    share no data) over that before, 2^-j.
+    standard deviation that is tried. one_sign: no value is below 0. The likelihood above is multiplied by the
+    posterior probability of this over the prior one, 2^-j; the posterior probability is a product over
+    owners, exact if they share no data.
     """
     from scipy.optimize import nnls
     from scipy.special import log_ndtr
@@ -96,8 +96,8 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
 
     Effects of instruments differ by session, where sessions are given, and by experiment; effects of
     printing, the modulus and leaks by specimen. The size, the first parameter, is one an owner; the shape,
-    all others, is shared. Only sizes of either sign without a shape vary by experiment: experiments differ in
-    their protocol, too, and a leak or a drift of each would pass for another law of the same unit.
+    all others, is shared. Only sizes of either sign without a shape vary by experiment. Experiments also
+    differ in their protocol, and separate leaks or drifts would imitate another law of the same unit.
     """
     found = []
     for effect in (*effects, *of_specimens(experiments)):
@@ -117,7 +117,7 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
 
 
 def sizes_of(effect: Effect) -> tuple[tuple[str, Parameter], ...]:
-    """Keys and parameters of the owners' own sizes, of an effect of `pooled_effects`."""
+    """Keys and parameters of the owners' sizes, of an effect of `pooled_effects`."""
     pairs = zip(effect.keys, effect.parameters, strict=True)
     return tuple((key, p) for key, p in pairs if OF in p.name)
 
@@ -159,7 +159,7 @@ def fits_among(
 
 
 def _fitted(fitter: Fitter, base: Fit, effect: Effect) -> tuple[float, Fit] | None:
-    """Gain in -2 log L and fit of an effect whose owners differ; None where the data show none."""
+    """Gain in -2 log L and fit of an effect whose owners differ; None if the data show none."""
     shapes = [{**base.values, **shape} for shape in _shapes(effect)]
     begun = [(spread, values) for values in shapes if (spread := _spread(fitter, base, effect, values))]
     begun.sort(key=lambda one: -one[0].gain)
@@ -180,7 +180,7 @@ def _shapes(effect: Effect) -> list[dict[str, float]]:
 def _settled(
     fitter: Fitter, base: Fit, effect: Effect, spread: Spread, values: Mapping[str, float]
 ) -> tuple[float, Fit] | None:
-    """Gain and fit with spread, values and shape estimated in turn, from a first spread."""
+    """Gain and fit with spread, values and shape estimated alternately, from a first spread."""
     sizes = sizes_of(effect)
     own = {key for key, _ in sizes}
     fit = base

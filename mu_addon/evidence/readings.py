@@ -43,10 +43,10 @@ MOST_CLIPPED = 0.6
 
 
 def quantum(values: Array) -> float:
-    """Step of readings (n,), in their unit; 0 where they show none.
+    """Step of readings (n,), in their unit; 0 if they show none.
 
-    The largest number of which all of them and all of their differences are whole multiples: with `DIGITS`
-    digits at most, or any, as a converter's share of its range or a force over a section is.
+    The largest number that divides all of them and all of their differences: with at most `DIGITS` digits, or
+    any number, such as a converter's share of its range or a force over a section.
 
     >>> quantum(np.array([50.0, 49.5, 48.5]))
     0.5
@@ -66,7 +66,7 @@ def _decimal(seen: Array) -> float:
 
 
 def _any_step(seen: Array, values: Array) -> float:
-    """Least difference of readings, or down to a fourth of it, of which all differences are multiples."""
+    """Least difference of readings, or down to a fourth of it, that divides all differences."""
     if len(seen) < FEWEST:
         return 0.0
     away = seen - seen[0]
@@ -89,9 +89,9 @@ def _any_step(seen: Array, values: Array) -> float:
 
 
 def _step_of_few(seen: Array, values: Array) -> float:
-    """Largest step of which a few levels, each read often, are multiples from 0 to their last digits.
+    """Largest step that divides a few levels, each read often, to their last digits.
 
-    By Euclid's algorithm, down to a thousandth of the largest level: records that each stand at one reading.
+    By Euclid's algorithm, down to a thousandth of the largest level: for records that stay at one reading.
     """
     if not 3 <= len(seen) < FEWEST or np.count_nonzero(np.isfinite(values)) < CLIPPED * len(seen):
         return 0.0
@@ -135,7 +135,7 @@ def dwell(values: Array) -> float:
 def stretch(values: Array) -> float:
     """Mean over readings (n,) of the length of the run of unchanged readings that each lies in.
 
-    Long where a part of a record is held, however fast the rest of it changes.
+    Long where a part of a record is held, at any speed of the rest.
     """
     seen = values[np.isfinite(values)]
     ends = np.concatenate([[0], 1 + np.flatnonzero(np.diff(seen)), [len(seen)]])
@@ -146,8 +146,8 @@ def stretch(values: Array) -> float:
 def between_steps(time_s: Array, values: Array) -> Array:
     """Quantised readings (n,) at times (n,) in s made continuous: lines from change to change.
 
-    Where a reading changes to the next step the quantity lies halfway; where it turns back, or stays to the
-    end, the middle of the step is the best estimate.
+    When a reading changes to the next step, the quantity is halfway between. When it turns back, or stays to
+    the end, the middle of the step is the best estimate.
     """
     changed = np.flatnonzero(np.diff(values))
     if not len(changed):
@@ -180,12 +180,12 @@ def divided(time_s: Array, values: Array, order: int) -> Array:
 
 
 def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
-    """Mask (n,) of readings (n,) at times (n,) in s that stand alone, away from all around them.
+    """Mask (n,) of isolated readings (n,) at times (n,) in s, away from all around them.
 
     Each is compared with the lines through its neighbours on both sides, through the next but one on both
-    sides, and through two before and two after it. A corner or a step agrees with one of the latter two; a
+    sides, and through two before and two after it. A corner or a step agrees with one of the last two. A
     reading beyond all four, on one side and by `WRONG` deviations, is wrong. step: of the display, in the
-    readings' unit, where it is known from other records.
+    readings' unit, if known from other records.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
@@ -212,8 +212,8 @@ def wrong_readings(time_s: Array, values: Array, step: float = 0.0) -> Array:
 def clipped_readings(time_s: Array, values: Array) -> Array:
     """Mask (n,) of readings (n,) at times (n,) in s that lie at the end of their channel's range.
 
-    Those that stay at the record's largest or smallest value for `CLIPPED` samples, though the channel is
-    noisy and does not read in steps; with them those between, whose noise is cut off on one side.
+    Readings that stay at the record's largest or smallest value for `CLIPPED` samples, although the channel
+    is noisy and has no steps, and the readings between them, whose noise is cut off on one side.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
@@ -239,7 +239,7 @@ def clipped_readings(time_s: Array, values: Array) -> Array:
 def without_wrong_readings(
     experiments: Sequence[Experiment], simulator: Composite
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without predicted readings that stand alone or were clipped, and these in words.
+    """The experiments without isolated or clipped predicted readings, and a text on these.
 
     See `wrong_readings` and `clipped_readings`.
     """
@@ -267,8 +267,8 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
     """Mask (n,) of readings (n,) that lie away from their prediction (n,) unlike those around them.
 
     By `WRONG` deviations from the median residual of `AROUND_ONE` readings, one or two together. A clock
-    offset or a lag does that wherever the prediction changes fast, so a residual it could explain counts only
-    where ten times as many readings, of changes as fast, have none. step: as in `wrong_readings`.
+    offset or a lag does that wherever the prediction changes fast. A residual that it could explain therefore
+    counts only if ten times as many equally fast readings have none. step: as in `wrong_readings`.
     """
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(predicted))
@@ -296,7 +296,7 @@ def unpredicted_readings(values: Array, predicted: Array, step: float = 0.0) -> 
 def without_unpredicted_readings(
     experiments: Sequence[Experiment], simulator: Composite, values: Mapping[str, float]
 ) -> tuple[list[Experiment], list[str]]:
-    """The experiments without readings that stand alone in a fit's residual, and these in words.
+    """The experiments without readings that are isolated in a fit's residual, and a text on these.
 
     Where a quantity changes fast from sample to sample, only the prediction shows that a reading is wrong; so
     where there is no clock (`unclocked.lone`).

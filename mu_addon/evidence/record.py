@@ -26,12 +26,12 @@ KNOWN = "spread known"
 class Series:
     """One channel of one experiment: rows `at` (slice) of the record's long vector of values.
 
-    experiment: its number in the record. group: name that series of the same noise share. row: of the
-    prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan where the record has no clock;
-    count (b,): samples in each block; sample_s: median time between samples in s, or nan. step: of its
-    readings' resolution, in the channel's unit, 0 without one; stays: number of unchanged readings in a row,
-    around a reading (`readings.stretch`). louder (b,): white noise of each block over the usual, None where
-    it is 1 throughout (`scatter.with_bursts`).
+    experiment: its number in the record. group: name shared by series of the same noise. row: of the
+    prediction (channels, n). time_s (b,): mean times of the b blocks in s, nan without a clock; count (b,):
+    samples in each block; sample_s: median time between samples in s, or nan. step: of its readings'
+    resolution, in the channel's unit, 0 without one; stays: number of unchanged readings in a row, around a
+    reading (`readings.stretch`). louder (b,): white noise of each block over the usual, None if it is 1
+    throughout (`scatter.with_bursts`).
     """
 
     experiment: int
@@ -95,7 +95,7 @@ class Record:
     """Series of several experiments, their measured values (N,) as one vector, groups together.
 
     values: in the unit of each channel, in standard deviations where a record's spread is given. again: the
-    experiments as driven by a second reading of the same gauges, see `drive.denoised_drives`.
+    experiments driven by a second reading of the same gauges, see `drive.denoised_drives`.
     """
 
     experiments: tuple[Experiment, ...]
@@ -211,7 +211,7 @@ def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int 
     """The predicted channels of the experiments as one vector of block means.
 
     blocks: most blocks a series may have. Experiments of unknown kinds are left out, and so is a channel that
-    equals another one of its experiment to the last digit. Raises InputError where nothing is left or a given
+    equals another one of its experiment to the last digit. Raises InputError if no reading is left or a given
     spread is 0 throughout.
     """
     kept = tuple(e for e in experiments if simulator.knows(e))
@@ -228,7 +228,7 @@ def record(experiments: Sequence[Experiment], simulator: Composite, blocks: int 
     # Stable: experiments keep their order within a group.
     parts.sort(key=lambda part: part[0])
     if not parts:
-        raise InputError("no experiment can be predicted", "measured data", "add one the model knows")
+        raise InputError("no experiment can be predicted", "measured data", "add one that the model has")
     series, values_, start = [], [], 0
     for group, (fields, values) in parts:
         s = Series(group=group, at=slice(0, 0), **fields)
@@ -247,7 +247,7 @@ def _series(i: int, e: Experiment, row: int, channel: str, blocks: int, step: fl
     spread = e.columns.get(f"{head}_sd_{unit}")
     if spread is not None and not spread.any():
         raise InputError(
-            f"{head}_sd_{unit} is 0 throughout", e.name, "give by how much the record may be off, or none"
+            f"{head}_sd_{unit} is 0 throughout", e.name, "give the record's standard deviation, or none"
         )
     per = max(1, math.ceil(n / blocks))
     first = np.arange(0, n, per)

@@ -53,7 +53,7 @@ class Dependence:
     """One test of a whitened residual against a quantity that it must not depend on.
 
     statistic: a chi squared with `dof` degrees of freedom, or a standard normal deviate. p_value: of that
-    test alone, for noise that is white once whitened. where: in words, where the dependence is strongest.
+    test alone, for noise that is white after whitening. where: text on where the dependence is strongest.
     """
 
     against: str
@@ -99,8 +99,8 @@ CONDITIONS = (
 def dependence_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Every test of a fit's residual, in a fixed order, except for quantities that do not vary.
 
-    The noise is the fitter's, estimated with every smooth cause set aside. A test thus shows the model's
-    misfit, and now and then the slowest part of the noise, which such data hardly determine.
+    The noise is the fitter's, estimated with every smooth cause set aside. A test therefore shows the model's
+    misfit, and sometimes the slowest part of the noise, which such data hardly determine.
     """
     spare = dict.fromkeys(fitter.deviance(fit), 0.0)
     return [*_fitted_tests(fitter, fit, spare), *_plain_tests(fitter, fit)]
@@ -110,7 +110,7 @@ def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """The tests of `dependence_table` under two estimates of the noise; the larger p-value of each counts.
 
     A dependence must gain more likelihood than the noise does when it is estimated from the residual itself,
-    as if that had no cause. Tests that fit nothing are repeated under that second noise.
+    as if that had no cause. Tests without a fit are repeated under that second noise.
     """
     own, refitted = fitter.under_its_own_noise(fit)
     before, after = fitter.deviance(fit), own.deviance(refitted)
@@ -170,7 +170,8 @@ def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
-    """Names of what the residual depends on, strongest first, at a false-alarm rate of `FALSE_ALARM`.
+    """Names of the quantities that the residual depends on, strongest first, at a false-alarm rate of
+    `FALSE_ALARM`.
 
     The rate is divided by the number of tests (Bonferroni).
     """
@@ -188,7 +189,7 @@ def _response(fitter: Fitter, fit: Fit) -> Array:
 
 
 def taken_by_scales(fitter: Fitter, fit: Fit) -> float:
-    """Chi squared that a scale of each experiment's own response takes from a fit's residual."""
+    """Chi squared that a scale factor of each experiment's response takes from a fit's residual."""
     record = fitter.record
     response = _response(fitter, fit)
     own = response[:, None] * (record.of_experiment[:, None] == np.arange(len(record.experiments)))
@@ -203,7 +204,8 @@ def _channels(record: Record) -> tuple[str, ...]:
 def _angles(fitter: Fitter, fit: Fit) -> dict[int, Array]:
     """Angle (n,) at each sample, by experiments that have one: as predicted, which has no noise.
 
-    A measured angle has the noise of the residual that it would be compared with; as a drive it has none.
+    A measured angle has the noise of the residual that it would be compared with, but as a drive it has no
+    noise.
     """
     found = {}
     for i, e in enumerate(fitter.record.experiments):
@@ -239,9 +241,9 @@ def _powers(record: Record, values: Mapping[int, Array], degree: int = 4) -> Arr
 def _by_turn(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Test against the angle that a unit is turned by within a record.
 
-    Such readings have no clock, and so a noise that is estimated from this very residual: a share of it is
-    tested (by the beta distribution), not its size over that noise. Misfits are cut off at `CUT` of their own
-    standard deviations, as outliers are part of them. Records are also compared (`_turned_alike`).
+    Such readings have no clock, so their noise is estimated from the same residual. A share of the residual
+    is tested (by the beta distribution), not its size over that noise. Misfits are cut off at `CUT` of their
+    standard deviations, since they include outliers. Records are also compared (`_turned_alike`).
     """
     from scipy.stats import beta
 
@@ -320,8 +322,8 @@ def _alternating(record: Record, r: Array) -> list[Dependence]:
 def _scores(values: Array) -> Array:
     """Normal scores (n,) of values by their ranks, of unit standard deviation; zeros where all are one.
 
-    van der Waerden 1952: an outlier is no larger than other readings, and what a display rounds to one number
-    has one rank, whatever rounding left of it.
+    van der Waerden 1952: an outlier is no larger than other readings, and readings that a display rounds to
+    one number have one rank.
     """
     from scipy.stats import norm, rankdata
 
@@ -367,10 +369,10 @@ def _fitted(fitter: Fitter, fit: Fit) -> _Fitted:
 
 
 def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float]) -> list[Dependence]:
-    """Test whether markers' response to the modulus depends on the chamber beside which they sit.
+    """Test whether markers' response to the modulus depends on their chamber.
 
     A chamber that bends unlike the rest moves the markers beyond it, and none before it. `where` names the
-    marker that stands out most, and its place at rest counted in chambers from the inlet.
+    marker that deviates most, and its position at rest in chambers from the inlet.
     """
     from scipy.stats import chi2
 
@@ -522,7 +524,8 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Power of the whitened residual by bands of frequency, series of a group and of one clock together.
 
     The rounding error of readings in steps is a sawtooth, a tone, where the quantity rises steadily. Where it
-    stays between two steps readings alternate by a whole one. Both are expected in a band beside the noise.
+    stays between two steps readings alternate by a whole one. Both are expected in a band in addition to the
+    noise.
     """
     from scipy.stats import chi2
 
@@ -649,7 +652,8 @@ def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
-    """The clearest jump between two experiments, in standard deviations and words, and how many were tried.
+    """The clearest jump between two experiments, in standard deviations and as text, and the number of tried
+    ones.
 
     Of channels whose one zero is fitted for all experiments: a reglued marker or a moved camera has another
     one from then on.

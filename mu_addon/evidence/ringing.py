@@ -56,8 +56,8 @@ def ringing(time_s: Array, still: Array, hertz: Array, damping: Array) -> Array:
 def swinging(time_s: Array, still: Array, hertz: float, damping: float) -> Array:
     """Signals (c, n) of a driven mode, from those without inertia (c, n), in the signals' unit.
 
-    `still` plus the result of `ringing`, for one mode: exact for signals linear between their samples, from
-    rest. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical one, below 1.
+    `still` plus the result of `ringing`, for one mode from rest: exact for signals that are linear between
+    samples. time_s (n,): ascending, in s; hertz: undamped; damping: share of the critical one, below 1.
     """
     from scipy.linalg.lapack import ztbtrs
 

@@ -32,8 +32,8 @@ def causes_of(
 ) -> tuple[Cause, ...]:
     """The chosen effects, the most needed first, each with its rivals.
 
-    Rivals are also effects beside the others whose residual is within their law's error (`LAW`). Those of
-    several effects that are not accepted are not sought: that takes as long as the selection.
+    Rivals are also effects in addition to the others whose residual is within their law's error (`LAW`).
+    Those of several effects that are not accepted are not sought: that takes as long as the selection.
     """
     found = []
     for e in chosen.effects:
@@ -67,7 +67,7 @@ def promising_rivals(
     effects: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[Fit]:
-    """Fits of those of some effects in the place of a cause that promise half of what it takes, or more.
+    """Fits of effects in the place of a cause, of those that promise at least half of its gain.
 
     Each is tried that is not in the chosen model; the best comes first.
     """
@@ -108,7 +108,7 @@ def coinciding(
     """Add, as rivals of a selection's causes, effects that scale the same experiments' force equally well.
 
     If one specimen was tested along x, or all fast tests came last, a cause that acts along x, or by rate,
-    may also be that specimen's height as typed, or a change before those tests. Each is fitted in place of
+    may also be that specimen's entered height, or a change before those tests. Each is fitted in place of
     each cause, and is a rival within `RIVAL_DELTA_CHI2`.
     """
     chosen = found.chosen
@@ -141,8 +141,8 @@ def pairs_for(
 ) -> tuple[str, ...]:
     """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
 
-    A camera's fault changes what each channel shows in proportion, which two physical effects can do together
-    where neither does anything alone. The `SEEDS` pairs that take most to first order are fitted.
+    A camera's fault scales each channel. Two physical effects can do that together although neither does it
+    alone. The `SEEDS` pairs that take most to first order are fitted.
     """
     physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
     columns = {id(s): s.column[: len(base.residual)] for s in physical}
@@ -163,7 +163,7 @@ def pairs_for(
 
 
 def nearest(each: Iterable[tuple[str, float]], within: float) -> dict[str, float]:
-    """Rivals by title, the nearest first: those of which a fit lies at a distance below a limit."""
+    """Rivals by title, the nearest first: effects with a fit at a distance below a limit."""
     least: dict[str, float] = {}
     for title, distance in each:
         if distance < within:
@@ -179,7 +179,7 @@ def not_chosen(found: Selection) -> list[Effect]:
 def _with_their_laws(fitter: Fitter, chosen: Fit, less: Fit, rivals: Sequence[Fit]) -> list[Fit]:
     """Rivals of one cause, the nearest of them with laws of more freedom where those fit better.
 
-    The cause's own law was chosen likewise. A rival must first take `WORTH_LAWS` of the cause's gain.
+    The cause's law was chosen in the same way. A rival must first take `WORTH_LAWS` of the cause's gain.
     """
     found = ranked(rivals)
     reach = chosen.chi2 + (1.0 - WORTH_LAWS) * (less.chi2 - chosen.chi2)

@@ -65,7 +65,7 @@ def scatter(record: Record, series: Series) -> float:
 def stated_noise(record: Record, series: Series) -> float:
     """The error that the stated accuracy of a series' instruments allows, in its unit; inf without any.
 
-    That of its own instrument and, by the mean slope, of those that read its drives.
+    That of its instrument and, by the mean slope, of the instruments of its drives.
     """
     e = record.experiments[series.experiment]
     found = e.stated_accuracy(series.channel)
@@ -79,11 +79,11 @@ def stated_noise(record: Record, series: Series) -> float:
 
 
 def noise_limit(record: Record, series: Series) -> tuple[float, str]:
-    """The largest standard deviation of noise of a series, in its channel's unit, and what sets it.
+    """The largest standard deviation of noise of a series, in its channel's unit, and its source.
 
     The accuracy stated for its instruments, or `SURELY` the scatter from reading to reading (`reading_noise`,
     or the display's steps) where this is larger. Without a statement `TIMES` that scatter, or `ACCURACY` of
-    the largest reading; `UNSEEN` of it where there are too few readings to tell.
+    the largest reading; `UNSEEN` of it if there are too few readings to estimate it.
     """
     largest = float(np.nanmax(np.abs(record.experiments[series.experiment][series.channel])))
     seen, stated = scatter(record, series), stated_noise(record, series)
@@ -157,7 +157,7 @@ class Excess:
     """The series whose error exceeds its noise the most.
 
     error, noise: root mean square of the misfit and its largest noise, in the channel's unit. where: its
-    experiment and channel. by: what sets that noise, in words.
+    experiment and channel. by: source of that noise, as text.
     """
 
     error: float
@@ -190,7 +190,7 @@ def excess(record: Record, left: Array) -> Excess | None:
 
 
 def with_bursts(record: Record, left: Array) -> tuple[Record, list[str]]:
-    """The record with each block's noise where it varies in time or with load, and where, in words.
+    """The record with each block's noise if it varies in time or with load, and a text on where.
 
     By the scatter of a misfit (N,) from block to block, in windows, to which a smooth error of the model does
     not contribute. Unchanged where the scatter is even.
@@ -212,7 +212,7 @@ def _loudness(time_s: Array, left: Array) -> Array | None:
     """Noise (b,) of each block of a misfit (b,) over the usual, where it is `LOUD` or more; None if even.
 
     By the scatter of windows, and of single blocks by their distance from those around them: at most a share
-    `MOST` of all. What lies between loud blocks of one burst is as loud as the quieter of them.
+    `MOST` of all. Blocks between loud blocks of one burst get the noise of the quieter of these.
     """
     from scipy.ndimage import maximum_filter1d, median_filter
 

@@ -135,7 +135,7 @@ def _hidden_pair(
 def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit, chosen: Fit) -> Fit:
     """A fit without the effect that later ones make needless.
 
-    Its gain beside them is no more than noise or an error of their law would give.
+    Its additional gain is no more than by noise or an error of their law.
     """
     found = []
     for e in chosen.effects:
@@ -150,8 +150,8 @@ def _without_superfluous(fitter: Fitter, seen: Sequence[Sensitivity], base: Fit,
 def reselected(fitter: Fitter, seen: Sequence[Sensitivity], found: Selection) -> Selection:
     """Repeat a selection under the noise of another fitter; no effect is added.
 
-    Each effect's p-value is computed again, and rivals anew; an effect no longer significant is reported in
-    `doubted`.
+    Each effect's p-value and rivals are computed again; an effect that is no longer significant is reported
+    in `doubted`.
     """
     base = fitter.fit((), found.base.values)
     chosen = fitter.fit(found.chosen.effects, found.chosen.values)
@@ -184,7 +184,7 @@ def one_more(
 ) -> Selection:
     """Add to a selection that left structure the common effect that takes all of it; unchanged without such.
 
-    For noise that was estimated anew around the causes: an effect smaller than the noise assumed before may
+    For noise that was estimated again around the causes: an effect smaller than the noise assumed before may
     now be significant.
     """
     if found.doubted or not found.left or len(found.chosen.effects) >= MOST_EFFECTS:
@@ -200,8 +200,8 @@ def select_owned(
 ) -> tuple[Selection, list[Sensitivity]]:
     """Add to an insufficient selection the effect of one specimen or experiment that explains the data.
 
-    Unchanged where there is none. The choice of the specimen adds to chance, too: the false-positive rate is
-    that of the whole library for every owner. Also returned: sensitivities of all.
+    Unchanged without such an effect. The choice of the specimen also adds to chance: the false-positive rate
+    is that of the whole library for every owner. Also returned: sensitivities of all.
     """
     owned = owned_effects(fitter.simulator.effects, fitter.record.experiments)
     if not owned:
@@ -229,7 +229,8 @@ def _grown(
 ) -> Selection:
     """A selection with the best of some effects added to the first of the seeds where it explains the data.
 
-    Unchanged but for `Selection.wider` where none does. most: of the effects that are fitted beside a seed.
+    Unchanged except for `Selection.wider` if none does. most: number of effects that are fitted in addition
+    to a seed.
     """
     singles, wider = found.singles, found.wider
     for seed in seeds:
@@ -283,10 +284,10 @@ def select_pooled(
 ) -> Selection:
     """Add to an insufficient selection the effect whose differences among owners explain the data.
 
-    Unchanged where there is none. The false-positive probability is that of a spread at its bound of 0 (half
-    a chi squared of one degree), times the number of effects and groupings tried. No effect of one size for
-    all may explain more: smooth structure may pass for slow noise. Rivals are other effects, or groupings,
-    with as good a likelihood within their law's error (`LAW`).
+    Unchanged without such an effect. The false-positive probability is that of a spread at its bound of 0
+    (half a chi squared of one degree), times the number of effects and groupings tried. No effect of one size
+    for all may explain more: smooth structure may pass for slow noise. Rivals are other effects, or
+    groupings, with as good a likelihood within their law's error (`LAW`).
     """
     fits = fits_among(fitter, found.base, progress)
     if not fits:
@@ -312,11 +313,11 @@ def select_pooled(
 def further_owners(
     fitter: Fitter, found: Selection, progress: Callable[[str], None] = lambda _: None
 ) -> Selection:
-    """Add to a selection whose last effect belongs to one owner the same effect of every other who has it.
+    """Add to a selection whose last effect is of one owner the same effect of every other owner who has it.
 
     Beside a large leak of one specimen a small one of another passes for slow noise and leaves no structure.
-    An owner is added where it is `accepted` and no structure is left. Unchanged where no effect belongs to
-    one specimen.
+    An owner is added where it is `accepted` and no structure is left. Unchanged if no effect is of one
+    specimen.
     """
     chosen = found.chosen
     if not chosen.effects or found.doubted:

@@ -1,4 +1,4 @@
-"""Signature of each effect in a record, the part absorbed by nuisances, and which effects look alike."""
+"""Signature of each effect in a record, the part absorbed by nuisances, and similar effects."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def signatures(
 ) -> Array:
     """Changes (N, m) of the prediction by every effect, small and at its starts, and by every nuisance.
 
-    In the record's units (slopes also over the parameter's). values: by key; around values that hold an
-    effect, its own columns are the derivatives by its parameters. effects: others than the simulator's, of
-    one specimen or found before. Drifts of zeros are left out, and columns of zeros.
+    In the record's units (slopes also over the parameter's). values: by key; if they hold an effect, its
+    columns are the derivatives by its parameters. effects: in addition to the simulator's, of one specimen or
+    found before. Drifts of zeros are left out, and columns of zeros.
     """
     base = record.predict(simulator, values)
     columns: list[Array] = []
@@ -72,9 +72,9 @@ class Sensitivity:
 
     column (N + m,): the part not absorbed by nuisances, for the best visible shape, and the cost of moving
     the m nuisances with prior knowledge; unabsorbed: its length over the length before; limit: size at which
-    delta chi squared is 16, in the parameter's unit; absorbed_by: the nuisances that take most, by how much
-    of the rest each takes; at_bounds: root of delta chi squared at the effect's largest size, nan where that
-    was not computed.
+    delta chi squared is 16, in the parameter's unit; absorbed_by: the nuisances that absorb most, each with
+    its share of the rest; at_bounds: root of delta chi squared at the effect's largest size, nan if not
+    computed.
     """
 
     effect: Effect
@@ -156,7 +156,7 @@ def sensitivities(
 def _slope(fitter: Fitter, values: Mapping[str, float], key: str, p: Parameter) -> Array:
     """Derivative (N,) of the prediction by one value, central unless a bound is in the way.
 
-    One-sided where the other side has no prediction. 0 where neither has: `Composite.refused` says why.
+    One-sided where the other side has no prediction. 0 where neither has: `Composite.refused` has the reason.
     """
     at, h = values.get(key, p.null), 1.0 if p.linear else 0.05 * p.step
     up = fitter.possible({**values, key: at + h})

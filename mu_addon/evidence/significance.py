@@ -1,4 +1,4 @@
-"""Significance of an effect: what it gains, and the probability that noise alone gains as much."""
+"""Significance of an effect: its gain, and the probability of that gain by noise alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DRAWS = 20000
 
 
 def gain_of(fitter: Fitter, less: Fit, more: Fit) -> float:
-    """Twice the log likelihood gained by an effect: the least under one noise and under each one's own.
+    """Twice the log likelihood gained by an effect: the least under a common noise and under separate ones.
 
     Without the second, slow noise estimated too small would pass for a cause; without the first, noise
     swollen by a cause would hide it. The gains by gauges' noise alone and by a search for its starts
@@ -53,8 +53,8 @@ def false_alarm_probability(fit: Fit, seen: Sequence[Sensitivity], gain: float) 
     """Probability that noise alone lets some effect of the library gain as much on top of a fit.
 
     The parametric bootstrap of the linearised library: gains are squares of the noise along each effect's
-    signature, one-sided where a bound makes it so; far in the tail, as many independent squares as fit the
-    bootstrap's hundredth.
+    signature, one-sided at a bound. Far in the tail, they are approximated by independent squares, fitted in
+    number to the bootstrap's last hundredth.
     """
     from scipy.stats import chi2
 

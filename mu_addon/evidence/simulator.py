@@ -55,13 +55,12 @@ class Simulator(Protocol):
 class Composite:
     """Simulators of several kinds of experiment as one; they share parameters by name, and cache predictions.
 
-    simulators: by kind. An effect whose parameters differ from kind to kind counts as several effects of one
-    name; those that refine another one's law stand apart in `refinements`. known: values, by
-    "effect.parameter", of effects that an earlier diagnosis named: they are in every prediction, and none of
-    these effects is offered again; unseen: those of them that no kind here has. remembered: most predictions
-    kept, the oldest are dropped; calls: predictions that were computed; refused: why models that a fit asked
-    for have no prediction, by the titles of their effects. Raises InputError where two simulators give a
-    parameter another unit, null or disjoint bounds.
+    simulators: by kind. An effect whose parameters differ between kinds counts as several effects of one
+    name; refinements of a law are in `refinements`. known: values, by "effect.parameter", of effects that an
+    earlier diagnosis named: they are in every prediction and are not offered again; unseen: those that no
+    kind here has. remembered: largest number of cached predictions; calls: number of computed predictions;
+    refused: why a requested model has no prediction, by the titles of its effects. Raises InputError where
+    two simulators give a parameter another unit, null or disjoint bounds.
     """
 
     def __init__(
@@ -121,9 +120,8 @@ class Composite:
     def predict(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
         """Prediction (channels, n) in the channels' units, read-only, from the cache where possible.
 
-        values: as in `Simulator.predict`; those the kind does not know are ignored,
-        and so are those of other specimens (`Effect.whose`). Raises InputError for a
-        kind without a simulator.
+        values: as in `Simulator.predict`; values unknown to the kind or of other specimens (`Effect.whose`)
+        are ignored. Raises InputError for a kind without a simulator.
         """
         simulator = self._of(experiment)
         own = self._own(experiment, {**self._known, **values} if self._known else values)
@@ -141,7 +139,7 @@ class Composite:
         return found
 
     def _own(self, experiment: Experiment, values: Mapping[str, float]) -> dict[str, float]:
-        """The values that the experiment's simulator knows, and those of its specimen by their plain keys."""
+        """The values that the experiment's simulator uses, with those of its specimen by plain keys."""
         knows, only, name = self._knows[experiment.kind], self._only, experiment.name
         own = {k: v for k, v in values.items() if k in knows and only.get(k, name) == name}
         others = [(k, v) for k, v in values.items() if OF in k and k not in knows]

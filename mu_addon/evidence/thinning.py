@@ -19,12 +19,12 @@ MOST = 20_000
 
 
 def thinned(experiments: Sequence[Experiment], simulator: Composite) -> tuple[list[Experiment], list[str]]:
-    """The experiments with no more than `MOST` rows where they have a clock, and which were longer, in words.
+    """The experiments with at most `MOST` rows if they have a clock, and a text on the longer ones.
 
-    Equal numbers of consecutive rows are averaged, all columns alike. That is exact for quantities linear
-    within them, as nearly holds over a twenty-thousandth of a record, and loses no information in white
-    noise. A missing reading is left out of its mean. Where a predicted channel stays on the steps of a
-    display, several readings hold no more information than one, and rows are sampled instead.
+    Equal numbers of consecutive rows are averaged, in all columns. That is exact for quantities linear within
+    them, as nearly holds over a twenty-thousandth of a record, and loses no information in white noise. A
+    missing reading is left out of its mean. Where a predicted channel stays on the steps of a display,
+    several readings hold no more information than one, and rows are sampled instead.
     """
     found, words = [], []
     for e in experiments:
@@ -46,7 +46,7 @@ def _every(values: Array, each: int) -> Array:
 
 
 def _means(values: Array, each: int) -> Array:
-    """Means (m,) of so many values (n,) each, the last of what is left; nan where all are."""
+    """Means (m,) of so many values (n,) each, the last of the remaining ones; nan if all are nan."""
     first = np.arange(0, len(values), each)
     seen = np.isfinite(values)
     count = np.add.reduceat(seen.astype(float), first)

@@ -1,4 +1,4 @@
-"""Readings without a clock that stand alone in a fit's residual: poses at rest, points of a curve."""
+"""Readings without a clock that are isolated in a fit's residual: poses at rest, points of a curve."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Points:
     """Readings of one channel of an experiment without a clock, as n points in the order of their drives.
 
     rows (n,): of the experiment. off (n,): reading less prediction, in the channel's unit. drive: name of the
-    drive that varies most. places (n, d): every drive in its unit. closed: the order has no ends, as in a
-    whole turn. step: of the display, in the channel's unit.
+    drive that varies most. places (n, d): every drive in its unit. closed: the order is cyclic, as in a full
+    turn. step: of the display, in the channel's unit.
     """
 
     experiment: Experiment
@@ -55,10 +55,10 @@ class Points:
 
 
 def points(experiment: Experiment, channel: str, predicted: Array, step: float) -> Points | None:
-    """The points of a channel beside its prediction (n,); None where they are too few to tell.
+    """The points of a channel with its prediction (n,); None if they are too few.
 
-    None, too, where a spread of the record is given: it counts as one number. step: of the display, in the
-    channel's unit, 0 where there is none.
+    None, too, if a spread of the record is given: it counts as one number. step: of the display, in the
+    channel's unit, 0 without one.
     """
     head, _, unit = channel.rpartition("_")
     off = experiment[channel] - predicted
@@ -84,11 +84,11 @@ def _closed(orientation_deg: Array) -> bool:
 
 
 def lone(every: Sequence[Points]) -> list[Array]:
-    """Masks (n,) of the points that stand alone, for one channel of one kind in several experiments.
+    """Masks (n,) of isolated points, for one channel of one kind in several experiments.
 
     These are `WRONG` standard deviations from the median of the points around them, and at most `MOST` of an
-    experiment. A point does not count where it may show a wrong model: near an end, beyond which the course
-    is unknown, among more than `IN_A_ROW`, and where those at the same place are off likewise.
+    experiment. A point does not count if it may show a wrong model: near an end, beyond which the course is
+    unknown, among more than `IN_A_ROW`, or if others at the same place deviate equally.
     """
     away = np.abs(np.concatenate([p.away for p in every]))
     if np.count_nonzero(away) <= STEEP * len(away):

@@ -66,11 +66,11 @@ def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
 class Body:
     """Inputs of a run of the unit, before it has a mesh.
 
-    finer: the mesh that mesh_error compares with. distal: how many chambers, from the tip, a clog cuts off.
-    lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
-    `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None where it is free.
-    drawn: the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small
-    effect. self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
+    finer: the mesh that mesh_error compares with. distal: number of chambers, from the tip, that a clog cuts
+    off. lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
+    `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None for a free tip. drawn:
+    the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small effect.
+    self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
     """
 
     unit: Unit
@@ -111,7 +111,7 @@ class Body:
         return attrs.evolve(self, mesh=mesh, finer=finer)
 
     def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
-        """Settings of Newton's method for a run of this body, with an effect or none."""
+        """Settings of Newton's method for a run of this body, with an effect or without."""
         own = effect.newton if effect else SMOOTH
         if self.self_contact:
             return RESOLVED_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
@@ -123,7 +123,7 @@ class Body:
 
         if self.unit.wall.names:
             raise InputError(
-                "evidence takes a neo-Hookean wall: what a wall does beyond that is what it looks for",
+                "evidence needs a neo-Hookean wall: it looks for the behaviour beyond that",
                 "[wall]",
                 "leave [wall] out of the unit",
             )
@@ -199,7 +199,7 @@ def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
 
 
 def with_flat_obstacle(body: Body, mesh: Mesh, gap_mm: float) -> Model:
-    """The unit beside a flat frictionless wall along its axis, on the side +y, or -y for gap_mm < 0.
+    """The unit next to a flat frictionless wall along its axis, on the side +y, or -y for gap_mm < 0.
 
     |gap_mm|: distance in mm of the wall from the outline at rest.
     """
@@ -294,8 +294,8 @@ def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Material
 def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
     """Lattice stiffer by `excess` in compression; below 0 less stiff, as if its struts buckled.
 
-    In parallel with the lattice's law a foam that resists one side only; for less stiff struts it resists
-    tension, and takes the place of as much of the law. Two such foams are the lattice at small strain.
+    A foam in parallel with the lattice's law that resists only one sign of strain. For less stiff struts it
+    resists tension and replaces an equal part of the law. Two such foams are the lattice at small strain.
     """
     from ..fem.laws import Foam
     from ..fem.materials import Layer, Materials
@@ -311,7 +311,7 @@ def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
 
 
 def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
-    """The wall stiffer along the print's layers, which lie across the axis; the lattice as it is.
+    """The wall stiffer along the print's layers, which lie across the axis; the lattice unchanged.
 
     All struts of a body-centred cell make one angle with the layers: to a homogenised lattice it is another
     modulus. Struts of a resolved mesh are printed in layers, too.
@@ -423,7 +423,7 @@ EFFECTS = {
 # A load cell farther from the tip than stated, in runs of a held tip.
 HELD = UnitEffect(
     "seating",
-    Parameter("tip_gap_mm", "mm", 0.0, 3.0, 0.0, (0.2, 1.0), "a cell run up by eye stands off by tenths"),
+    Parameter("tip_gap_mm", "mm", 0.0, 3.0, 0.0, (0.2, 1.0), "a cell set by eye is off by tenths"),
     (0.0, 0.5, 1.5, 3.0),
     body=lambda body, more_mm: attrs.evolve(body, gap_mm=(body.gap_mm or 0.0) + more_mm),
     length=1,

@@ -76,11 +76,11 @@ class UnitSettings:
     """Settings of the unit's simulation for the evidence.
 
     mesh: the model's; finer: the one that mesh_error compares with; changes: a coarser one for effects and
-    walls, whose changes of the response are taken over in proportion, or None for the model's: what is
-    between these two is then fitted beside every hypothesis (`FARTHER`), in place of mesh_error. pressures:
-    their approximate number; margin: beyond the measured ones, as a share of their range. effects: names of
-    those to run; whole: of those run at every size, the others at `UnitEffect.first` alone and believed no
-    further, or None for all. distal: chambers behind a clog. lattice: a law for the lattice in place of the
+    walls, whose changes of the response are transferred in proportion, or None for the model's. The
+    difference of these two is then fitted with every hypothesis (`FARTHER`), in place of mesh_error.
+    pressures: their approximate number; margin: beyond the measured ones, as a share of their range. effects:
+    names of those to run; whole: those run at every size, None for all; the others are run and trusted at
+    `UnitEffect.first` alone. distal: chambers behind a clog. lattice: a law for the lattice in place of the
     unit's moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
     `UnitResponse`. self_contact: of walls and struts of a resolved unit. workers: processes, one a core.
     """
@@ -105,7 +105,7 @@ class UnitSettings:
         return cls(STRUTS, changes=STRUTS_COARSE, whole=frozenset(), self_contact=self_contact)
 
     def further(self, names: Collection[str]) -> UnitSettings | None:
-        """With those of some effects at every size that are not yet; None where all are."""
+        """With some effects also at the remaining sizes; None where all are."""
         more = frozenset({*KNOWN, HELD.name}.intersection(names))
         if self.whole is None or more <= self.whole:
             return None
@@ -174,7 +174,7 @@ def unit_responses(
     Of unit_pose experiments those are the `unit_pose.STATIONS` about their axis.
 
     The unit keeps its moduli at every scale, as proportional scaling has it. Its runs are kept in the folder
-    `cache` and found again there, also by another call; `progress` is called with what is done and the share.
+    `cache` and found again there, also by another call; `progress` is called with a text and the share done.
     Sizes of an effect that cannot be computed are left out with a UnitResponseWarning, and so are pressures
     that the base model does not reach. Raises InputError for markers out of place (`attached`) and added
     masses, which the model lacks, and ConvergenceError where the base model reaches too few pressures.
@@ -268,7 +268,7 @@ def _counted_alike(responses: Sequence[UnitResponse]) -> list[UnitResponse]:
 
 
 def similar(unit: Unit) -> Unit:
-    """The unit at 1.0x that moves as this one does, all lengths alike; this one where it cannot be drawn.
+    """The unit at 1.0x that moves as this one does, all lengths scaled; this one if that cannot be drawn.
 
     An elastic body has no intrinsic length: enlarged as a whole, at the same pressures and moduli, it rotates
     by the same angles. The print's offsets and skin depth in mm do not grow with the unit, so here they are
@@ -364,7 +364,7 @@ class _Plan:
     ) -> Run:
         """A run of an effect whose size is that at 1.0x, of the reference where none is named.
 
-        The reference's outline is kept whether or not walls are asked for, so that one run serves both.
+        The reference's outline is always kept, so that one run serves with and without walls.
         """
         points = tuple(tuple((m.point / self.enlarged).tolist()) for m in self.markers)
         turn, axis = orientation
@@ -379,7 +379,7 @@ class _Plan:
         return attrs.evolve(self.case(), body=self.body)
 
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
-        """What runs of effects start from first, then the longest runs."""
+        """First the runs that runs of effects start from, then the longest."""
         yield self.case()
         yield self.base_case
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
@@ -405,7 +405,7 @@ class _Plan:
         return self._unit(found[self.base_case.key()])
 
     def reference(self, found: dict[str, Result]) -> Result:
-        """What effects change on their own mesh, as `base`."""
+        """Changes by effects on their mesh, as `base`."""
         return self._unit(found[self.case().key()])
 
     def _unit(self, result: Result) -> Result:
@@ -541,7 +541,7 @@ class _Plan:
         return Variant(effect.parameter.narrowed(low, high), np.array(sizes), np.array(values))
 
     def _continued(self, result: Result, reference: Result) -> Result:
-        """The result with what it changes grown in proportion to pressure where it ends beyond the readings.
+        """The result, its changes extrapolated in proportion to pressure where it ends before the readings.
 
         There it serves gauges alone, and a body that collapses costs most.
         """
@@ -558,7 +558,7 @@ class _Plan:
         return Result(values, result.why)
 
     def _taken_over(self, result: Result, base: Result, reference: Result) -> Result:
-        """The base's response with an effect, from what this one changes of the reference's.
+        """The base's response with an effect, from its change of the reference's.
 
         In proportion to how far both move from rest, which differs by the meshes' errors.
         """
@@ -573,7 +573,7 @@ class _Plan:
     def _mesh_errors(self, at: Array, base: Array, way: Array) -> dict[str, Variant]:
         """Errors of the model's mesh, everywhere and at each suction, at pressures (k,) in kPa.
 
-        base (c, k): response of c channels; way (c, k): what it moved by from the coarser mesh.
+        base (c, k): response of c channels; way (c, k): its change from the coarser mesh.
         """
         shares = {"mesh_share": (np.ones_like(at), FARTHER)}
         sucking = np.flatnonzero(at < 0)
@@ -598,8 +598,8 @@ def _with_midpoints(
 ) -> tuple[Array, Array, Array, dict[str, Variant]]:
     """Pressures (k,) in kPa with those midway in suction, and the rest of a response at these.
 
-    There walls and struts meet one after the other, at pressures that differ between meshes: errors of a mesh
-    are narrower than the pressures that were simulated are apart.
+    There walls and struts touch one after the other, at pressures that differ between meshes by less than the
+    interval of simulated pressures.
     """
     from scipy.interpolate import CubicSpline
 
@@ -646,7 +646,7 @@ def _found(
 def _solved(
     missing: dict[str, Run], first: int, workers: int, cache: Path | None
 ) -> Iterator[tuple[str, Result]]:
-    """Results by key; the first runs in this process, the others in processes of their own."""
+    """Results by key; the first runs in this process, the others in separate ones."""
     keys, cases = list(missing), list(missing.values())
     first = first if workers > 1 else len(cases)
     for key, case in zip(keys[:first], cases[:first], strict=True):

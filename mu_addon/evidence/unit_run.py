@@ -46,7 +46,7 @@ class Run:
     """One quasi-static simulation: a body, an effect and its size, pressures in kPa, points in mm.
 
     points: p of (x, y, z). effect: empty for the base model. size: in the effect's unit. outline: also
-    compute how far the outline moves toward +y and -y, in mm.
+    compute the outline's displacement toward +y and -y, in mm.
     """
 
     body: Body
@@ -211,7 +211,7 @@ def _states(
 ) -> Iterator[tuple[int, State]]:
     """Yield number and state of each pressure as far as they are reached; raise the last ConvergenceError.
 
-    start: without pressure. beside: displacements of nearly the same body by number.
+    start: without pressure. beside: displacements of a nearly equal body by number.
     """
     distinct, sides = branches(pressures_kPa)
     number = {p: int(np.flatnonzero(pressures_kPa == p)[0]) for p in distinct}

@@ -39,13 +39,12 @@ class Verdict:
 
     kind: one of `KINDS`. experiments: all of them, their drives freed of gauge noise
     (`drive.denoised_drives`). sources: noise by group of series. intervals: 95 % bounds by key, in the
-    parameters' units. identifiability: effects that these data cannot show, with
-    the reason. set_aside: readings left out, in words (`readings.wrong_readings`). refused: why models that
-    were tried have no prediction, by the titles of their effects. share_taken: of the base model's misfit by
-    the chosen one; a verdict `named` or `ambiguous` may leave structure (`main_causes.mainly`). nearest:
-    title of the best single explanation, named or not, and its share of the misfit. far: nuisances that are
-    far from what was known of them, the farthest first. zeros: of a load cell, where they hide an error.
-    `as_json` is the content of verdict.json.
+    parameters' units. identifiability: effects that these data cannot show, with the reason. set_aside: texts
+    on readings left out (`readings.wrong_readings`). refused: why tried models have no prediction, by the
+    titles of their effects. share_taken: of the base model's misfit by the chosen one; a verdict `named` or
+    `ambiguous` may leave structure (`main_causes.mainly`). nearest: title of the best single explanation,
+    named or not, and its share of the misfit. far: nuisances far from prior knowledge, the farthest first.
+    zeros: of a load cell, if they hide an error. `as_json` is the content of verdict.json.
     """
 
     kind: str
@@ -82,10 +81,10 @@ class Verdict:
 
     @property
     def in_question(self) -> frozenset[str]:
-        """Names of effects that the verdict turns on; none where it is `none`.
+        """Names of effects that decide the verdict; empty if it is `none`.
 
-        Those chosen, their rivals, and those that alone take `NEAR` of what the best takes, or `SOME` of it
-        as far as they are believed.
+        The chosen ones, their rivals, and those that alone take `NEAR` of the best one's gain, or `SOME` of
+        it within their trusted range.
         """
         if self.kind == "none":
             return frozenset()
@@ -110,7 +109,7 @@ class Verdict:
     def as_json(self) -> dict[str, Any]:
         """The content of verdict.json.
 
-        partly_explained_by: effects of the chosen model where the verdict names none; they are not the cause.
+        partly_explained_by: effects of the chosen model if the verdict names none; they are not the cause.
         """
         causes = [
             {

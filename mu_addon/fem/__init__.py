@@ -1,9 +1,9 @@
 """Finite elements: quasi-static equilibria of soft bodies under pressure, weight and contact.
 
-A `Model` is a discretised body, `Materials` what fills it, and `Equilibrium` finds its states by Newton's
+A `Model` is a discretised body, `Materials` are its laws, and `Equilibrium` finds its states by Newton's
 method: `simulate` along a pressure protocol, `simulate_in_time` where a law or friction remembers,
-`bending_angle_deg` and `probe` read results off a deformed mesh. Units:
-mm, N, MPa, s; kPa and degrees only where the name says so.
+`bending_angle_deg` and `probe` read results off a deformed mesh. Units: mm, N, MPa, s; kPa and degrees only
+with these units in the name.
 
     >>> from mu_addon.fem import NeoHooke
     >>> NeoHooke.parameter_names

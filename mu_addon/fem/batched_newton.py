@@ -42,7 +42,7 @@ class Variant:
 
 
 class BatchedNewton:
-    """Equilibria of many variants of one body, each state from the body's own at the same pressure.
+    """Equilibria of many variants of one body, each from the body's state at the same pressure.
 
     Every step is a quasi-Newton step with the variant's exact tangent at the body's state, at the cost of one
     solve with the tangent that all variants share (see `variants`). Raises InputError for a model with
@@ -58,7 +58,7 @@ class BatchedNewton:
     ) -> None:
         if model.self_contact is not None:
             raise InputError(
-                "bodies with self-contact each have a tangent of their own pattern",
+                "bodies with self-contact have tangents of different patterns",
                 "BatchedNewton",
                 "solve each separately, with Equilibrium",
             )
@@ -122,7 +122,7 @@ class BatchedNewton:
         return Equilibrium(self.model, self.variants[i].of(self.materials), self.settings)
 
     def _alone(self, i: int, state: State, near: Array | None) -> State:
-        """Solve for a variant that the shared factor does not serve, by its own factors or along its path."""
+        """Solve for a variant for which the shared factor fails, by its own factors or along its path."""
         alone = self.alone(i)
         limit = self.settings.predictor_tolerance * np.abs(state.u).max()
         for start in (near, state.u):
@@ -141,8 +141,8 @@ class _Part:
     """Elements (e,) that variants change, as a separate model; `unknowns` (c,) are its free ones.
 
     A variant's new law is taken at rest and rotated with its elements. A stiff inclusion deforms little, so
-    this is closer to its final tangent than the law at the body's strain, which under compression need not
-    even be definite.
+    this is closer to its final tangent than the law at the body's strain, which may be indefinite under
+    compression.
     """
 
     def __init__(

@@ -1,9 +1,9 @@
 """Terms that laws other than neo-Hooke's add to beams: energy of fibres along them, under uniaxial stress.
 
-The beams of `fem.beams` are of a neo-Hookean resin. A fibre of another law differs from it by the energy of a
-rod of both laws pulled along the beam, free to change its section. Strains of fibres are those of linear
-theory: the beam's stretch, and its moment over its flexural stiffness. So the added energy is exact to first
-order in what the law adds, and has a potential at any size of it.
+The beams of `fem.beams` are of a neo-Hookean resin. A fibre of another law adds the difference in energy of
+two rods, one of each law, pulled along the beam with free lateral strain. Strains of fibres are those of
+linear theory: the beam's stretch, and its moment over its flexural stiffness. The added energy is exact to
+first order in the law's difference, and has a potential at any size.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ class Mixture(NamedTuple):
 class Fibres:
     """Energy that fibres add to e beams, 14 to a beam.
 
-    by_strain (e, 14, 6): slopes of the fibres' stretches by the beam's strains; volume (e, 14) in mm3;
-    own (e,): the curve of each beam. coefficients (4, k, c): of c curves, cubics of the stress in MPa beyond
+    by_strain (e, 14, 6): slopes of the fibres' stretches by the beam's strains; volume (e, 14) in mm3; own
+    (e,): number of each beam's curve. coefficients (4, k, c): of c curves, cubics of the stress in MPa beyond
     the neo-Hookean one, by the stretch since each of `knots` (k + 1,); energies (k, c) in MPa at the knots.
     """
 
@@ -198,7 +198,7 @@ def _cubics(x: Array, value: Array, slope: Array) -> Array:
 def _curve(found: Sequence[Mixture], frames: Array, stretches: Array) -> tuple[Array, Array]:
     """Stress and tangent modulus (k, c) in MPa of c rods at stretches (k,), the first of which is 1.
 
-    Under uniaxial stress along the third axes of frames (c, 3, 3): the energy at its least over all other
+    Under uniaxial stress along the third axes of frames (c, 3, 3): the energy is minimal over all other
     components of a symmetric stretch tensor.
     """
     basis = []

@@ -1,8 +1,8 @@
 """Geometrically exact two-node beams: energy, forces and stiffness of 12 unknowns an element.
 
 A beam node has a displacement and a rotation vector, measured from the undeformed body. Between two nodes the
-section turns about one axis (Crisfield and Jelenic, Proc. R. Soc. A 455 (1999) 1125): strains are taken in
-the frame midway between both, so a rigid motion strains nothing. In linear theory an element is exact for any
+section turns about one axis (Crisfield and Jelenic, Proc. R. Soc. A 455 (1999) 1125): strains are measured in
+the frame midway between both, so they vanish in a rigid motion. In linear theory an element is exact for any
 taper, since its stiffness comes from the integrated flexibility of the strut (`sections_of`).
 
 Unknowns of an element, (12,): displacement and rotation vector of its first node, then of its second.
@@ -40,7 +40,7 @@ class Sections:
     """Stiffness of e elements: axial (N), torsional (N mm2), and of bending with shear, each (e,).
 
     bending: of the relative rotation t of both ends and the offset q of one from the other's tangent, as
-    energy 1/2 (turn t^2 + 2 mixed t q + offset q^2), in N mm, N and N/mm; alike in both planes of the axis.
+    energy 1/2 (turn t^2 + 2 mixed t q + offset q^2), in N mm, N and N/mm; equal in both planes of the axis.
     """
 
     axial: Array
@@ -56,7 +56,7 @@ class Beams:
 
     chord (e, 3): from an element's first to its second end in mm; frames (e, 3, 3): rows are two axes of its
     section and its own axis; sections: its stiffness. An axial stretch makes the section thinner and changes
-    the resin's modulus, and so all other stiffness (`_law`). fibres: what another law adds.
+    the resin's modulus, and therefore all other stiffness (`_law`). fibres: the part that another law adds.
     """
 
     chord: Array
@@ -92,7 +92,7 @@ class Beams:
     def end_loads(self, x: Array) -> tuple[Array, Array]:
         """Axial forces (e,) in N, and both ends' bending moments (e, 2, 2) in N mm about the section's axes.
 
-        x (e, 12): the unknowns. The moment changes along an element as its shear force says.
+        x (e, 12): the unknowns. The moment changes along an element by its shear force.
         """
         stress = self._law(self.strains(x))[1] / self.length[:, None]
         lever = 0.5 * self.length[:, None] * (stress[:, :2] @ _COUPLES)
@@ -108,7 +108,7 @@ class Beams:
 
 @attrs.frozen(eq=False)
 class _State:
-    """Strains (e, 6) of elements at their unknowns, their slopes (e, 6, 12) and what second slopes take.
+    """Strains (e, 6) of elements at their unknowns, their slopes (e, 6, 12) and the terms of second slopes.
 
     sign (e, 1): of the second node's quaternion, which is turned to the side of the first one's.
     """
@@ -192,9 +192,9 @@ class _State:
 def _law(strains: Array, length: Array, s: Sections) -> tuple[Array, Array, Array]:
     """Energies (e,) in mJ of strains (e, 6), their slopes (e, 6) and second slopes (e, 6, 6).
 
-    Of a thin incompressible neo-Hookean rod stretched by l: axially E A (l^2 + 2/l - 3)/6; its section's
-    second moment shrinks by l^-2 and the tangent modulus is E (1 + 2/l^3)/3, so that a turn of the section
-    by a given angle between its ends costs (1 + 2/l^3)/(3 l) of what it costs undeformed, and a twist 1/l.
+    Of a thin incompressible neo-Hookean rod stretched by l: axially E A (l^2 + 2/l - 3)/6. Its section's
+    second moment shrinks by l^-2 and the tangent modulus is E (1 + 2/l^3)/3. A given relative rotation of its
+    ends therefore has (1 + 2/l^3)/(3 l) of the undeformed energy, and a given twist 1/l.
     """
     shear, turn, twist = strains[:, :2] * length[:, None], strains[:, 3:5] * length[:, None], strains[:, 5]
     real = strains[:, 2]

@@ -16,8 +16,8 @@ Array = np.ndarray[Any, Any]
 class TipSection:
     """The end plane of a mesh's tip, whose rotation is the bending angle.
 
-    nodes: (t,) that integrate over it. places: theirs (t, 3) at rest in mm. area: the share of the plane that
-    each stands for, (t,) in mm2. symmetry: axes whose zero plane is a mirror of the body.
+    nodes: (t,) that integrate over it. places: their positions (t, 3) at rest in mm. area: the part of the
+    plane of each node, (t,) in mm2. symmetry: axes whose zero plane is a mirror of the body.
     """
 
     nodes: Array
@@ -53,8 +53,8 @@ def bending_angle_deg(mesh: Mesh, u: Array) -> float:
     """Rotation of the tip's cross-section against the fixed base, positive toward +y, in degrees.
 
     Area-weighted best-fit rotation (orthogonal Procrustes) of the end plane in the plane of bending (y, z):
-    of cap and lattice, or of a resolved unit's cap and ends of struts. Toward +y because that is how the unit
-    bends when pressure grows; as a right-hand rotation about x it is negative. u: (n, 3) in mm. For many
+    of cap and lattice, or of a resolved unit's cap and ends of struts. Positive toward +y, to which the unit
+    bends under growing pressure; as a right-hand rotation about x it is negative. u: (n, 3) in mm. For many
     states of one mesh, `TipSection` finds the plane once.
     """
     return TipSection.of(mesh).angle_deg(u)
@@ -80,7 +80,8 @@ def tip_faces(mesh: Mesh) -> tuple[Array, Array, Array]:
 
 
 def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> tuple[Array, Array]:
-    """Tip nodes with weights that integrate over what fills the end plane, a third of a triangle a node.
+    """Tip nodes with weights that integrate over the solid part of the end plane, a third of a triangle a
+    node.
 
     On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2. found:
     the `tip_faces`.

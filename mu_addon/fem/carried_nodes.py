@@ -25,10 +25,11 @@ def following(mesh: Mesh, u: Array) -> Array:
 class Carried:
     """The carried nodes of a mesh with beams (`Mesh.carried`).
 
-    A node at X moves by the mean, weighted by its two shares, of what the sections at two beam nodes would
-    do to it: u + (R - 1) a, with displacement u and rotation R of the beam node at X_b, and a = X - X_b for a
-    node of one section. Between two, a is shorter by half the other's share of the way to it (midway by a
-    quarter): the axis is then the parabola with the sections as its normals, and their shear is the beam's.
+    A node at X moves by the mean, weighted by its two shares, of the motions by the sections at two beam
+    nodes: u + (R - 1) a, with displacement u and rotation R of the beam node at X_b, and a = X - X_b for a
+    node of one section. Between two sections, a is shorter by half the other's share of the distance (midway
+    by a quarter): the axis is then the parabola with the sections as its normals, and their shear is the
+    beam's.
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -68,7 +69,7 @@ class Carried:
         return np.stack([turned_slopes(u[self._turns], arm) for arm in self._axes()], axis=2)
 
     def _moments(self, forces: Array) -> Array:
-        """Sums (t, 3, 3) in N mm, over what a section carries, of arms by axis times forces (n, 3) in N."""
+        """Sums (t, 3, 3) in N mm, over the nodes of a section, of arms by axis times forces (n, 3) in N."""
         acting = self._share[:, None] * forces[self.nodes[self._own]]
         found = np.empty((len(self._turns), 3, 3))
         for axis, i in np.ndindex(3, 3):
@@ -77,7 +78,7 @@ class Carried:
         return found
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array:
-        """Derivative (n, 3) by all nodes' places of forces (n, 3) times what carried nodes are given.
+        """Derivative (n, 3), by all nodes' positions, of forces (n, 3) times the motion of carried nodes.
 
         That is their displacement at u (n, 3) or, with a change v (n, 3) of u, its change. Arms alone depend
         on places.
@@ -112,8 +113,8 @@ class Carried:
         """Stiffness (t, 3, 3) in N mm of rotation vectors under forces (n, 3) in N on carried nodes.
 
         Also returned: the nodes (t,) that carry them. It is the stiffness of forces of fixed direction as
-        their arms rotate. convex: each without its negative eigenvalues, since contact on both sides of a
-        strut otherwise turns it over, and on the way to equilibrium its forces are far larger than there.
+        their arms rotate. convex: each without its negative eigenvalues. Contact on both sides of a strut
+        otherwise turns it over, since its forces before equilibrium are far larger than there.
         """
         moments = self._moments(forces)
         found = np.zeros((len(self._turns), 3, 3))
@@ -125,8 +126,8 @@ class Carried:
         return found, self._turns
 
     def operators(self, u: Array) -> Array:
-        """Derivatives (1 + 2 k, 3, 3) of a node's displacement: by its own, and by those of the beam nodes
-        that carry it.
+        """Derivatives (1 + 2 k, 3, 3) of a node's displacement: by itself, and by the unknowns of its beam
+        nodes.
 
         The k shares come first, then the k slopes by rotation vectors.
         """
@@ -168,8 +169,8 @@ class Folding:
     """Map of blocks with a carried node on either side to blocks between beam nodes.
 
     block (e,): which of the given; left, right (e,): operators of its row and column, see
-    `Carried.operators`; row, column (e,): nodes of the lower triangle, and turned (e,), whether the block
-    falls there transposed; both (e,): whether its own transpose falls there, too.
+    `Carried.operators`; row, column (e,): nodes of the lower triangle, turned (e,): True if the block is
+    transposed there; both (e,): True if its transpose is there, too.
     """
 
     block: Array

@@ -28,9 +28,9 @@ class CloggedModel(Model):
 
     The neck is closed by a cone from the neck's rim to the mean of its nodes. It carries the pressure
     difference to the rim, so that both chambers are closed and the load has a potential, -p (V - share_lost
-    V_beyond): the tangent stays symmetric. Its own part of the tangent, of the rim alone, is left out, which
-    costs Newton's method steps and changes no equilibrium. more: further arguments of `Model`. Raises
-    InputError where no neck is cut.
+    V_beyond): the tangent stays symmetric. Its part of the tangent, of the rim alone, is left out: Newton's
+    method needs more steps to the same equilibrium. more: further arguments of `Model`. Raises InputError
+    where no neck is cut.
     """
 
     def __init__(self, mesh: Mesh, height_mm: float, share_lost: float, **more: Any) -> None:
@@ -129,7 +129,7 @@ class CloggedModel(Model):
         return np.einsum("qa,eqi->eai", shape, area) / 3, area.sum(axis=1) / 2
 
     def _add_cone(self, residual: Array, x: Array, pressure: float) -> None:
-        """Add the force of a pressure on the cone; the apex hands its third to the rim's nodes alike."""
+        """Add the force of a pressure on the cone; the apex shares its third among the rim's nodes."""
         of_nodes, whole = self._cone(x, self._apex(x))
         np.add.at(residual, self._rim, pressure * of_nodes)
         at_apex = pressure * whole.sum(axis=0) / 3

@@ -90,7 +90,7 @@ class Solution:
     """Result of `conjugate_gradients` for k systems.
 
     x (k, n): on the device; solved (k,) bool: residual within the tolerance; definite (k,) bool: no direction
-    of negative curvature was met; iterations: those made, the same for all.
+    of negative curvature was found; iterations: their number, the same for all.
     """
 
     x: wp.array
@@ -106,7 +106,7 @@ def conjugate_gradients(multiply: Any, precondition: Any, b: wp.array, tolerance
     residual is below `tolerance` of its right-hand side, or after MAX_ITERATIONS. (Hestenes and Stiefel, J.
     Res. Natl. Bur. Stand. 49 (1952) 409.)
 
-    Warp's own solver does not return the curvature, by which an indefinite matrix is found.
+    Warp's solver does not return the curvature, which reveals an indefinite matrix.
     """
     device, k = b.device, b.shape[0]
     x, r = wp.zeros_like(b), wp.clone(b)
@@ -144,10 +144,9 @@ def conjugate_gradients(multiply: Any, precondition: Any, b: wp.array, tolerance
 class ConjugateGradients:
     """Solves with a symmetric positive definite matrix of one pattern, as `factor.Cholesky` does.
 
-    The preconditioner is a factorised sparse approximate inverse, by Warp (Kolotilina and Yeremin, SIAM
-    J. Matrix Anal. Appl. 14 (1993) 45). indptr (n + 1,), indices (nnz,): the lower triangle by columns; order
-    (n,): in which the unknowns are kept on the device. tolerance: residual over right-hand side of every
-    solution.
+    The preconditioner is a factorised sparse approximate inverse, by Warp (Kolotilina and Yeremin, SIAM J.
+    Matrix Anal. Appl. 14 (1993) 45). indptr (n + 1,), indices (nnz,): the lower triangle by columns; order
+    (n,): of the unknowns on the device. tolerance: residual over right-hand side of every solution.
     """
 
     # A residual below this share of a random right-hand side proves the matrix definite but for about
@@ -216,10 +215,10 @@ class ConjugateGradients:
     def _prove_definite(self) -> None:
         """Solve with a random right-hand side; raises IndefiniteError where that fails.
 
-        The residual's part along a mode v of the preconditioned matrix, of negative eigenvalue l, is that
-        of b times the product of 1 - l / h over the Ritz values h. While all curvatures are positive so
-        are all h, and that part cannot shrink. A residual that shrank all the same had no such part: in
-        n unknowns a random unit b has less than e of a given unit v with probability e sqrt(2 n / pi).
+        The residual's part along a mode v of the preconditioned matrix, of negative eigenvalue l, is that of
+        b times the product of 1 - l / h over the Ritz values h. While all curvatures are positive so are all
+        h, and that part cannot shrink. A residual that shrank nevertheless had no such part: in n unknowns a
+        random unit b has a component below e along a given unit v with probability e sqrt(2 n / pi).
         """
         b = np.random.default_rng(0).standard_normal((1, self.size))
         tried = self._run(self._put(b, wp.float64), None, self.proof)
@@ -250,8 +249,8 @@ class ConjugateGradients:
     def solve_changed(self, b: Array, changes: Changes | None) -> tuple[Array, Array]:
         """Solutions (k, n) of k systems with right-hand sides b (k, n), and which are solved, (k,) bool.
 
-        Each system is the matrix plus its own change, or the matrix alone where changes is None. `iterations`
-        then holds how many were needed.
+        Each system is the matrix plus its change, or the matrix alone if changes is None. `iterations` then
+        holds how many were needed.
         """
         found = self._run(self._put(b[:, self._order], wp.float64), changes, self.tolerance)
         self.iterations = found.iterations

@@ -50,10 +50,10 @@ class Body(Protocol):
 def damped_minimum(body: Body, start: Array, pressure_MPa: float) -> State:
     """The stable state at a pressure in MPa that damped motion from a start (n, 3) in mm leads to.
 
-    Each step minimises the potential's quadratic model with a share of the undeformed body's stiffness about
-    the last iterate added, which is a step in time of a motion that this stiffness damps; the share follows
-    how well the model tells the decrease (Levenberg and Marquardt). Steps end before surfaces touch. The
-    cavity must be closed, so that its pressure has a potential. Raises ConvergenceError.
+    Each step minimises the potential's quadratic model plus a share of the undeformed body's stiffness about
+    the last iterate. This is a time step of a motion damped by that stiffness. The share is adapted to the
+    model's accuracy (Levenberg and Marquardt). Steps end before surfaces touch. The cavity must be closed, so
+    that its pressure has a potential. Raises ConvergenceError.
     """
     model, parameters, tolerance = body.model, body.parameters, body.settings.tolerance
     u, damping = start, _FIRST

@@ -23,7 +23,7 @@ def gravity(
     """Weight as consistent nodal forces (n, 3) in N, for `Model.load`.
 
     density_tonne_per_mm3: of the undeformed body, one number or one an element (m,); 1 g/ml is 1e-9.
-    direction (3,): the way things fall, of any length. g_mm_per_s2: standard gravity by default.
+    direction (3,): of gravity, of any length. g_mm_per_s2: standard gravity by default.
     """
     points, _ = tet_quadrature(mesh.order)
     shape = shape_functions(points, mesh.order)

@@ -24,7 +24,7 @@ DEVICE = described(
 
 
 def device_field() -> Any:
-    """Field of a job for the device; raises InputError for a name that is none."""
+    """Field of a job for the device; raises InputError for an unknown name."""
     return attrs.field(default=DEVICE.default, validator=_known)
 
 

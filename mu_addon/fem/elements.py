@@ -38,9 +38,9 @@ def tet_quadrature(order: int) -> tuple[Array, Array]:
 def triangle_quadrature(order: int) -> tuple[Array, Array]:
     """Barycentric points (q, 3) and weights (q,), summing to 1/2: degree 2 for order 1, 4 for order 2.
 
-    These degrees integrate the enclosed volume of a (curved) face and its derivatives exactly, which
-    is what keeps the assembled pressure stiffness of a closed cavity symmetric. Source of the
-    six-point rule: Dunavant, Int. J. Numer. Methods Eng. 21 (1985) 1129.
+    These degrees integrate the enclosed volume of a (curved) face and its derivatives exactly, so that the
+    assembled pressure stiffness of a closed cavity is symmetric. Source of the six-point rule: Dunavant, Int.
+    J. Numer. Methods Eng. 21 (1985) 1129.
     """
     if order == 1:
         return np.full((3, 3), 1 / 6) + np.eye(3) * 0.5, np.full(3, 1 / 6)
@@ -66,7 +66,7 @@ def triangle_shapes(order: int) -> tuple[Array, Array, Array]:
 class ReferenceGradients:
     """Shape functions' gradients (m, q, n, 3) in 1/mm by the undeformed place, and volumes (m, q) in mm3.
 
-    Of m elements with n nodes, at q quadrature points; a volume is that which its point stands for.
+    Of m elements with n nodes, at q quadrature points, each with its part of the volume.
     """
 
     gradients: Array
@@ -113,7 +113,7 @@ def even_points(steps: int) -> Array:
 
 
 def solid_volumes(mesh: Mesh) -> Array:
-    """Volumes (m, q) in mm3 that the quadrature points of a mesh's elements stand for, as far as filled.
+    """Filled volumes (m, q) in mm3 of the quadrature points of a mesh's elements.
 
     Raises MeshingError as `reference_gradients`.
     """
@@ -141,7 +141,7 @@ def shape_gradients(barycentric: Array, order: int) -> Array:
 class Reference:
     """Gradients and volumes of a mesh's undeformed elements, on a device of Warp as well.
 
-    near: of a mesh of the same elements; only elements with moved nodes are then computed anew.
+    near: of a mesh of the same elements; only elements with moved nodes are computed again.
     """
 
     def __init__(self, mesh: Mesh, device: str, near: Reference | None = None) -> None:
@@ -164,7 +164,7 @@ class Reference:
 
     @property
     def resisting_volumes(self) -> Array:
-        """Volumes (m, q) in mm3 that the quadrature points stand for, as far as `Mesh.resisting` counts."""
+        """Volumes (m, q) in mm3 of the quadrature points, times `Mesh.resisting`."""
         volumes = self.at.volumes
         return np.asarray(volumes * self.mesh.resisting if self.mesh.resolved else volumes)
 

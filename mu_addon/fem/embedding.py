@@ -25,8 +25,8 @@ _NEIGHBOURS = 16
 class Embedding(Probe):
     """Points (p, 3) in mm that move with a mesh; made by `embed`.
 
-    outside_mm (p,): distance of each point from the mesh, 0 inside. mirrored (p,): whether a point lies on
-    the other side of the mirror plane x = 0 of a half mesh.
+    outside_mm (p,): distance of each point from the mesh, 0 inside. mirrored (p,): True for a point on the
+    other side of the mirror plane x = 0 of a half mesh.
     """
 
     outside_mm: Array
@@ -43,8 +43,8 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
     """Embed points (p, 3) in mm in a mesh, so that they move with its deformation.
 
     Inside the mesh a point moves by the shape functions of its element. Outside, the displacement of the
-    nearest surface point is continued linearly with its gradient; points beyond the fixed base stand still
-    as it does. Points across the mirror plane x = 0 of a half mesh move as their images do.
+    nearest surface point is continued linearly with its gradient; points beyond the fixed base are fixed.
+    Points across the mirror plane x = 0 of a half mesh move as their images do.
     """
     points = np.asarray(points, float)
     mirrored = np.zeros(len(points), bool)
@@ -67,9 +67,9 @@ def embed(mesh: Mesh, points: Array) -> Embedding:
 class Footholds:
     """Positions of points (p, 3) relative to a mesh, so that their weights follow small motions of both.
 
-    tets (p, n): nodes of each point's element; at (p, 4): the place in it, barycentric, about which the
-    displacement is continued linearly; held (p,): beyond the fixed base, where nothing is continued. weights
-    (p, n): as in `embed`, at the positions that the footholds were made for.
+    tets (p, n): nodes of each point's element; at (p, 4): barycentric position in it, about which the
+    displacement is continued linearly; held (p,): beyond the fixed base, without continuation. weights (p,
+    n): as in `embed`, at the positions that the footholds were made for.
     """
 
     tets: Array
@@ -79,7 +79,7 @@ class Footholds:
 
     @classmethod
     def of(cls, mesh: Mesh, points: Array) -> Footholds:
-        """Footholds of points in a quadratic mesh or beside it, none of them across a mirror plane."""
+        """Footholds of points in or near a quadratic mesh, none of them across a mirror plane."""
         element, local = _elements(mesh, points)
         inside = element >= 0
         at, held = _barycentric(local), np.zeros(len(points), bool)
@@ -189,7 +189,7 @@ def _weights(nodes: Array, at: Array, held: Array, points: Array) -> Array:
 def _nearest(mesh: Mesh, points: Array) -> tuple[Array, Array, Array, Array]:
     """Elements (p,) at the surface points nearest to points outside a mesh, and these, barycentric (p, 4).
 
-    Besides whether each lies on the fixed base (p,), and distances (p,) in mm.
+    Also returned: mask (p,) of those on the fixed base, and distances (p,) in mm.
     """
     from scipy.spatial import cKDTree
     from trimesh.triangles import closest_point

@@ -39,9 +39,9 @@ SHARES_OF_WAY = (1 / 16, 1 / 4)
 class Equilibrium:
     """Finds equilibria of one body with one set of materials, by Newton's method with line search.
 
-    `at_zero_pressure` is the state without pressure, `newton` one at a pressure from a nearby start,
-    `reach` one from states before it with adaptive load steps, `path` several in order. No state is
-    returned that did not converge or is unstable: ConvergenceError says at what pressure, where and why.
+    `at_zero_pressure` is the state without pressure, `newton` a state at a pressure from a nearby start,
+    `reach` a state from earlier ones with adaptive load steps, `path` several in order. No state is returned
+    that did not converge or is unstable: ConvergenceError gives the pressure, place and reason.
 
     settings: tolerances, by default a residual of 1e-9 of the root sum of squares of all element forces.
     """
@@ -74,9 +74,9 @@ class Equilibrium:
         """Factorise the tangent; where it is indefinite, with a share of the undeformed body's added.
 
         Away from equilibrium a thin wall may be compressed beyond its buckling load although the equilibrium
-        itself is stable. convex: as `Model.tangent` takes it; where that of self-contact is needed and not
-        asked for, it comes first. first: number of the share to begin with, 0 for none. Returns whether the
-        tangent asked for was definite, and the number of the share that was added.
+        itself is stable. convex: as in `Model.tangent`; if the convex tangent of self-contact is needed and
+        not requested, it is tried first. first: number of the share to begin with, 0 for none. Returns True
+        if the requested tangent was definite, and the number of the added share.
         """
         touches = self.model.has_convex_tangent
         shares = 0.0, *self.settings.regularisation
@@ -122,9 +122,9 @@ class Equilibrium:
     def newton(self, u: Array, pressure: float, reach_mm: float = np.inf) -> State:
         """Stable equilibrium at a pressure in MPa, from a start (n, 3) in mm that obeys the supports.
 
-        With friction, one whose bound belongs to it. Raises ConvergenceError where elements invert, progress
-        stops, the equilibrium found is unstable, or a component of the displacement differs from the start's
-        by more than `reach_mm`. Self-contact is left out where nothing comes near enough to feel it.
+        With friction, an equilibrium with its own bound. Raises ConvergenceError if elements invert, progress
+        stops, the equilibrium is unstable, or a component of the displacement differs from the start's by
+        more than `reach_mm`. Self-contact is left out if no pair is within its gap.
         """
         contact = self.model.self_contact
         if contact is not None and not contact.friction and not contact.count(u):
@@ -152,9 +152,9 @@ class Equilibrium:
         return self._with_friction(State(pressure, u), found)
 
     def _with_friction(self, state: State, found: Callable[[State, bool], State]) -> State:
-        """The equilibrium from a start whose friction's bound belongs to it.
+        """The equilibrium from a start, with its own bound of friction.
 
-        found: the equilibrium from a start with the bound held, and whether it is not the first. Raises
+        found: the equilibrium from a start with the bound held, called with False for the first. Raises
         ConvergenceError.
         """
         if self.model.self_contact is not None:
@@ -176,9 +176,9 @@ class Equilibrium:
     def _descend(self, start: State, factored: bool, free_of: SelfContact | None = None) -> State:
         """The equilibrium from a start, friction's bound held; its cost is added to the start's.
 
-        factored: whether the factor that is there belongs to a definite tangent of about this start. free_of:
-        contact that the model leaves out; a search that needs further factors and has passed through a touch
-        ends with ConvergenceError, before it finds a body that passes through itself.
+        factored: True if the existing factor is that of a definite tangent near this start. free_of: contact
+        that the model leaves out; a search that needs further factors and has passed a touch ends with
+        ConvergenceError, before it finds a body that passes through itself.
         """
         s, pressure = self.settings, start.pressure_MPa
         search = Descent(self.model, self.parameters, pressure, start.u, s)
@@ -220,10 +220,10 @@ class Equilibrium:
     def reach(self, target: float, history: Sequence[State]) -> State:
         """The state at a pressure in MPa, from converged states before it, the last of them the nearest.
 
-        Steps are predicted and halved until they converge to where they were predicted, so that no
-        snap to another branch passes for the path. Where the smallest step fails the path goes on beyond the
-        limit point if the settings say so, and a state so found tells it (`State.snapped_mm`). Raises
-        ConvergenceError naming pressure, place and cause otherwise.
+        Steps are predicted and halved until they converge to where they were predicted, so that no snap to
+        another branch passes for the path. If the smallest step fails and the settings allow it, the path
+        continues beyond the limit point; such a state has `State.snapped_mm` > 0. Raises ConvergenceError
+        naming pressure, place and cause otherwise.
         """
         s = self.settings
         if len(history) == 1:
@@ -266,8 +266,8 @@ class Equilibrium:
         """The stable state at a pressure in MPa that damped motion from u (n, 3) in mm leads to.
 
         For starts far from equilibrium, see `damped_minimum`. The cavity must be closed, so that its pressure
-        has a potential. With friction its bound belongs to the state: the motion is that of each bound in
-        turn. Raises ConvergenceError where it leads to none.
+        has a potential. With friction the bound is that of the state: the motion is repeated for each bound.
+        Raises ConvergenceError if it leads to none.
         """
 
         def found(start: State, again: bool) -> State:
@@ -281,14 +281,14 @@ class Equilibrium:
     def snapped(self, last: State, pressure: float) -> State:
         """Stable state beyond a limit point, at a pressure in MPa, that the body snaps to from one before it.
 
-        `State.snapped_mm` holds the distance. Raises ConvergenceError where there is none.
+        `State.snapped_mm` holds the distance. Raises ConvergenceError if there is none.
         """
         state = self.settled(last.u, pressure)
         moved = float(np.linalg.norm(state.u - last.u, axis=1).max())
         return attrs.evolve(state, snapped_mm=max(moved, last.snapped_mm))
 
     def start(self, u: Array, guess: Array) -> Array:
-        """Start (n, 3) in mm: the prediction, or the last state u if surfaces would meet on the way.
+        """Start (n, 3) in mm: the prediction, or the last state u if surfaces would touch before it.
 
         A start cut short at the first touch would lie where the barrier's forces are largest.
         """
@@ -321,7 +321,7 @@ class Equilibrium:
     ) -> list[State]:
         """States at the given pressures in MPa, visited in order from a converged start.
 
-        on_state: called with each state as it is found. Raises ConvergenceError as `reach`.
+        on_state: called with each state. Raises ConvergenceError as `reach`.
         """
         found = [start]
         for target in pressures_MPa:

@@ -21,8 +21,8 @@ class IndefiniteError(ArithmeticError):
 def nested_dissection(pattern: sparse.csr_matrix) -> Array:
     """Fill-reducing order (n,) of the nodes of a symmetric pattern, by METIS.
 
-    By minimum degree where pymetis is missing, as it has no wheel for Windows: a factor of the default unit
-    then took 0.50 instead of 0.44 s.
+    By minimum degree without pymetis, which has no wheel for Windows: a factor of the default unit then took
+    0.50 instead of 0.44 s.
     """
     graph = pattern - sparse.diags(pattern.diagonal())
     graph = sparse.csr_matrix(graph)
@@ -51,7 +51,7 @@ def _minimum_degree(graph: sparse.csr_matrix) -> Array:
 
 @cache
 def _load_cvxopt() -> None:
-    """Load cvxopt, whose own OpenBLAS reads these variables meanwhile. Raises ImportError."""
+    """Load cvxopt, whose OpenBLAS reads these variables on loading. Raises ImportError."""
     # Its threads spin while they wait for each other on the small dense blocks here: two made Model A four
     # times slower than one.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

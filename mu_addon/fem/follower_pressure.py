@@ -73,8 +73,8 @@ def pressure_stiffness(
 ):
     """Tangent of `pressure_force`, symmetrised a face.
 
-    On a closed cavity (or one closed by symmetry planes) the assembled tangent is symmetric, because
-    a uniform pressure has the potential -p V; taking each face's symmetric part leaves the sum as it is.
+    On a closed cavity (or one closed by symmetry planes) the assembled tangent is symmetric, because a
+    uniform pressure has the potential -p V; the sum of the faces' symmetric parts is therefore the same.
     """
     f = wp.tid()
     n = faces.shape[1]

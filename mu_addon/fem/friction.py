@@ -17,9 +17,9 @@ _LEAST = 1e-6
 class Memory:
     """Memory of points (f, q) of a surface of their last committed contact, in the obstacle's frame.
 
-    place (f, q, 3) in mm; gap (f, q), their distance, in mm; normal (f, q, 3), its gradient, and pressure
-    (f, q) in MPa that bound friction; slip (f, q, 3), elastic slip, in mm; slid
-    (f, q), the length slid so far, in mm. lost_mJ: what sliding has cost so far.
+    place (f, q, 3) in mm; gap (f, q), their distance, in mm; normal (f, q, 3), its gradient, and pressure (f,
+    q) in MPa that bound friction; slip (f, q, 3), elastic slip, in mm; slid (f, q), the length slid so far,
+    in mm. lost_mJ: energy dissipated by sliding so far.
     """
 
     place: Array
@@ -46,9 +46,9 @@ class Lag:
 def met(before: Array, gap: Array) -> Array:
     """Share (f, q) of a step that is in contact, of the distances in mm at both its ends.
 
-    before, gap (f, q): at the start and the end, negative in contact. The distance is taken to be linear over
-    the step, so that a point which comes nearer aslant does not slip before it touches. 1 out of contact,
-    where it is of no account.
+    before, gap (f, q): at the start and the end, negative in contact. The distance is assumed linear over the
+    step, so that an obliquely approaching point does not slip before it touches. 1 out of contact, where it
+    has no effect.
     """
     away = np.maximum(before, 0.0)
     share = gap / np.where(gap < 0, gap - away, 1.0)
@@ -56,7 +56,7 @@ def met(before: Array, gap: Array) -> Array:
 
 
 def slip(memory: Memory, lag: Lag, place: Array) -> Array:
-    """Slip (f, q, 3) in mm in the lagged tangent plane, had nothing slid since the last committed state.
+    """Slip (f, q, 3) in mm in the lagged tangent plane, without sliding since the last committed state.
 
     place (f, q, 3) in mm: where the points are, in the obstacle's frame. The elastic slip remembered, plus
     the share of the way that was in contact, less its part along the lagged normal.
@@ -69,8 +69,9 @@ def energy(e: Array, bound: Array, stiffness: float) -> Array:
     """Energy (...) in mJ/mm2 whose derivative by slip e (..., 3) in mm is `traction`: Huber's function.
 
     bound (...) of the traction and stiffness in MPa and MPa/mm. With the bound held, a step's energy is that
-    of elastic slip and what sliding costs: Coulomb's law as an incremental potential, as in Li et al., ACM
-    Trans. Graph. 39 (2020) 49, but of elastic slip in place of velocity, so that what sticks does not creep.
+    of elastic slip plus the dissipation by sliding: Coulomb's law as an incremental potential, as in Li et
+    al., ACM Trans. Graph. 39 (2020) 49, but of elastic slip in place of velocity, so that sticking points do
+    not creep.
     """
     size = np.linalg.norm(e, axis=-1)
     least = bound / stiffness

@@ -1,7 +1,7 @@
 """Stiffness of a homogenised lattice of graded struts, relative to struts of factor 1.
 
-An element gets the moduli of the infinite lattice whose struts all have the diameters at its position, as if
-these changed slowly from cell to cell. Moduli of the periodic body-centred cell were computed once from its
+An element gets the moduli of the infinite lattice with the strut diameters at its position: the diameters are
+assumed to vary slowly between cells. Moduli of the periodic body-centred cell were computed once from its
 quadratic solid (`benchmarks/grading.py`, resin of Poisson's ratio 0.45) over the diameters at junctions and
 at mid-span. Polynomials in their logarithms fit them within 1.6 %, and cells left out of the fit within 3 %.
 """
@@ -132,9 +132,9 @@ def element_factors(d: Dimensions, mesh: Mesh) -> Array:
 def law_weight(law: Any, moduli: Moduli) -> Array:
     """Factor (n,) on the stiffness of one law of a homogenised lattice, by `relative_moduli`.
 
-    Of a law from `homogenize` the foam stands for struts in bending and follows E[100], cubic shear and
-    diagonal stretch for struts in tension, and follow C44 and C12. The one isotropic modulus of a unit was
-    measured on a block that plates hold: such blocks follow the geometric mean of E[100] and C44, within 6 %
+    In a law from `homogenize` the foam represents struts in bending and follows E[100]; cubic shear and
+    diagonal stretch represent struts in tension and follow C44 and C12. A unit's single isotropic modulus was
+    measured on a block between plates. Such blocks follow the geometric mean of E[100] and C44, within 6 %
     over print offsets of 0.12 and 0.17 mm (docs/engineering/method.md).
     """
     return {
@@ -175,7 +175,7 @@ def _require_known(d: Dimensions, factors: Array) -> None:
         if shares.min() < low or shares.max() > high:
             raise InputError(
                 f"struts of {d.cell * shares.min():.3g} to {d.cell * shares.max():.3g} mm at their {part} "
-                f"are beyond the {low * d.cell:.3g} to {high * d.cell:.3g} mm that the homogenised stiffness "
+                f"are outside the {low * d.cell:.3g} to {high * d.cell:.3g} mm for which the homogenised stiffness "
                 "of graded struts is known for",
                 "[grading]",
                 'choose factors nearer to 1, or fidelity "resolved"',

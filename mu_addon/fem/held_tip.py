@@ -22,11 +22,10 @@ EDGE = 1e-3
 class HeldTip(Obstacle):
     """The edge of the tip toward +y on a stiff load cell that lies across the axis; a term of a model's.
 
-    The cell holds the edge's y where it is at rest plus `gap_mm`, toward either side: what it would have to
-    pull is a force below 0, which a flat pad does not have. Nothing else is held: the tip slides along the
-    pad without friction and turns about its edge. mesh: half, quarter or whole. shift (n,): further way in y
-    of each node in mm, of a unit that its weight bends before the cell is put there. Raises InputError where
-    the mesh has no tip.
+    The cell holds the edge's y at rest plus `gap_mm`, toward either side. A pulling force is below 0; a flat
+    pad cannot pull. The tip is otherwise free: it slides along the pad without friction and rotates about its
+    edge. mesh: half, quarter or whole. shift (n,): additional displacement in y of each node in mm, for a
+    unit bent by its weight before the cell is placed. Raises InputError where the mesh has no tip.
     """
 
     def __init__(self, mesh: Mesh, gap_mm: float, shift: Array | None = None) -> None:

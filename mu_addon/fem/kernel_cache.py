@@ -1,8 +1,8 @@
 """Warp's cache of compiled kernels, protected so that damage on the disk ends no run.
 
-Warp writes it without fsync and reads it without doubt: after a power cut an entry may be cut short, a disk
-may return other bits than it was given, and a home may be full or read-only. Code of which one bit is wrong
-ends the process, or computes something else, so every entry is given the digests of its files.
+Warp writes it without fsync and reads it without a check. A power cut may truncate an entry, a disk may
+corrupt it, and a home folder may be full or read-only. Code with one wrong bit ends the process or computes
+wrong values, so every entry gets the digests of its files.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ _BEING_BUILT = re.compile(r"_p\d+_t\d+$")
 def usable_cache(cache: Path) -> Path:
     """Return the cache without damaged entries, or a copy for this process if it cannot be written.
 
-    The copy is removed when the process ends. Raises OSError where there is no room for it either. Of a cache
-    that can be written every entry is sealed: at once, and what this process adds when it ends.
+    The copy is removed when the process ends. Raises OSError if that has no room either. In a writable cache
+    every entry is sealed: existing ones at once, entries of this process at its end.
     """
     damaged = [entry for entry in entries(cache) if not is_whole(entry)]
     if _writable(cache):
@@ -64,9 +64,9 @@ def entries(cache: Path) -> list[Path]:
 
 
 def seal(cache: Path) -> None:
-    """Write the digests of an entry's files beside them, if it has files without one.
+    """Write the digests of an entry's files into its folder, if it has files without one.
 
-    Existing digests stay: they belong to the files as first written.
+    Existing digests are kept: they are of the files as first written.
     """
     for entry in entries(cache):
         with suppress(OSError, InputError, OutputError):

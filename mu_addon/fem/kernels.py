@@ -106,8 +106,8 @@ def mean_dilatation(
 class LawKernels:
     """The element kernels of one material law: energy, force, stiffness, and advance of its history.
 
-    along: the stress at each point, and how it changes along other displacements. `advance` is None where the
-    law keeps none.
+    along: the stress at each point, and how it changes along other displacements. `advance` is None for a law
+    without history.
     """
 
     energy: Any
@@ -119,7 +119,7 @@ class LawKernels:
 
 @cache
 def law_kernels(law: Any, mean: bool = False) -> LawKernels:
-    """Compile the element kernels of a law (see laws.Law for what a law gives).
+    """Compile the element kernels of a law (see laws.Law).
 
     Each runs over the rows of one layer; an element's first layer sets its output, later ones add to it.
     mean: of the law's kappa/2 (J - 1)^2, the part mean_kappa (k,) takes the mean J of the element, which is

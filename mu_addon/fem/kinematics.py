@@ -63,8 +63,8 @@ def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:
 def invert(nodes: Array, points: Array, local: Array) -> Array:
     """Reference coordinates (e, 3) of a point in each of e curved elements, by Newton's method.
 
-    nodes (e, 10, 3) and points (e, 3) in mm. local (e, 3): where to begin, changed in place; -1 where the map
-    is singular on its way.
+    nodes (e, 10, 3) and points (e, 3) in mm. local (e, 3): start, changed in place; -1 if the map becomes
+    singular.
     """
     left = np.arange(len(local))
     for _ in range(8):

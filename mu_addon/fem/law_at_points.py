@@ -28,7 +28,7 @@ class Point(NamedTuple):
 def evaluate(law: Any, F: Array, rows: Array) -> Point:
     """A law at F (n, 3, 3) of parameters (n, count) or one row, on the CPU.
 
-    For a law with history a row goes on with its numbers and the time step, as `Law` has it.
+    For a law with history a row continues with its numbers and the time step, as in `Law`.
     """
     inputs, n, count = _inputs(F, rows)
     outputs = [wp.zeros(n, dtype=d, device="cpu") for d in (f64, mat33, mat99)]

@@ -54,7 +54,7 @@ class Descent:
         return self.level / self.scale if self.scale else 0.0
 
     def forget(self) -> None:
-        """Drop the steps taken so far: they belong to another factor."""
+        """Drop the steps so far: they are of another factor."""
         self._secants = []
 
     def direction(self, solve: Callable[[Array], Array]) -> Array:
@@ -81,7 +81,7 @@ class Descent:
     def pushed_forward(self, solved: Array, shares: list[float]) -> Array:
         """Second half of the recursion: the step (f,) in mm of the factorised tangent's solution (f,) in mm.
 
-        solved, shares: the solution for what `pulled_back` returned, and its coefficients.
+        solved, shares: the solution for the result of `pulled_back`, and its coefficients.
         """
         step = solved
         for (s, y, r), share in zip(self._secants, reversed(shares), strict=True):
@@ -93,8 +93,8 @@ class Descent:
         one.
 
         The step is halved until the residual halves or the potential falls enough (Armijo). Raises
-        ConvergenceError where no length tried does either. With self-contact no step goes as far as a touch,
-        nor does it move a node by more than `LONGEST_STEP`.
+        ConvergenceError where no length tried does either. With self-contact a step ends before a touch and
+        moves no node by more than `LONGEST_STEP`.
         """
         model, s = self.model, self.settings
         far = float(np.abs(step).max())

@@ -24,7 +24,7 @@ def _rows(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class Layer:
-    """A material law in some elements: elements (k,), parameters (k, count) in the law's own order.
+    """A material law in some elements: elements (k,), parameters (k, count) in the law's order.
 
     weight, a number or (k,): share of an element's volume that this law fills; laws that share an element act
     in parallel, under the same strain (Voigt). Raises InputError where the law does not admit its parameters.
@@ -89,10 +89,9 @@ class Materials:
         return cls((Layer(NeoHooke, np.arange(len(parameters)), parameters),))
 
     def blended(self, share: Array, law: Any, parameters: Array) -> Materials:
-        """These materials with another law in a share (m,) of each element and their own weight reduced by
-        it.
+        """These materials with another law in a share (m,) of each element, and their weights reduced by it.
 
-        parameters: (m, count) or one row for all. Elements of which a layer keeps nothing leave it. Raises
+        parameters: (m, count) or one row for all. Elements with weight 0 in a layer leave it. Raises
         InputError for a share outside 0 to 1, or parameters that the law does not admit.
         """
         share = np.asarray(share, float)

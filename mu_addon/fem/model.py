@@ -66,8 +66,8 @@ class LayerData:
 class MaterialData:
     """A body's materials on the device, layer by layer, with their history.
 
-    dt_s is the step's length. least_force_N: root sum of squares of the element forces of a body strained
-    by LEAST_STRAIN, roughly; below it forces drown in the rounding of stresses. beams: of a mesh with some.
+    dt_s: length of the step. least_force_N: approximate root sum of squares of the element forces of a body
+    strained by LEAST_STRAIN; smaller forces are within the rounding of stresses. beams: of a mesh with some.
     """
 
     layers: tuple[LayerData, ...]
@@ -117,12 +117,12 @@ class Model:
     above POINTWISE_BULK shear moduli acts on the mean J of an element. True asks it of every law, which must
     then split the volume off; None, of the laws that do so in a resolved mesh, and of none in another.
 
-    Attributes: volumes (m,) of the elements, as far as they are filled, in mm3; reference, what elements are
-    as drawn.
+    Attributes: volumes (m,), filled volumes of the elements in mm3; reference, elements in the undeformed
+    body.
 
     Attributes to set: load, dead forces on the nodes (n, 3) in N, or None; obstacles, rigid bodies that it
-    may touch; self_contact, what keeps its own surface apart, or None. With self-contact `pattern` grows
-    where pairs meet that it has no entry for, and `factor` is another after that.
+    may touch; self_contact, contact of its surface with itself, or None. With self-contact `pattern` grows
+    when a pair in contact has no entry; `factor` is then replaced.
     """
 
     def __init__(
@@ -247,7 +247,7 @@ class Model:
         self.pattern = self._own_pattern = Pattern.of(row[sorting], column[sorting], self.free)
 
     def _hold_beams(self, fixed: Array) -> None:
-        """Fix the unknowns without own stiffness in beams, and apply supports to rotation vectors."""
+        """Fix the unknowns inside beams, which have no stiffness, and apply supports to rotation vectors."""
         mesh = self.mesh
         self._carried = Carried(mesh) if len(mesh.beams) else None
         if self._carried is None:
@@ -292,7 +292,7 @@ class Model:
         return keys
 
     def following(self, u: Array) -> Array:
-        """Displacements u (n, 3) in mm with tied and carried nodes set to what they follow, in place."""
+        """Displacements u (n, 3) in mm with tied and carried nodes moved with their masters, in place."""
         if self._carried is not None:
             self._carried.follow(u)
         return self.mesh.following(u)
@@ -320,7 +320,7 @@ class Model:
         return np.asarray(u.ravel()[self._three])
 
     def _beam_tangent(self, u: Array, pressure: float, m: MaterialData, own: Array, convex: bool) -> Array:
-        """Blocks of the tangent, those of beams and of what they carry added to its own (b, 3, 3)."""
+        """Blocks (b, 3, 3) of the tangent, plus those of beams and of carried nodes."""
         assert m.beams is not None
         assert self._carried is not None
         found = np.zeros((len(self._all_keys), 3, 3))
@@ -358,8 +358,8 @@ class Model:
     def parameters(self, materials: Materials) -> MaterialData:
         """A body's materials on the device, without history.
 
-        Raises InputError where an element has none, or where with mean_dilatation a law does not split the
-        volume off.
+        Raises InputError for an element without a law, or, with mean_dilatation, a law without separate
+        volumetric part.
         """
         covered = np.zeros(len(self.mesh.tets), dtype=np.int32)
         stiffness = np.zeros(len(self.mesh.tets))
@@ -420,7 +420,7 @@ class Model:
         return Beams(chord, frames, sections, fibres)
 
     def by_places(self, u: Array, forces: Array, v: Array | None = None) -> Array | float:
-        """Derivative (n, 3) by places of forces times what carried nodes are given (`Carried.by_places`)."""
+        """Derivative (n, 3), by positions, of forces times motion of carried nodes (`Carried.by_places`)."""
         return 0.0 if self._carried is None else self._carried.by_places(u, forces, v)
 
     @property
@@ -519,7 +519,7 @@ class Model:
         return self.following(found)
 
     def before_touch(self, u: Array, to: Array) -> Array:
-        """Displacements `to`, (n, 3) in mm, or the last on the straight way from u before surfaces meet.
+        """Displacements `to`, (n, 3) in mm, or the last on the straight line from u before surfaces touch.
 
         u must be free of intersections. Without self-contact that is always `to`.
         """
@@ -717,7 +717,7 @@ class Model:
         return found.row, found.col
 
     def forget_contact(self) -> None:
-        """Return to the body's own pattern, without the entries of self-contact: factors take less time."""
+        """Return to the pattern without self-contact: factors take less time."""
         if self.pattern is not self._own_pattern:
             self.pattern, self._own = self._own_pattern, slice(None)
             self.__dict__.pop("factor", None)
@@ -732,7 +732,7 @@ class Model:
         """The tangent's blocks (b, 3, 3) of their parts, and of contact with obstacles.
 
         Also returned, for each obstacle that touches beams: pairs (j, 2) of carried nodes, and their blocks
-        (j, 3, 3). A beam's elements have no blocks: these belong to its ends (`_add_on_beams`).
+        (j, 3, 3). A beam's elements have no blocks: its ends have them (`_add_on_beams`).
         """
         inputs = [self._block_parts, *self._block_lists, self._blocks]
         self._launch(kernels.gather_blocks, len(self._blocks), inputs)

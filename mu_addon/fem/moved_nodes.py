@@ -21,11 +21,11 @@ def relocated(model: Model, mesh: Mesh, self_contact: SelfContact | None = None)
     """The model of a mesh of the same elements with moved nodes, in milliseconds, without a new pattern.
 
     The two share buffers and factor: use one after the other, and factorise again in between. `load` is the
-    first model's and must be set anew where it depends on the places. self_contact: of the other mesh, see
+    first model's and must be set again if it depends on the positions. self_contact: of the other mesh, see
     `SelfContact.relocated`; needed where the first model has one. Raises InputError for a mesh of other
-    elements, for a model with obstacles or self-contact alone, and where the tangent of one whose tied nodes
-    follow others than before is asked for: its pattern is another. An inverted element raises MeshingError
-    when it is first used.
+    elements, for a model with obstacles or self-contact alone, and for the tangent of a model whose tied
+    nodes have other masters than before: its pattern differs. An inverted element raises MeshingError when it
+    is first used.
     """
     if model.obstacles or (model.self_contact is not None and self_contact is None):
         raise InputError(

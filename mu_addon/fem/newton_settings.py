@@ -10,7 +10,7 @@ class NewtonSettings:
     """Tolerances and limits of Newton's method; a state converges where the residual is below `tolerance`.
 
     Residuals are relative to the root sum of squares of all element forces. Load steps in MPa lie between
-    min_step_MPa and `largest_step_MPa`. The other numbers are counts and ratios, as the comments say.
+    min_step_MPa and `largest_step_MPa`. The other numbers are counts and ratios, see the comments.
     """
 
     tolerance: float = 1e-9  # residual over the root sum of squares of all element forces
@@ -57,7 +57,7 @@ RESOLVED_NEWTON = NewtonSettings(
 CONTACT_NEWTON = NewtonSettings(keep_factor=0.2, max_factorisations=40, predictor_tolerance=3.0)
 
 RESOLVED_OBSTACLE_NEWTON: NewtonSettings = attrs.evolve(CONTACT_NEWTON, max_step_MPa=0.005, follow_snaps=True)
-"""For a body meshed strut by strut beside an obstacle: struts snap one by one long before the body does."""
+"""For a body meshed strut by strut near an obstacle: struts snap one by one long before the body does."""
 
 # A body that closes ends far from its prediction, and steps that touch cut short are many.
 SELF_CONTACT_NEWTON = NewtonSettings(

@@ -27,9 +27,9 @@ _AT_BOUND = 0.999
 class ObstacleContact:
     """Contact of a state with one obstacle; forces are of the meshed body on the obstacle, (3,) in N.
 
-    area_mm2: of the surface that touches, undeformed; sticking: the share of it that does not slide, 1 where
-    nothing touches. deepest_mm: the error of the gap. slid_mm (f, q): slid length of each point of
-    `Obstacle.places`; lost_mJ: energy dissipated by sliding.
+    area_mm2: of the surface in contact, undeformed; sticking: the share of it that does not slide, 1 without
+    contact. deepest_mm: the error of the gap. slid_mm (f, q): slid length of each point of `Obstacle.places`;
+    lost_mJ: energy dissipated by sliding.
     """
 
     normal_N: Array
@@ -50,24 +50,25 @@ class Obstacle:
     """Contact of a mesh's outer surface with a rigid body, as a term of `Model.obstacles`.
 
     Where a point of the surface is a depth s inside, the obstacle presses on it with k s^2/(2 d) for s < d
-    and k (s - d/2) beyond, in MPa on the undeformed area, along the distance's gradient. d is `depth_mm`, k
-    such that at `pressure_MPa` the depth is d: that is the gap's error, `deepest_mm` what a state has of it.
-    Force and tangent are continuous, and the energy is a potential of the displacement.
+    and k (s - d/2) beyond, in MPa on the undeformed area, along the distance's gradient. d is `depth_mm`, and
+    k is such that at `pressure_MPa` the depth is d. The depth is the error of the gap; `deepest_mm` is its
+    largest value in a state. Force and tangent are continuous, and the energy is a potential of the
+    displacement.
 
-    friction: Coulomb's coefficient. The traction grows with the slip since the last committed state, and what
-    was elastic of the slip before, up to `friction` times the pressure; at `pressure_MPa` a slip of
-    `stick_mm` (of None: depth_mm) gets there. Slip is relative to the obstacle, in its own frame. The bound
-    lags: `Equilibrium.newton` finds an equilibrium with pressure and normal of an earlier one, and again
-    until friction changes by less than equilibrium.FRICTION_TOLERANCE of its bound, so that energy, force
-    and symmetric tangent belong together. Such a body has memory:
-    `time_stepping.simulate_in_time` solves it, and commits.
+    friction: Coulomb's coefficient. The traction grows with the slip since the last committed state plus the
+    earlier elastic slip, up to `friction` times the pressure. At `pressure_MPa` it reaches that bound at a
+    slip of `stick_mm` (None: depth_mm). Slip is relative to the obstacle, in its frame. The bound lags:
+    `Equilibrium.newton` finds an equilibrium with pressure and normal of an earlier one, and repeats this
+    until friction changes by less than equilibrium.FRICTION_TOLERANCE of its bound. Energy, force and
+    symmetric tangent are therefore consistent. Such a body has memory: `time_stepping.simulate_in_time`
+    solves it, and commits.
 
     `pose` may be set between equilibria, as an obstacle that moves has it; `path`, a function of time in s,
     does so in `simulate_in_time`. Faces of the base, the cavity and mirror planes do not touch. halvings: of
-    a face's sides, before the quadrature's points are laid on the pieces: large faces feel an obstacle up to
-    near their edges only with some. faces: those of `outer_faces` that can touch, where others cannot: it
-    saves time. Of a resolved mesh what a strut has inside another part does not touch, and forces on tied
-    nodes go to those that they follow, as `Model` folds them. Raises InputError.
+    a face's sides, with quadrature points on the pieces; large faces need some to have contact near their
+    edges. faces: those of `outer_faces` that can touch, to save time. In a resolved mesh the parts of a strut
+    inside another part do not touch, and forces on tied nodes act on their masters, as in `Model`. Raises
+    InputError.
     """
 
     def __init__(
@@ -119,7 +120,7 @@ class Obstacle:
             self.pose = self.path(time_s)
 
     def begin(self, u: Array | None = None) -> None:
-        """Start friction's memory anew at displacement u (n, 3) in mm, else at rest, without any slip."""
+        """Reset friction's memory at displacement u (n, 3) in mm, by default at rest, without any slip."""
         if not self.friction:
             return
         y, g, n, _ = self._points(np.zeros_like(self._rest) if u is None else u)
@@ -238,7 +239,7 @@ class Obstacle:
     def forces(self, u: Array) -> tuple[Array, Array]:
         """Nodes (j,) of the faces in contact, and the contact energy's derivative by them, (j, 3) in N.
 
-        u: displacements (n, 3) in mm. A node is listed once for every face that it belongs to.
+        u: displacements (n, 3) in mm. A node is listed once for each of its faces.
         """
         face, y, g, n, _ = self._contact_candidates(u)
         at_points = -self._pressure(g)[0][..., None] * n

@@ -34,11 +34,11 @@ class OuterFaces:
 
 
 def outer_faces(mesh: Mesh) -> OuterFaces:
-    """The boundary faces of a mesh that belong to neither cavity, base nor a mirror plane.
+    """The boundary faces of a mesh without those of cavity, base and mirror planes.
 
     Of a resolved mesh they count as far as the elements behind them do: `filled` at the quadrature point that
-    is nearest to a face's corner is the bare share of that third. Faces of which all nodes are tied lie
-    inside what they are tied to.
+    is nearest to a face's corner is the bare share of that third. Faces with all nodes tied lie inside the
+    part they are tied to.
     """
     faces, owner = free_boundary(mesh)
     cavity = {tuple(f) for f in np.sort(mesh.cavity_corners, axis=1).tolist()}

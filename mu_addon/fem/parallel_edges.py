@@ -1,10 +1,10 @@
 """Weights of nearly parallel edges in ipctk's improved maximum, each by its own edge and vertex.
 
-The improved maximum takes from the energy of two edges that of each vertex of one with the other, smoothed
-like theirs where they are nearly parallel. ipctk 1.6 tells such terms apart by their edges, in either order,
-and by a name that depends on that order ("first edge, end of the second"), so that of two edges beside each
-other one term gets the weight of two. The energy then jumps where one of them leaves the gap, and no search
-for an equilibrium passes the jump.
+The improved maximum subtracts from the energy of two edges that of each vertex of one with the other,
+smoothed in the same way if they are nearly parallel. ipctk 1.6 identifies such terms by their edges, in
+either order, and by a name that depends on that order ("first edge, end of the second"). For two adjacent
+edges one term therefore gets the weight of two. The energy then jumps where one of them leaves the gap, and
+no search for an equilibrium passes the jump.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Array = np.ndarray[Any, Any]
 
 
 def reweigh(ipctk: Any, surface: Any, near: Any, candidates: Any, places: Array, reach_mm: float) -> None:
-    """Weigh nearly parallel edges of `near`, ipctk's pairs on its mesh `surface`, anew and in place.
+    """Correct, in place, the weights of nearly parallel edges of `near`, ipctk's pairs on its mesh `surface`.
 
-    candidates: ipctk's, of which `near` holds what is nearer than reach_mm; places (v, 3) in mm of the mesh's
+    candidates: ipctk's, `near` holds those nearer than reach_mm; places (v, 3): positions in mm of the mesh's
     vertices.
     """
     ends, slopes = np.asarray(surface.edges), near.enable_shape_derivatives
@@ -54,7 +54,7 @@ def _pairs(
 
 
 class _Term(NamedTuple):
-    """One of ipctk's terms of two edges by value: its own objects end with the list that they are in."""
+    """One of ipctk's terms of two edges by value: its objects do not outlive their list."""
 
     edges: tuple[int, int]
     threshold: float

@@ -58,9 +58,8 @@ class ProtocolText:
     def values(self, names: Sequence[str]) -> Array:
         """Values (c, k) of k columns of numbers, the first of them time; needs their names in the heading.
 
-        Raises InputError naming file and line where a value is missing or not a finite number, a pressure (a
-        column whose name ends with kPa) is out of range, time does not increase, or there are fewer than two
-        rows.
+        Raises InputError with file and line if a value is missing or not finite, a pressure (a column in kPa)
+        is out of range, time does not increase, or there are fewer than two rows.
         """
         columns = [self.names.index(name) for name in names]
         found: list[list[float]] = []
@@ -115,9 +114,8 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
 def read_protocol(path: Path) -> Protocol:
     """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
 
-    Raises InputError naming file and line where the file is unreadable, a value is missing or not a finite
-    number, a pressure is out of range, time does not increase, or the protocol does not start at atmospheric
-    pressure.
+    Raises InputError with file and line if the file is unreadable, a value is missing or not finite, a
+    pressure is out of range, time does not increase, or the protocol does not start at atmospheric pressure.
     """
     text = read_protocol_text(path, COLUMNS)
     number, line = text.heading

@@ -17,7 +17,7 @@ def _float64(values: Any) -> Array:
 
 
 class Rigid(Protocol):
-    """A rigid body in its own frame: a signed distance and its first two derivatives."""
+    """A rigid body in its frame: a signed distance and its first two derivatives."""
 
     def distance(self, x: Array) -> tuple[Array, Array, Array]:
         """Signed distance (k,) in mm of points (k, 3) in mm, negative inside, and its derivatives.
@@ -104,8 +104,8 @@ class Box:
 def round_bend(normal: Array, radius: Array, within: Array | None = None) -> Array:
     """Second derivative (k, 3, 3) in 1/mm of the distance from a point, or from an edge.
 
-    normal (k, 3): the distance's gradient; radius (k,) in mm: the distance, below 0 for what is inside.
-    within (k, 3, 3): the projection on the plane across the edge, for an edge.
+    normal (k, 3): the distance's gradient; radius (k,) in mm: the distance, below 0 inside. within (k, 3, 3):
+    the projection on the plane across the edge, for an edge.
     """
     plane = np.eye(3) if within is None else within
     return np.asarray((plane - normal[:, :, None] * normal[:, None, :]) / radius[:, None, None])

@@ -68,7 +68,7 @@ class Touch:
 
     pressure_kPa (n,): the contact's normal force at each node of the mesh over the undeformed area around it;
     force_N: total normal force between all pieces, mirror images included; gap_mm: the least distance,
-    infinite where nothing is within the gap.
+    infinite if no pair is within the gap.
     """
 
     pressure_kPa: Array
@@ -91,29 +91,29 @@ class _Plane:
 
 
 class SelfContact:
-    """Energy of a body's surface that comes near itself, as `Model.self_contact` takes it.
+    """Energy of a body's surface near itself, for `Model.self_contact`.
 
     gap_mm: the distance d at which two pieces of the surface begin to repel each other; they never touch.
-    stiffness_MPa: k. An area at distance s < d from what faces it holds -k d ((s/d)^2 - 1)^2 ln((s/d)^2) in
-    N/mm, so that the pressure between them grows without bound as they close (Li et al., ACM Trans. Graph. 39
-    (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices with facets and
-    of edges with edges counts an area more than once: two flat plates press on each other like a k 2.3 to 3.1
-    times as large, by how their meshes lie. Forces balance exactly all the same, and the gap left hardly
+    stiffness_MPa: k. An area at distance s < d from the opposite surface has the energy -k d ((s/d)^2 - 1)^2
+    ln((s/d)^2) in N/mm, so that the pressure grows without bound as they close (Li et al., ACM Trans. Graph.
+    39 (2020) 49; weighted by area: Li et al., arXiv 2307.15908). The sum over pairs of vertices with facets
+    and of edges with edges counts an area more than once: two flat plates press on each other like a k 2.3 to
+    3.1 times as large, by how their meshes lie. Forces balance exactly all the same, and the gap left hardly
     depends on k. Gap and k are constant along a path: energy, forces and tangent are those of one potential.
 
-    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept off its mirror
-    image by the same energy, of its own area: a body that mirrors itself meets its image on the plane and
-    nowhere else. Of a resolved mesh the struts begin to touch two gaps away from the wall, bar or seat that
-    they stand on: their feet may cut into it where it bends. Faces of the base do not touch, nor do facets
-    nearer than the gap to their own neighbourhood as drawn, as around the axis of a cap. Facets with a common
-    node are not kept apart.
+    Quadratic faces count as four flat triangles each. A node of a half or quarter mesh is kept from its
+    mirror image by the same energy over its area: a symmetric body touches its image only on the plane. In a
+    resolved mesh the struts have contact only from two gaps away from the wall, bar or seat that supports
+    them: near it they may cut into it where it bends. Faces of the base have no contact, nor do facets that
+    in the undeformed body are nearer than the gap to their neighbourhood, as around the axis of a cap. Facets
+    with a common node are not kept apart.
 
     friction: Coulomb's coefficient, 0 without friction; see `SelfFriction`. A body with it has memory, as
-    beside an `Obstacle` with friction: `time_stepping.simulate_in_time` solves it. On a mirror plane a body
-    and its image slide alike, and nothing slides.
+    with a rough `Obstacle`: `time_stepping.simulate_in_time` solves it. On a mirror plane a body and its
+    image move equally, so there is no sliding.
 
-    facets (t, 3): the triangles that touch, as node numbers. Raises InputError where ipctk is missing, and
-    where pieces of the surface are nearer than the gap as drawn: a third of the wall's thickness is safe.
+    facets (t, 3): the triangles that touch, as node numbers. Raises InputError if ipctk is missing, or pieces
+    of the undeformed surface are nearer than the gap: a third of the wall's thickness is safe.
     """
 
     def __init__(self, mesh: Mesh, gap_mm: float, stiffness_MPa: float, friction: float = 0.0) -> None:
@@ -172,9 +172,9 @@ class SelfContact:
         return [nodes[pair[pair >= 0]] for pair in ids]
 
     def _without_feet(self, mesh: Mesh, facets: Array) -> Array:
-        """Facets without those at the foot of a part that stands on another in the undeformed body.
+        """Facets without those at the foot of a part supported by another in the undeformed body.
 
-        Struts stand on the wall, on a waveguide's bar and its seats, and these on the wall.
+        The wall and a waveguide's bar and seats support struts, and the wall supports bar and seats.
         """
         number = _parts(mesh)
         foot = np.zeros(len(mesh.nodes), bool)
@@ -185,7 +185,7 @@ class SelfContact:
         return facets[~foot[facets].any(axis=1)]
 
     def _without_slivers(self, facets: Array) -> Array:
-        """Facets without those nearer than the gap, as drawn, to others of their own neighbourhood.
+        """Facets without those nearer than the gap, in the undeformed body, to others of their neighbourhood.
 
         So they are where facets narrow to a point, as around a cap's axis. Raises InputError where pieces are
         near that do not hang together there, a wall's faces or two walls, and where facets are small.
@@ -232,7 +232,7 @@ class SelfContact:
         return 0.0 if self._friction is None else self._friction.lost_mJ
 
     def begin(self, u: Array | None = None) -> None:
-        """Start friction's memory anew at displacement u (n, 3) in mm, else at rest."""
+        """Reset friction's memory at displacement u (n, 3) in mm, by default at rest."""
         self._recall(np.zeros_like(self._rest) if u is None else u, 0.0)
 
     def kept(self) -> dict[str, Array]:
@@ -528,8 +528,8 @@ class SelfContact:
     def _near(self, places: Array, reach_mm: float, by_places: bool = False, among: Any = None) -> Any:
         """ipctk's pairs of the surface nearer than reach_mm at its nodes' places (v, 3) in mm.
 
-        by_places: with what derivatives by the places as drawn need. among: candidates that hold them all;
-        without, weights may be wrong and only what is near is true.
+        by_places: with the terms for derivatives by undeformed positions. among: candidates that contain all
+        pairs; without it weights may be wrong, and only the distances are valid.
         """
         near = self._ipctk.NormalCollisions()
         if by_places:
@@ -547,7 +547,7 @@ class SelfContact:
         return near
 
     def _hessian(self, potential: Any, near: Any, places: Array, convex: bool = False) -> sparse.coo_matrix:
-        """Second derivative of a potential over pairs, by the surface's own unknowns (3 v, 3 v)."""
+        """Second derivative of a potential over pairs, by the surface's unknowns (3 v, 3 v)."""
         return potential.hessian(near, self._surface, places, self._projection(convex)).tocoo()
 
     def _projection(self, convex: bool) -> Any:

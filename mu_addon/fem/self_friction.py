@@ -14,9 +14,9 @@ class SelfFriction:
 
     coefficient: Coulomb's. slip_mm, e: friction grows with the slip s since the last committed state as 2 s/e
     - (s/e)^2, up to the coefficient times the barrier's force from a slip of e on (Li et al., ACM Trans.
-    Graph. 39 (2020) 49, of displacements in place of velocities). Sticking points thus move by less than e in
-    every step, also where its load does not change. Pairs of facets, their normals and forces are those of an
-    earlier iterate, as of `Obstacle`, so that energy, force and tangent belong together.
+      Graph. 39 (2020) 49, of displacements in place of velocities). Sticking points therefore move by less
+      than e in every step, also under constant load. Pairs of facets, their normals and forces are those of
+      an earlier iterate, as in `Obstacle`, so that energy, force and tangent are consistent.
 
     ipctk, surface, barrier: the library, its mesh of the surface and its potential of the normal forces. All
     places are (v, 3) in mm of the surface's v nodes, by columns, pairs ipctk's. lost_mJ: energy dissipated up

@@ -30,8 +30,7 @@ class Crossing:
     """Two pieces of a body's surface that intersect.
 
     place (3,) in mm: their position, deformed. walls (2, 3) in mm: the middle of either piece in the
-    undeformed body. inner: for each, True if it belongs to the cavity. facets: number of intersecting pairs
-    of facets.
+    undeformed body. inner: for each, True on the cavity. facets: number of intersecting pairs of facets.
     """
 
     place: Array
@@ -51,7 +50,7 @@ def _text(place: Array) -> str:
 
 @attrs.frozen(eq=False)
 class FirstSelfIntersection:
-    """Pressure in MPa at which walls first meet, between two states of a path, and the crossings there.
+    """Pressure in MPa at which walls first touch, between two states of a path, and the crossings there.
 
     before_MPa, after_MPa: of the two states. Between them the body is taken to move along a straight line;
     `crossings` are those found at `pressure_MPa`, where the first of them begins.
@@ -64,7 +63,7 @@ class FirstSelfIntersection:
 
 
 def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfIntersection | None:
-    """The first pressure in MPa at which walls of a body meet, along a path of states, or None.
+    """The first pressure in MPa at which walls of a body touch, along a path of states, or None.
 
     The first state must be free of self-intersections. Between states the body is taken to move along a
     straight line; the pressure is found to a thousandth of a step.
@@ -90,7 +89,7 @@ def first_self_intersection(mesh: Mesh, states: Sequence[State]) -> FirstSelfInt
 def crossings(mesh: Mesh, u: Array) -> tuple[Crossing, ...]:
     """Self-intersections of a mesh's surface displaced by u (n, 3) in mm, cavity and outside together.
 
-    Mirror images of half meshes count. The crossing of most facets comes first.
+    Mirror images of half meshes count. The crossing of most facets is first.
     """
     return _Boundary(mesh).crossings(u)
 

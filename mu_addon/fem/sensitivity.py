@@ -4,9 +4,9 @@ With u and v fixed, g = v . r(u) is a sum over quadrature points, of F = 1 + gra
 
 g = sum dV f [P : H + p cof F : H],    p = kappa (mean J - 1) the part of the pressure by the mean,
 
-so that its derivatives by every node's place, every point's filled share and every tie's weight come from one
-pass over the elements, however many freedoms move them. Source: the shape derivative in material form, e.g.
-Haftka and Guerdal, Elements of Structural Optimization, ch. 7.
+so that its derivatives by every node's position, every point's filled share and every tie's weight take one
+pass over the elements for any number of freedoms. Source: the shape derivative in material form, e.g. Haftka
+and Guerdal, Elements of Structural Optimization, ch. 7.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Array = np.ndarray[Any, Any]
 class Sensitivity:
     """Derivatives of a number by a mesh, at fixed displacements of its untied nodes.
 
-    nodes (n, 3) by places, per mm, of beams' ends only as far as their sections carry nodes; filled (m, q) by
+    nodes (n, 3) by positions, per mm; for ends of beams only the part by carried nodes; filled (m, q) by
     shares of volume; tied_weights (t, k) by weights of ties; stiffness (m,) by the logarithm of each
     element's stiffness.
     """
@@ -56,8 +56,8 @@ def of_residual(
     """Sensitivities of v . r(u), in mJ, r the elements' and the pressure's forces, for each v of `along`.
 
     u and each v: displacements (n, 3) in mm that tied and carried nodes follow, v to first order about u;
-    pressure in MPa. Forces of contact and dead loads are left out, and so is what beams do as their ends
-    move: their derivatives are computed elsewhere.
+    pressure in MPa. Forces of contact, dead loads and beams are left out: their derivatives are computed
+    elsewhere.
     """
     mesh = model.mesh
     G, dV = model.reference.at.gradients, model.reference.resisting_volumes

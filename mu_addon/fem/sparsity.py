@@ -59,11 +59,11 @@ class Pattern:
 
 
 def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> tuple[Pattern, Array]:
-    """A pattern with additional entries (j,) of the lower triangle, and the positions in it of its own
-    (nnz,).
+    """A pattern with additional entries (j,) of the lower triangle, and the new positions (nnz,) of the old
+    ones.
 
-    free (f,): number 3 node + axis of each unknown. The order is made anew: the old one made the factor of a
-    unit whose walls touch 2.5 times slower, and with more room for contact 10 times.
+    free (f,): number 3 node + axis of each unknown. The order is computed again: the old one made the factor
+    of a unit with touching walls 2.5 times slower, and 10 times with more room for contact.
     """
     count = len(free)
     new = np.unique(columns.astype(np.int64) * count + rows)

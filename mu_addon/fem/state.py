@@ -19,8 +19,8 @@ Array = np.ndarray[Any, Any]
 class State:
     """A converged equilibrium: pressure in MPa, displacement u (n, 3) in mm, relative residual, and its cost.
 
-    residual: over the root sum of squares of all element forces; iterations, factorisations: those it took.
-    snapped_mm: largest move of a node at a limit point before the state, 0 where the path is smooth.
+    residual: over the root sum of squares of all element forces; iterations, factorisations: their numbers.
+    snapped_mm: largest displacement of a node at a limit point before the state, 0 on a smooth path.
 
     >>> import numpy as np
     >>> State(0.02, np.zeros((4, 3))).pressure_kPa

@@ -40,8 +40,8 @@ def cauchy(
     """Cauchy stress (m, q, 3, 3) in MPa and deformation gradients (m, q, 3, 3) at the quadrature points.
 
     u: displacements (n, 3) in mm. sigma = P F^T / det F, the laws of an element added by their weights.
-    history: of each law with one, from `MaterialData.kept`. reference: of all elements, where it is known.
-    Raises InputError where a history is missing, since such a law's stress depends on it.
+    history: of each law with one, from `MaterialData.kept`. reference: of all elements, if known. Raises
+    InputError where a history is missing, since such a law's stress depends on it.
     """
     everywhere = np.arange(len(mesh.tets))
     F, _ = deformation_gradients(mesh, u, everywhere, reference)
@@ -57,7 +57,7 @@ def cauchy(
             if own is None:
                 raise InputError(
                     f"{layer.law.name}: its stress depends on how the state was reached",
-                    remedy="give what the materials remember of it",
+                    remedy="give the materials' history of it",
                 )
             # A step of zero time from a committed state leaves it and its stress unchanged.
             rows = np.hstack([rows, own.reshape(len(rows), -1), np.zeros((len(rows), 1))])
@@ -70,8 +70,8 @@ def of_sections(mesh: Mesh, u: Array, F: Array, elements: Array, poisson: Array)
     """F (e, q, 3, 3) of elements (e,) under displacements u (n, 3) in mm, with that of beams' sections.
 
     Sections keep their drawn width; a strut stretched by l along its axis narrows by l^-nu. Elements that are
-    not swept along a strut have nodes beyond a beam's ends: at points within it F is that of its sections.
-    poisson (e,): nu.
+    not swept along a strut have nodes beyond a beam's ends; at points within the beam F is that of its
+    sections. poisson (e,): nu.
     """
     inside = np.repeat(~mesh.solid[elements][:, None], F.shape[1], axis=1)
     if mesh.in_beams.size:
@@ -156,7 +156,7 @@ class PeakStretch:
 def peak_stretch(mesh: Mesh, u: Array, region: int) -> PeakStretch:
     """The largest principal stretch of a region under displacements u (n, 3) in mm.
 
-    Points of a resolved mesh's struts of which less than half is filled do not count.
+    Points of a resolved mesh's struts that are less than half filled do not count.
     """
     elements = np.flatnonzero(mesh.region == region)
     F, volumes = deformation_gradients(mesh, u, elements)

@@ -1,4 +1,4 @@
-"""Variants of one tangent that differ by a change each, solved for all at once."""
+"""Variants of one tangent, each with a change, solved together."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class SharedTangent(Protocol):
 class DirectVariants:
     """Solves by one Cholesky factor.
 
-    The unknowns that any variant changes, `changed`, are eliminated last. The Schur complement that remains
-    for them is common to all variants, and each adds its own change to it.
+    The unknowns that any variant changes, `changed`, are eliminated last. Their Schur complement is common to
+    all variants, and each adds its change to it.
     """
 
     def __init__(self, pattern: Pattern, changed: Array, threads: int) -> None:
@@ -66,7 +66,7 @@ class DirectVariants:
     def solve(self, b: Array, taken: Sequence[_Correction]) -> Sequence[Array]:
         """A variant's solution (n,) for each right-hand side of b (k, n), in single precision.
 
-        taken: what `take` returned for each of the k variants.
+        taken: result of `take` for each of the k variants.
         """
         back = np.argsort(self._turned)
 
@@ -95,7 +95,7 @@ class IterativeVariants:
         Raises IndefiniteError where the change leaves a diagonal entry of the matrix 0 or less.
         """
         if (self._gradients.diagonal[change.unknowns] + change.matrix.diagonal() <= 0).any():
-            raise IndefiniteError("a variant leaves nothing of the stiffness of an unknown")
+            raise IndefiniteError("a variant leaves an unknown without stiffness")
         return change
 
     def solve(self, b: Array, taken: Sequence[Change]) -> list[Array | None]:

@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 NEGLIGIBLE = 1e-12
-"""Weight up to which a moved node does not follow another: what rounding leaves of 0."""
+"""Weight up to which a moved node does not follow another: 0 to rounding."""
 
 
 class TiedBlocks:

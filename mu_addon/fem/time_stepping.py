@@ -52,14 +52,13 @@ def simulate_in_time(
 ) -> Trajectory:
     """Equilibria of a body with history at k instants, time (k,) in s ascending and pressure (k,) in kPa.
 
-    The body starts without history, at rest or, where the model has a load, where that takes it; the first
-    instant's pressure comes at once. Pressure is
-    linear between instants, in steps of at most `max_step_s` and the settings' largest pressure step, halved
-    where they do not converge; obstacles with a path are where they are at each step's time. Where the
-    settings follow snaps, a small step that fails goes on beyond the limit point, and the instant's state
-    tells it (`State.snapped_mm`). `on_state` is called when its instant is the last that materials and
-    contacts remember. `load` gives an instant of an earlier run by its number, if it kept one with `store`.
-    Raises InputError where time runs backward, and ConvergenceError naming instant and cause.
+    The body starts without history, at rest or at equilibrium with the model's load. The first instant's
+    pressure is applied at once. Pressure is linear between instants, in steps of at most `max_step_s` and the
+    settings' largest pressure step, halved if they do not converge. Obstacles with a path are moved to each
+    step's time. If the settings follow snaps, a failing small step continues beyond the limit point, and the
+    instant's state has `State.snapped_mm` > 0. `on_state` is called when its instant is the last that
+    materials and contacts remember. `load` gives an instant of an earlier run by its number, if it kept one
+    with `store`. Raises InputError where time runs backward, and ConvergenceError naming instant and cause.
     """
     time, pressure = np.asarray(time_s, float), in_MPa(np.asarray(pressure_kPa, float))
     if (np.diff(time) < 0).any():

@@ -24,8 +24,8 @@ Array = np.ndarray[Any, Any]
 class Trajectory:
     """Motion of a mesh through a pressure protocol, in the protocol's order: k instants.
 
-    time_s and pressure_kPa (k,). solved (s,): the states that were solved for, each once, which `simulate`
-    orders by pressure; index (k,): which of them holds at each instant.
+    time_s and pressure_kPa (k,). solved (s,): the distinct states, ordered by pressure by `simulate`; index
+    (k,): number of each instant's state.
     """
 
     time_s: Array
@@ -66,8 +66,8 @@ def branches(pressure_kPa: Array) -> tuple[Array, list[Array]]:
     """Distinct pressures (d,) in kPa ascending, and the order in which to visit them: outward from 0.
 
     The second result has one array for each side of 0 that occurs, negative first. pressure_kPa: (k,). An
-    elastic body under pressure alone has no memory: as long as its path is stable, the state depends on the
-    pressure only, so that a pressure met twice is solved once.
+    elastic body under pressure alone has no memory: while its path is stable, the state depends on the
+    pressure only, so that a repeated pressure is solved once.
 
     >>> import numpy as np
     >>> distinct, sides = branches(np.array([0.0, 20.0, -10.0, 10.0, 20.0]))
@@ -89,13 +89,12 @@ def simulate(
 ) -> Trajectory:
     """Quasi-static motion of an elastic body: equilibria at times in s and pressures in kPa, (k,) each.
 
-    Every distinct pressure is solved once, outward from 0. on_state: called with each state as it is found.
-    load and store: a cache of states by pressure in MPa; a resumed run finds the same states to the last
-    digit, since each starts from those before it alone. The state without pressure is solved for only where
-    the model has a load.
+    Every distinct pressure is solved once, outward from 0. on_state: called with each state. load and store:
+    a cache of states by pressure in MPa. A resumed run finds identical states, since each starts only from
+    earlier ones. The state without pressure is solved for only where the model has a load.
 
-    Raises ConvergenceError where a pressure cannot be reached (on_state has then seen all before it), and
-    InputError for a body with friction or a law with history, which `simulate_in_time` solves.
+    Raises ConvergenceError if a pressure cannot be reached (on_state was called with all states before it),
+    and InputError for a body with friction or a law with history, which need `simulate_in_time`.
     """
     if equilibrium.model.has_friction or equilibrium.parameters.has_history:
         raise InputError(
@@ -131,7 +130,7 @@ def simulate(
 def whole_body(mesh: Mesh, trajectory: Trajectory) -> tuple[Mesh, Trajectory]:
     """Mesh and trajectory of the whole body, mirrored from those of its half or quarter.
 
-    Nothing is solved again: equilibria stay equilibria, to rounding. A path off the mirror plane needs both
+    Nothing is solved again: the equilibria remain valid to rounding. A path off the mirror plane needs both
     sides.
     """
     for axis in mesh.symmetry:

@@ -54,8 +54,8 @@ def column_blocks(lower: Lower, last: int) -> Array:
 class Triangular:
     """Solves with one factor for many right-hand sides at once, to single precision.
 
-    That halves the memory traffic, and suffices for steps that are corrected by exact residuals: on the unit
-    it changes a step by 1e-5 of its energy norm.
+    That halves the memory traffic. It suffices for steps corrected by exact residuals: on the unit it changes
+    a step by 1e-5 of its energy norm.
 
     The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix (t, t)
     that remains for them when all others are eliminated.

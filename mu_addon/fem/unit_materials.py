@@ -40,10 +40,9 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
     """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law that the unit's [wall] names.
 
     lattice: a homogenised lattice law in place of the neo-Hookean one. Graded struts make either stiffer or
-    softer from place to place (`graded_lattice`). A resolved mesh is all of the wall's
-    resin, and takes neither the lattice's modulus nor a law for it. A skin of other cure is spread
-    evenly over the wall's thickness (`skin_stiffening`): exact where the wall stretches, too soft where it
-    bends.
+    softer from place to place (`graded_lattice`). A resolved mesh consists of the wall's resin; the lattice's
+    modulus or law is not used. A skin of other cure is spread evenly over the wall's thickness
+    (`skin_stiffening`): exact where the wall stretches, too soft where it bends.
     """
     if mesh.resolved:
         return _of_resin(unit, mesh)
@@ -66,7 +65,7 @@ def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> M
 
 
 def _of_resin(unit: Unit, mesh: Mesh) -> Materials:
-    """The wall's law in wall and struts alike, stiffened by each element's share of the skin."""
+    """The wall's law in wall and struts, stiffened by each element's share of the skin."""
     m = unit.material
     count = len(mesh.tets)
     stiffer = _skin_stiffening(unit, mesh)
@@ -100,7 +99,7 @@ def _skin_stiffening(unit: Unit, mesh: Mesh) -> Array:
 def _depths(d: Dimensions, points: Array, corner: Array) -> Array:
     """Depths (n,) in mm below the struts' surface of points (n, 3) in mm; corner (3,): from cells' corners.
 
-    In graded struts those of an endless lattice of the point's own factor, in steps of _FACTOR.
+    In graded struts those of an infinite lattice of the point's factor, in steps of _FACTOR.
     """
     if d.grading is None:
         cell = StrutCell(d.kind, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)

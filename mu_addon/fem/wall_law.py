@@ -66,8 +66,8 @@ def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
 def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:
     """Stiffness in MPa that `Layered` adds along the layers, and its share of all.
 
-    ratio: Young's modulus along the layers over that across, which is kept; shear_MPa, bulk_MPa: of the
-    isotropic law beside it. For a ratio below 1 as much is added across them and taken from the isotropic
+    ratio: Young's modulus along the layers over that across, which is unchanged; shear_MPa, bulk_MPa: of the
+    parallel isotropic law. For a ratio below 1 as much is added across them and taken from the isotropic
     law's shear, which is the same at small strain.
     """
     from scipy.optimize import brentq

@@ -158,4 +158,4 @@ def test_what_cannot_be_an_obstacle_ends_with_what_to_do(files, words, expected,
 def test_friction_without_its_obstacle_is_refused(files, capsys):
     with pytest.raises(SystemExit):
         simulate(files, "--friction", 0.3)
-    assert "belongs after its --obstacle" in capsys.readouterr().err
+    assert "after its --obstacle" in capsys.readouterr().err

@@ -51,7 +51,7 @@ EFFECTS = (
             ),
         ),
         (KIND,),
-        "the beam sags under its own weight",
+        "the beam bends under its weight",
     ),
     Effect("strain_stiffening", STRAIN_STIFFENING.parameters, (KIND,)),
     Effect(
@@ -64,7 +64,7 @@ EFFECTS = (
 
 
 class BeamSag:
-    """Predicts the tip's sag of a cantilever: an elastica of given modulus, without weight of its own.
+    """Predicts the tip deflection of a cantilever: an elastica of given modulus, without weight.
 
     Shear is added at first order; the solid is incompressible. An experiment needs section_mm (width,
     thickness), length_mm and the column added_mass_g.

@@ -1,4 +1,4 @@
-"""Everything a bench measures beside the unit: the class that predicts each kind."""
+"""Experiments on a bench other than with the unit: the class that predicts each kind."""
 
 from __future__ import annotations
 

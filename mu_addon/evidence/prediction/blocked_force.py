@@ -54,12 +54,11 @@ class BlockedForce:
     """Predicts blocked_force experiments: the base clamped, the tip's edge against a flat load cell.
 
     The cell lies across the axis on the side toward which pressure bends the unit, `gap_mm` from the tip at
-    rest; the tip slides along it without friction, and turns. A cell cannot pull: the force is 0 where the
-    tip does not reach it. A blocked unit hardly deforms, so that moduli count only as far as it does: they
-    scale alike (m F(p/m)), and relax as an integral over the history of pressure and force. Friction in the
-    resin and Mullins' softening are of units that move, and are not offered. responses: forces in N with
-    the tip held (`blocked_responses`), one a scale, gap and orientation. Raises InputError without a
-    response.
+    rest; the tip slides along it without friction, and rotates. A cell cannot pull: the force is 0 where the
+    tip does not reach it. A blocked unit hardly deforms, so that its moduli have little effect. They scale by
+    one factor (m F(p/m)), and relax as an integral over the history of pressure and force. Friction in the
+    resin and Mullins' softening need motion and are left out. responses: forces in N with the tip held
+    (`blocked_responses`), one a scale, gap and orientation. Raises InputError without a response.
     """
 
     def __init__(self, responses: Sequence[UnitResponse], experiments: Sequence[Experiment] = ()) -> None:
@@ -176,8 +175,8 @@ def pressing(t: Array, held: Array, relaxing: Sequence[tuple[float, float]] = ()
     """Force (n,) on a cell that cannot pull, from the force (n,) that would hold a unit without memory.
 
     t (n,): times in s, ascending. relaxing: shares and times in s of the resin's elements. Relaxation acts
-    alike on pressure and force: the unit stands where one without memory stands under both, each weighed by
-    its past (`_weighed`). While the tip touches, the force's load is `held`; else the force is 0, and its
+    equally on pressure and force: the unit has the state of one without memory under both, each weighted by
+    its history (`_weighed`). While the tip touches, the force's load is `held`; else the force is 0, and its
     past fades.
     """
     if not relaxing:

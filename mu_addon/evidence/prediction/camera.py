@@ -102,9 +102,9 @@ def read_by_camera(
 
     time_s (n,): in s; scale: of the unit; values: by "effect.parameter". The picture's middle is that of the
     unit at rest, half way along its axis. Positions there: y across and z along the axis; x is depth, which
-    one camera does not see. Where only angles are known the unit bends as an arc of its length. A camera that
-    looks at an angle divides positions by 1 + k u, where u is the one along the axis, or across, in halves of
-    the unit's length (`_view`).
+    one camera does not see. Where only angles are known the unit bends as an arc of its length. An oblique
+    camera divides positions by 1 + k u, with u the position along or across the axis in half lengths of the
+    unit (`_view`).
     """
     get = values.get
     short, lens = get("camera_tilt.foreshortening", 0.0), get("lens_distortion.at_tip", 0.0)
@@ -169,9 +169,9 @@ def _view(values: Mapping[str, float]) -> tuple[Array, Array] | None:
 def _angle_misread(angle: Array, view: tuple[Array, Array] | None, lens: float, squeezed: float) -> Array:
     """Error (n,) of the angle (n,) of the tip's cross-section as seen, both in rad.
 
-    The line that is seen is the tangent (sin a, cos a) at the tip of an arc, (1 - cos a)/a across and sin a/a
-    along of its length. Each fault turns it by its Jacobian: perspective (`_view`), then a lens of x' = x (1
-    + k r^2).
+    The camera sees the tangent (sin a, cos a) at the tip of an arc; the tip is at (1 - cos a)/a across and
+    sin a/a along, in arc lengths. Each fault turns it by its Jacobian: perspective (`_view`), then a lens of
+    x' = x (1 + k r^2).
     """
     y = 2.0 * np.where(np.abs(angle) > 1e-6, (1.0 - np.cos(angle)) / np.where(angle, angle, 1.0), 0.5 * angle)
     z = 2.0 * np.sinc(angle / np.pi) - 1.0

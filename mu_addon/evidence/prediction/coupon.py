@@ -122,9 +122,8 @@ def yeoh(c1: float, c2: float, mode: str, stretch: Array) -> Array:
     """Nominal stress (n,) of an incompressible solid of W = c1 (I1 - 3) + c2 (I1 - 3)^2, in the unit of c1.
 
     stretch (n,): length over undeformed length. mode: "uniaxial", "equibiaxial" or "pure_shear". P = 2 W' (a
-    - a^-m), where m = 2, 5, 3 in the three modes. In closed form: fits ask for it thousands of times, and a
-    test compares it with the law of the finite elements. Raises InputError for a stretch that is not
-    positive.
+    - a^-m), where m = 2, 5, 3 in the three modes. In closed form: fits evaluate it thousands of times, and a
+      test compares it with the finite elements' law. Raises InputError for a stretch that is not positive.
     """
     if not (stretch > 0).all():
         raise InputError("a stretch is not positive", mode, "stretch is length over initial length")

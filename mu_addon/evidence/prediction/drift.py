@@ -26,9 +26,9 @@ OFFSET_SHARE, LEAST_OFFSET_kPa = 0.1, 1.0
 def drifts(name: str, unit: str, most: float, kind: str, experiments: Sequence[Experiment]) -> list[Effect]:
     """The laws of a zero that drifts, as effects of one name for a kind; none without a clock.
 
-    most: largest size of the drift within a record, in `unit`. Zeros drift alike in every record, from its
-    beginning: linearly, as the logarithm of time, settling as an exponential or, where one of these is found,
-    as a power of time (heat that spreads: its root).
+    most: largest size of the drift within a record, in `unit`. Zeros drift equally in every record, from its
+    beginning: linearly, as the logarithm of time, or as a settling exponential. If one of these is found, a
+    power of time is tried (diffusing heat: the root).
     """
     clocks = [e["time_s"] for e in experiments if e.kind == kind and "time_s" in e.columns and len(e) > 1]
     lasts = max((float(t[-1] - t[0]) for t in clocks), default=0.0)

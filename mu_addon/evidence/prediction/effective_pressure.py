@@ -1,7 +1,7 @@
-"""Effective pressure: that at which a unit without memory would stand where the real one does.
+"""Effective pressure: at it a unit without memory would have the real unit's state.
 
-All moduli scaled alike are the pressure scaled inversely; moduli that relax alike change it to first order of
-the hereditary integral. Each record begins in equilibrium.
+Moduli scaled by one factor are the pressure divided by it. Moduli that relax by one factor change the
+pressure to first order of the hereditary integral. Each record begins in equilibrium.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def remembered(
 ) -> Array:
     """Pressure (n,) in kPa that puts a unit without memory into the same state, from that in the chambers.
 
-    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (any law), hysteresis without a rate
-    and Mullins softening, applied in this order. reference_kPa: whose square the energy of softening is
-    relative to, where values do not say; before_kPa: the largest absolute pressure before t begins.
+    t (n,): times in s. values: by "effect.parameter", of viscoelasticity (any law), rate-independent
+    hysteresis and Mullins softening, applied in this order. reference_kPa: its square is the default
+    reference of the energy of softening; before_kPa: the largest absolute pressure before t begins.
     """
     get = values.get
     if share := get("viscoelasticity.share", 0.0):

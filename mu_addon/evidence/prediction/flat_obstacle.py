@@ -1,4 +1,4 @@
-"""A wall beside the unit: the pressure at which it stops the unit, and the change by it."""
+"""A wall next to the unit: the pressure at which it stops the unit, and the change by it."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def _float64(values: Any) -> Array:
 
 @attrs.frozen(eq=False)
 class ObstacleResponse:
-    """The unit's response to a flat wall on one side of it, along its axis.
+    """The unit's response to a flat wall along its axis, on one side.
 
-    pressures_kPa (k,): of the free unit, from 0 on to its last one on this side, up or down; outward_mm (k,):
-    how far it then goes beyond its outline at rest, ascending from 0. reaches_mm (m,): how far walls stand
-    inside the last of these, ascending; shares (t,): of the way from the pressure at which a wall is met to
-    the last one, ascending to 1; changes (m, t, c): of c channels. spare_mm: how much farther than here the
-    free unit gets in another of the experiments; sizes are counted from there. Raises InputError.
+    pressures_kPa (k,): of the free unit, from 0 to its last one of this sign; outward_mm (k,): largest
+    distance beyond its outline at rest, ascending from 0. reaches_mm (m,): distance of walls inside the last
+    of these, ascending; shares (t,): from the pressure at the first touch (0) to the last one (1), ascending;
+    changes (m, t, c): of c channels. spare_mm: additional distance of the free unit in another experiment,
+    where sizes are counted from. Raises InputError.
     """
 
     pressures_kPa: Array = attrs.field(converter=_float64)
@@ -75,9 +75,9 @@ class ObstacleResponse:
         return CubicSpline(reaches, CubicSpline(shares, changes, axis=1)(_EVEN), axis=0)
 
     def met_kPa(self, reach_mm: float) -> float:
-        """Pressure in kPa at which the unit meets a wall.
+        """Pressure in kPa at which the unit touches a wall.
 
-        reach_mm: how far the wall stands inside the farthest place of the free unit in all experiments.
+        reach_mm: distance of the wall inside the free unit's farthest position in all experiments.
         """
         return float(self._met(self.farthest_mm - (reach_mm - self.spare_mm)))
 
@@ -102,8 +102,8 @@ _EVEN = np.linspace(0.0, 1.0, 101)
 def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> Effect:
     """The effect of contact with a wall; its size reach_mm is above 0 on the side +y, below 0 on -y.
 
-    sides: responses with the side that each wall stands on, 1 for +y and -1 for -y. Bounds are the nearest
-    computed walls. kind: of the experiments.
+    sides: responses with the side of each wall, 1 for +y and -1 for -y. Bounds are the nearest computed
+    walls. kind: of the experiments.
     """
     farthest = {s: max((side.farthest_mm for t, side in sides if t == s), default=0.0) for s in (1, -1)}
     # Walls nearer than the computed ones are not extrapolated.
@@ -124,7 +124,7 @@ def contact_effect(sides: Sequence[tuple[int, ObstacleResponse]], kind: str) -> 
         float(nearest[1]),
         0.0,
         tuple(starts),
-        f"how far a wall stands inside the farthest place of the free unit, {reaches}; below 0 toward -y",
+        f"distance of a wall inside the free unit's farthest position, {reaches}; below 0 toward -y",
     )
     mechanism = (
         "the unit touches a flat wall parallel to its axis, reach_mm inside the outline it would "

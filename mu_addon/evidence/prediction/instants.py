@@ -21,9 +21,9 @@ SHARE, MOST = 0.05, 8
 def finer(t: Array, drive: Array) -> tuple[Array, Array, Array]:
     """Times (m,) in s, the drive (m,) there in its unit, and the indices (n,) of the samples among them.
 
-    t (n,), drive (n,): samples, times ascending. Where the lines through the neighbours of two samples meet
-    between them, a corner is inserted, if on one side they hold for two steps or more; then fast changes are
-    divided evenly. Linear between the samples elsewhere.
+    t (n,), drive (n,): samples, times ascending. A corner is inserted where the lines through the neighbours
+    of two samples cross between them, if on one side the line holds for two steps or more. Then fast changes
+    are divided evenly. Linear between the samples elsewhere.
     """
     if len(t) < 6 or not np.ptp(drive):
         return t, drive, np.arange(len(t))

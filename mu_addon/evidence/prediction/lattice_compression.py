@@ -115,7 +115,8 @@ class Struts:
 
     thickness_mm: in mm, at 1.0x. exponent: 4 where struts bend, 2 where they stretch (Gibson and Ashby,
     Cellular Solids, 1997). A thin skin of depth d and modulus k times the core's adds 2 exponent (k - 1) d/t
-    to the stiffness. For the lattice's own cell use what `homogenize` computes instead, see `ComputedCell`.
+    to the stiffness. For the lattice's cell use the computed response of `homogenize` instead, see
+    `ComputedCell`.
     """
 
     thickness_mm: float = 1.5
@@ -146,12 +147,12 @@ SLENDER = Struts()
 
 @attrs.frozen
 class ComputedCell:
-    """Stiffness and mass of a lattice's own cell, from virtual tests of it at several print offsets.
+    """Stiffness and mass of a lattice's cell, from virtual tests at several print offsets.
 
     To first order, a thin skin acts as additional resin of its excess modulus times its depth, so that it
-    stiffens by the slope of the offset's response. reference: the block to whose modulus as drawn the
-    stiffness is relative, where it is not this one (another count of cells, say). printed_mm,
-    printed_excess_mm: offset and skin that the lattice has before any effect.
+    stiffens by the slope of the offset's response. reference: another block whose modulus as drawn the
+    stiffness is relative to (another count of cells, for example). printed_mm, printed_excess_mm: offset and
+    skin of the lattice before any effect.
     """
 
     response: OffsetResponse
@@ -205,11 +206,11 @@ def _linear(strain: Array) -> Array:
 class LatticeStress:
     """Predicts compressed lattices: modulus times `curve` of the strain, and the mass of weighed specimens.
 
-    A lattice scaled as a whole has no length of its own: as drawn, its modulus does not depend on scale.
+    A lattice scaled as a whole has no intrinsic length: as drawn, its modulus does not depend on scale.
     curve: stress (n,) over modulus at strain (n,), compression positive, of slope 1 at 0. experiments: in the
     order they were run, from which the earlier strain of each specimen is known. scalings: by name of the
-    experiment, slender struts where one has none. The mass needs columns mass_g and mass_sd_g, and section_mm
-    and length_mm.
+    experiment, by default of slender struts. The mass needs columns mass_g and mass_sd_g, and section_mm and
+    length_mm.
     """
 
     nuisances = (MODULUS, DENSITY)

@@ -62,7 +62,7 @@ class Recordings:
         return float(self._begins[-1])
 
     def place(self, moment_s: float) -> tuple[Experiment, float]:
-        """Record that contains a moment of recording, and the time by its own clock, both in s."""
+        """Record that contains a moment of recording, and the time by its clock, both in s."""
         k = self._of(moment_s)
         first = float(self.experiments[k]["time_s"][0])
         return self.experiments[k], first + moment_s - float(self._begins[k]) - 0.5 * self._sample_s[k]
@@ -113,9 +113,9 @@ def slip_effects(channels: Sequence[str], kind: str, recordings: Recordings) -> 
     """Markers that may have slipped, as effects of a kind, with starts by a search of the records.
 
     channels: that are predicted. None where fewer than two markers are seen: one alone moves as it would if
-    the camera were moved. The marker whose best moment gains most is always among them, others where theirs
-    gains more than the best of so many moments would by noise. A marker that is seen along one axis has a
-    signed displacement, others a length and a direction in the picture.
+    the camera were moved. The marker whose best moment gains most is always included, others if their best
+    moment gains more than the best of so many moments would by noise. A marker that is seen along one axis
+    has a signed displacement, others a length and a direction in the picture.
     """
     known = markers(channels)
     found = [s for s in searched(recordings) if known.get(s.marker) and set(s.axes) <= set(known[s.marker])]
@@ -193,7 +193,7 @@ def slipped(
 
     y (c, n): without slips, in degrees and mm; rest (c,): at rest. values: by "effect.parameter", see
     `slip_effects`; without any the channels stay. The displacement rotates with the surface that the marker
-    sits on: by twice the angle of the line from the inlet, as on an arc. Along one axis it stays as it is.
+    sits on: by twice the angle of the line from the inlet, as on an arc. Along one axis it is unchanged.
     """
     found = y
     if not any(key.startswith(SLIP) for key in values):

@@ -98,9 +98,7 @@ EFFECTS = (
             Parameter(
                 "growth_per_MPa", "1/MPa", 0.0, 0.5, 0.0, (3e-3,), "the volume's, as the logarithm of time"
             ),
-            Parameter(
-                "begins_s", "s", 0.5, 1e4, 30.0, (5.0, 50.0), "what it began before the valve was shut"
-            ),
+            Parameter("begins_s", "s", 0.5, 1e4, 30.0, (5.0, 50.0), "began before the valve was shut"),
         ),
         (KIND,),
         "the wall creeps under pressure, so the chamber grows by as much in each decade of time",
@@ -162,7 +160,7 @@ class ChamberPressure:
 
     experiments: those of kind pressure_hold each add two nuisances, the initial pressure in kPa and the time
     in s at which the valve was shut, until when the supply keeps the pressure. compliance_per_kPa: relative
-    growth of the volume a kPa; it matters only while the pressure changes and a hold does not show it.
+    growth of the volume a kPa; it acts only while the pressure changes, so a hold does not show it.
     """
 
     def __init__(self, experiments: Sequence[Experiment], compliance_per_kPa: float = 0.0) -> None:

@@ -63,11 +63,11 @@ TWO_MODES = Effect(
 class PressureStep(UnitPressure):
     """Predicts pressure_step experiments: as `UnitPressure`, and with the inertia of the unit's first mode.
 
-    A step excites what quasi-static cycles do not. Inertia overshoots, or begins with a slope of zero; a line
-    that lags begins with a slope and ends within a few of its times; a resin that relaxes goes on for decades
-    of time, in both directions alike. The mode is linear: one period at every pressure, and all channels
-    follow it in proportion to their way. Where samples were lost while the pressure changed, its mean between
-    those that are left is a nuisance. Raises InputError without a response.
+    A step excites dynamics that quasi-static cycles do not. Inertia overshoots, or begins with zero slope. A
+    lagging line begins with a slope and ends within a few time constants. A relaxing resin continues for
+    decades of time, equally in both directions. The mode is linear: one period at every pressure, and all
+    channels follow it in proportion to their way. Where samples were lost while the pressure changed, its
+    mean between those that are left is a nuisance. Raises InputError without a response.
     """
 
     kind = KIND

@@ -141,9 +141,9 @@ def strain_histories(experiments: Sequence[Experiment], kind: str) -> dict[str, 
 def load_zeros(experiments: Sequence[Experiment], kind: str) -> tuple[Parameter, ...]:
     """The load cell's zero in each experiment of a kind that was recorded over time, as stress in kPa.
 
-    Cells are set to zero before each test, and keep it to a share of the load (`ZERO_SHARE`): an unknown zero
-    would imitate faces that close. Between plates a preload defines zero (`seating`), and cells have none.
-    Records of a few rows, and those of given spread, cannot determine it.
+    Load cells are set to zero before each test, to within a share of the load (`ZERO_SHARE`): an unknown zero
+    would imitate closing faces. Between plates a preload defines zero (`seating`), and load cells have no
+    zero parameter. Records of a few rows, and those of given spread, cannot determine it.
     """
     found = []
     for e in experiments:

@@ -50,8 +50,8 @@ class Variant:
 
     at (m,): values of `parameter` in its unit, ascending, its null among them. values (m, c, k): c channels
     in their units at the k pressures of the response; at the null they are the base's. A parameter with a
-    spread is an error of the model itself, of known size, and is fitted beside every hypothesis. Raises
-    InputError for fewer than two sizes, or if they do not ascend through the null.
+    spread is a model error of known size, and is fitted with every hypothesis. Raises InputError for fewer
+    than two sizes, or if they do not ascend through the null.
     """
 
     parameter: Parameter
@@ -72,11 +72,11 @@ class UnitResponse:
     """Quasi-static response of the unit: values (c, k) of channels at pressures (k,) in kPa ascending.
 
     channels: columns as measured (angle_deg, marker1_y_mm, ...), which give the units. variants: by the name
-    of their effect. orientation_deg, orientation_axis: see `unit_pose.down`. walls: by the side of the unit
-    they stand on, 1 for +y and -1 for -y. Interpolated by cubic splines, and along their end slopes beyond
-    the last pressures. discrepancy: standard deviation between codes of the same physics, as a smooth change
-    of the pressure over the largest one; 0 where the response is exact. gap_mm: of the load cell that holds
-    the tip, where one does. Raises InputError for fewer than four pressures and for shapes that do not match.
+    of their effect. orientation_deg, orientation_axis: see `unit_pose.down`. walls: by their side of the
+    unit, 1 for +y and -1 for -y. Interpolated by cubic splines, and linearly beyond the last pressures.
+    discrepancy: standard deviation between codes of the same physics, as a smooth change of the pressure over
+    the largest one; 0 if the response is exact. gap_mm: of the load cell that holds the tip, if any. Raises
+    InputError for fewer than four pressures and for shapes that do not match.
     """
 
     channels: tuple[str, ...]
@@ -201,8 +201,8 @@ def believed(
 ) -> tuple[Parameter, ...]:
     """Nuisances, with the modulus bounded so that no response has to be extrapolated far.
 
-    free: the modulus first. asked: experiments, each with the response that predicts it. A softer unit stands
-    where this one stands at a higher pressure, and beyond those computed it may balloon or collapse.
+    free: the modulus first. asked: experiments, each with the response that predicts it. A softer unit has
+    the state of this one at a higher pressure, and beyond the computed pressures it may balloon or collapse.
     """
     low = free[0].low
     for response, e in asked:
@@ -221,8 +221,8 @@ def discrepancies(spread: float) -> tuple[Parameter, ...]:
     """Smooth discrepancies of any unit's model, by the square and the cube of the pressure; none at 0.
 
     spread: standard deviation of each at the largest pressure, as a share of it. Kennedy and O'Hagan, J. R.
-    Stat. Soc. B 63 (2001) 425: a discrepancy of known size beside every hypothesis, so that no cause is named
-    for less.
+    Stat. Soc. B 63 (2001) 425: a discrepancy of known size in every hypothesis, so that no cause is named for
+    less.
     """
     if not spread:
         return ()
@@ -305,7 +305,7 @@ RELAXING = Effect(
         Parameter("onset_s", "s", 0.02, 1000.0, 1.0, (0.5, 5.0), "when that begins"),
     ),
     (KIND,),
-    "all moduli relax with time, by as much in each decade of it",
+    "all moduli relax with time, equally in each decade",
 )
 
 
@@ -342,11 +342,11 @@ class UnitPressure:
     """Predicts unit_pressure experiments from responses of the unit, one for each scale and orientation.
 
     The gauge's reading becomes the pressure in the chambers (offset, gain, and with an open valve leak and
-    lag). That becomes the pressure at which the uncorrected unit would stand where the unit stands now: all
-    moduli scaled alike are the pressure scaled inversely, at rest exactly and for moduli that relax alike to
-    first order of the hereditary integral. That pressure is looked up in the response. Each record starts in
-    equilibrium. experiments: in the order they were run, for the history of each specimen. Raises InputError
-    without a response.
+    lag). That becomes the pressure at which the uncorrected unit has the state of the real one. Moduli scaled
+    by one factor are the pressure divided by it: exactly at rest, and to first order of the hereditary
+    integral for moduli that relax by one factor. That pressure is looked up in the response. Each record
+    starts in equilibrium. experiments: in the order they were run, for the history of each specimen. Raises
+    InputError without a response.
     """
 
     kind = KIND
@@ -445,7 +445,7 @@ class UnitPressure:
         return np.asarray(pressure + self.reference_kPa * (second * x**2 + third * x**3))
 
     def _remembered_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """`effective_kPa`, kept: derivatives by what acts after it (camera, static effects) need it again."""
+        """`effective_kPa`, cached: derivatives by later effects (camera, static effects) need it again."""
         own = frozenset((k, v) for k, v in values.items() if not k.startswith(self._after))
         key = experiment.name, id(experiment), own
         if key not in self._effective:
@@ -456,7 +456,7 @@ class UnitPressure:
         return self._effective[key][1]
 
     def effective_kPa(self, experiment: Experiment, values: Mapping[str, float]) -> Array:
-        """Pressure (n,) in kPa at which the base unit stands where the unit of these values stands.
+        """Pressure (n,) in kPa at which the base unit has the state of the unit with these values.
 
         values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
         of the gauge, leak and line lag (with an open valve), modulus with temperature and fatigue,

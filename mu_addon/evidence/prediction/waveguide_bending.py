@@ -50,7 +50,7 @@ EFFECTS = (
             ),
         ),
         (KIND,),
-        "ambient light adds to the signal, more or less of it while it records",
+        "ambient light adds to the signal, and changes during the record",
         refines=True,
     ),
     Effect(
@@ -67,10 +67,10 @@ EFFECTS = (
         "optical_nonlinearity",
         (
             Parameter("at_90_deg", "", -0.9, 10.0, 0.0, (0.3,), "loss at 90 deg over proportional, less 1"),
-            Parameter("power", "", 1.1, 4.0, 2.0, (1.5, 2.5), "of the bend by which the excess goes"),
+            Parameter("power", "", 1.1, 4.0, 2.0, (1.5, 2.5), "of the bend, for the excess"),
         ),
         (KIND,),
-        "the light loss is not proportional to curvature, by a power of it",
+        "the light loss is not proportional to curvature, but a power of it",
         refines=True,
     ),
     Effect(

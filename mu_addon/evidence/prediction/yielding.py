@@ -141,8 +141,8 @@ def yielded(strain: Array, law: Callable[[Array], Array], values: Mapping[str, f
 def _borne_by_one(strain: bytes, power: float) -> Array:
     """z (n,), read-only, of Bouc and Wen's element by the bytes of strains (n,) in yield strains, in order.
 
-    Any stretch in one direction is exact, however long: elastic until z is 0, then along the curve of first
-    loading, whose strain x = int_0^z du/(1 - u^n) is tabulated.
+    Any loading in one direction is exact: elastic until z is 0, then along the curve of first loading, whose
+    strain x = int_0^z du/(1 - u^n) is tabulated.
     """
     way, height = _first_loading(power)
     x = np.frombuffer(strain)

@@ -38,9 +38,9 @@ class CubicShear(Law):
     """W(E) = 2 G (Exy^2 + Eyz^2 + Ezx^2): resists shear between the axes x, y, z, and no stretch along them.
 
     It acts in parallel with a law for the stretches, such as Foam: the whole's C44 is the sum of their shear
-    moduli. The square of the cosine between two axes' images is resisted, so that this law alone never has
-    negative energy, but shear puts the diagonals across it under compression: a companion with shear modulus
-    mu keeps the body elliptic up to a shear of about mu/G.
+    moduli. The energy is in the squared cosine between two axes' images and therefore never negative. But
+    shear compresses the diagonals across it: a parallel law with shear modulus mu keeps the body elliptic up
+    to a shear of about mu/G.
     """
 
     name = "cubic shear"

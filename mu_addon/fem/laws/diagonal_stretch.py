@@ -32,11 +32,11 @@ def diagonal_stiffness(E: mat33, m: Any) -> mat99:
 class DiagonalStretch(Law):
     """W(E) = C/2 (tr E)^2, where tr E/3 is the mean Green strain along the four diagonals of a cube.
 
-    It resists changes of length of the struts from a cell's centre to its corners, but no deformation that
-    keeps the sum of squared stretches: the volume may shrink under tension as under compression, as that of a
-    body-centred lattice does. In parallel with CubicShear of G = C it is four springs along the diagonals. C
-    adds to C11 and C12. Under compression from all sides the springs buckle: a companion with shear modulus
-    mu keeps the body elliptic up to a trace of about -mu/C.
+    It resists changes of length of the struts from a cell's centre to its corners, but not deformations that
+    keep the sum of squared stretches. The volume may shrink under tension and compression, as in a
+    body-centred lattice. In parallel with CubicShear of G = C it is four springs along the diagonals. C adds
+    to C11 and C12. Under compression from all sides the springs buckle: a companion with shear modulus mu
+    keeps the body elliptic up to a trace of about -mu/C.
     """
 
     name = "diagonal stretch"

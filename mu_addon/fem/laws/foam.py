@@ -101,8 +101,8 @@ class Foam(Law):
     tension for a >= 1 and of compression for a < 1, + lambda/gamma (ln J + (J^-gamma - 1)/gamma). With one mu
     and alpha, and gamma = alpha beta, lambda = 2 mu beta, this is the hyperfoam of one term.
 
-    Energy and stress are continuous; the tangent is where mu of tension and compression agree, and else jumps
-    by a finite amount where a principal stretch passes 1. lambda is the first Lame constant (0: no lateral
+    Energy and stress are continuous. The tangent is continuous if mu of tension and compression agree;
+    otherwise it jumps where a principal stretch passes 1. lambda is the first Lame constant (0: no lateral
     strain). A large alpha in compression gives a plateau. Meant for open lattices from about 0.4 to 1.5.
     Source: Storakers, J. Mech. Phys. Solids 34 (1986) 125.
     """
@@ -125,8 +125,8 @@ class Foam(Law):
         """Parameters (k, 6) of one small-strain Young's modulus in MPa, Poisson's ratio and two exponents.
 
         Each is a number or (k,); tension and compression get the same mu. gamma = alpha_compression nu/(1 - 2
-        nu), as one term's hyperfoam has it, and 1 for a nu of 0. The values are not checked here: `valid`
-        does that.
+        nu), as in hyperfoam with one term, and 1 for a nu of 0. The values are not checked here: `valid` does
+        that.
         """
         values = np.broadcast_arrays(*np.atleast_1d(modulus_MPa, poisson, alpha_tension, alpha_compression))
         modulus, nu, tension, compression = (np.array(v, float) for v in values)

@@ -77,11 +77,11 @@ def friction_advance(F: mat33, m: Any) -> _history:
 class Friction(Law):
     """Elastic, perfectly plastic branch in the deviator of the isochoric Green strain (J^(-2/3) C - 1)/2.
 
-    Without volumetric stiffness: laid over an elastic law, as a layer of its own, it adds hysteresis
-    that does not depend on the rate; several layers with rising yield stresses make a Prandtl-Ishlinskii
-    model. The step's energy is that of elastic strain plus what sliding costs, so that it has a minimum.
-    Stress is continuous, the tangent jumps where sliding begins. Meant for strains up to about 0.2, as the
-    yield stress holds for the second Piola-Kirchhoff stress.
+    It has no volumetric stiffness. As a layer in parallel with an elastic law it adds rate-independent
+    hysteresis; several layers with rising yield stresses make a Prandtl-Ishlinskii model. The step's energy
+    is that of elastic strain plus the dissipation by sliding, and therefore has a minimum. Stress is
+    continuous, the tangent jumps where sliding begins. Meant for strains up to about 0.2, as the yield stress
+    holds for the second Piola-Kirchhoff stress.
     """
 
     name = "friction"

@@ -16,12 +16,12 @@ class Law:
     units of `parameter_names`: energy in MPa, first Piola-Kirchhoff stress (mat33) and dP/dF (mat99,
     rows and columns 3 i + J). They may ask for J > 0.
 
-    A law with `history` > 0 numbers at a point finds them in m behind its parameters, and behind those
-    the time step in s; its energy is the incremental potential of the step, and `advance` (of F and m
-    too) gives the numbers at the step's end. All start from 0.
+    For a law with `history` > 0 numbers at a point, m continues with these numbers and the time step in s.
+    Its energy is the incremental potential of the step, and `advance` (also of F and m) gives the numbers at
+    the step's end. All start from 0.
 
-    split_volume: whether W = W_iso(J^(-1/3) F) + kappa/2 (J - 1)^2, with kappa the parameter number
-    `bulk`, or without that second term where `bulk` is None.
+    split_volume: True if W = W_iso(J^(-1/3) F) + kappa/2 (J - 1)^2, with kappa the parameter number `bulk`,
+    or without the second term if `bulk` is None.
     """
 
     name: str
@@ -39,13 +39,13 @@ class Law:
         """Shear and bulk modulus (k, 2) in MPa at small strain of parameters (k, count).
 
         Of a law that depends on direction: averaged over directions (Voigt). Raises NotImplementedError here;
-        every law gives its own.
+        every law defines it.
         """
         raise NotImplementedError
 
     @staticmethod
     def valid(parameters: Array) -> None:
-        """Raise InputError unless every row of parameters (k, count) is admissible; every law gives its own.
+        """Raise InputError unless every row of parameters (k, count) is admissible; every law defines it.
 
         Raises NotImplementedError here.
         """

@@ -63,9 +63,9 @@ class Layered(Law):
     """W = (K:C + K:C^-1 - 2 tr K)/8 with K = in_plane (1 - n n) + across n n, n the layers' normal.
 
     In parallel with an isotropic law it makes stiffness depend on direction. At small strain W = K:e^2/2; at
-    large strain a stretch l along n costs (l^2 + 1/l^2 - 2)/8, which stiffens both ways and so, unlike a law
-    quadratic in Green strain, never loses its stiffness under compression. n is a unit vector in the
-    undeformed body.
+    large strain the energy of a stretch l along n is (l^2 + 1/l^2 - 2)/8. It stiffens in tension and
+    compression and, unlike a law quadratic in Green strain, keeps its stiffness under compression. n is a
+    unit vector in the undeformed body.
     """
 
     name = "layered"

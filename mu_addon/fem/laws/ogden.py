@@ -58,10 +58,10 @@ def ogden_difference(stretch: vec3, m: Any) -> vec3:
 class Ogden(Law):
     """Ogden law, W = sum of mu_p/alpha_p (a^alpha_p + b^alpha_p + c^alpha_p - 3) + kappa/2 (J - 1)^2.
 
-    p = 1..3; a, b, c are the principal stretches at constant volume; 2 mu = sum of mu_p alpha_p. A term
-    that is not wanted has mu_p = 0. Rubber follows it as far as it was fitted, up to stretches of 7; each
-    mu_p alpha_p > 0 is enough for stability and not asked for, since fits often break it harmlessly.
-    Source: Ogden, Proc. R. Soc. A 326 (1972) 565.
+    p = 1..3; a, b, c are the principal stretches at constant volume; 2 mu = sum of mu_p alpha_p. A term that
+    is not wanted has mu_p = 0. Rubber follows it in the range of the fit, up to stretches of 7. Every mu_p
+    alpha_p > 0 is sufficient for stability, but is not required: many good fits violate it. Source: Ogden,
+    Proc. R. Soc. A 326 (1972) 565.
     """
 
     name = "Ogden"

@@ -65,7 +65,7 @@ def roxburgh_advance(F: mat33, m: Any) -> _history:
 
 
 class OgdenRoxburgh(Law):
-    """Yeoh law whose isochoric stress is eta times its own below the largest energy W_m so far (Mullins).
+    """Yeoh law whose isochoric stress is scaled by eta below the largest energy W_m so far (Mullins).
 
     eta = 1 - erf((W_m - W)/(m + beta W_m))/r. Larger r: less softening; m, in MPa, keeps small strains
     as they were; beta widens the return. No set remains at rest and reloading retraces unloading. Stress is

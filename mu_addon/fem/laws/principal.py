@@ -1,8 +1,8 @@
 """Isotropic laws of the principal stretches.
 
-With C = sum of x_a N_a (x) N_a, x = stretch^2, the second Piola-Kirchhoff stress is the sum of
-s_a N_a (x) N_a. Its derivative needs (s_b - s_a)/(x_b - x_a), which a law gives in a form that is as
-exact for two equal stretches as for distinct ones; then so are stress and tangent.
+With C = sum of x_a N_a (x) N_a, x = stretch^2, the second Piola-Kirchhoff stress is the sum of s_a N_a (x)
+N_a. Its derivative needs (s_b - s_a)/(x_b - x_a). A law gives this in a form that is exact also for two equal
+stretches; then stress and tangent are exact there, too.
 """
 
 from __future__ import annotations

@@ -91,12 +91,12 @@ def prony_advance(F: mat33, m: Any) -> _history:
 class Prony(Law):
     """Viscoelastic law: a Yeoh law for slow loading, and branches that relax with times tau_i in s.
 
-    Each branch carries an isochoric second Piola-Kirchhoff stress Q with dQ/dt + Q/tau = beta dS/dt, S the
-    Yeoh law's own, so that at once a step is 1 + sum of beta_i times as stiff as in the long run; beta is
-    g/(1 - sum of g) of relative moduli g. Stress taken as linear in time within a step, which makes
-    any step stable. A branch that is not wanted has beta 0. Branches are linear in stress: meant for
-    stretches where the Yeoh law's own shape does not depend on the rate. Volume change is elastic.
-    Source: Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153.
+    Each branch carries an isochoric second Piola-Kirchhoff stress Q with dQ/dt + Q/tau = beta dS/dt, S of the
+    Yeoh law. The instantaneous stiffness is 1 + sum of beta_i times the long-term one; beta is g/(1 - sum of
+    g) of relative moduli g. Stress taken as linear in time within a step, which makes any step stable. A
+    branch that is not wanted has beta 0. Branches are linear in stress: valid for stretches where the shape
+    of the Yeoh law does not depend on the rate. Volume change is elastic. Source: Simo, Comput. Methods Appl.
+    Mech. Eng. 60 (1987) 153.
     """
 
     name = "Prony"

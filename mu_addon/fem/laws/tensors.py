@@ -56,7 +56,7 @@ def add_swapped(A: mat99, factor: wp.float64, X: mat33, Y: mat33) -> mat99:
 
 @wp.func
 def add_left(A: mat99, S: mat33) -> mat99:
-    """A + the tensor delta_ik S_JL, which is what a fixed second Piola-Kirchhoff stress adds."""
+    """A + the tensor delta_ik S_JL, the contribution of a fixed second Piola-Kirchhoff stress."""
     for i in range(3):
         for j in range(3):
             for n in range(3):

@@ -34,9 +34,9 @@ yeoh_parts = of_invariants(yeoh_energy, yeoh_slope)
 class Yeoh(Law):
     """Yeoh law, W = sum of c_i (I1 - 3)^i, i = 1..3, + kappa/2 (J - 1)^2 with I1 at constant volume.
 
-    Filled rubber follows it as far as it was fitted, up to stretches of 3 to 4. It is stable where
-    dW/dI1 grows fast enough with I1, which c2 < 0 can spoil at large stretches: a matter of the fit, not
-    looked for here. Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754.
+    Filled rubber follows it as far as it was fitted, up to stretches of 3 to 4. It is stable where dW/dI1
+    grows fast enough with I1. A c2 < 0 can prevent this at large stretches; the fit checks it, not this law.
+    Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754.
     """
 
     name = "Yeoh"
