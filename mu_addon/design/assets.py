@@ -9,7 +9,7 @@ from ..reading import file_text, parse_toml
 
 
 def asset_root() -> Path:
-    """The folder `assets`: inside the package in the built extension, beside it in a checkout.
+    """The folder `assets`: inside the package in the built extension, next to it in a checkout.
 
     Raises InputError where neither exists.
     """

@@ -20,7 +20,7 @@ PIECES = 8
 def lattice_beams(d: Dimensions, bar: Bar | None = None) -> Beams:
     """The lattice as beams: each strut is a chain of `PIECES` frusta whose radii in mm follow its law.
 
-    bar: a waveguide; struts that it replaces are left out, and those that meet it are thickened as in the
+    bar: a waveguide; struts that it replaces are left out, and those that touch it are thickened as in the
     printable solid (`waveguide.strut_radii`). Frusta with both ends inside the actuator's outer surface are
     left out.
     """

@@ -33,14 +33,14 @@ MOST_MM = 1_000_000.0
 QUANTUM_MM = 1e-5
 """Vertices closer than that are one: files repeat them for every triangle."""
 AROUND = 96
-"""Number of flat pieces around the actuator in the test of whether a body contains it."""
+"""Number of flat pieces around the actuator in the test for a body that contains it."""
 SLACK_MM = 1e-3
 """Distance by which a body may miss an end plane."""
 
 
 @attrs.frozen
 class Flaw:
-    """Reason against a surface: what is wrong, what to do, and the places (n, 3) in mm."""
+    """Fault of a surface: what is wrong, what to do, and the places (n, 3) in mm."""
 
     what: str
     remedy: str
@@ -52,7 +52,7 @@ class Body:
     """A surface of triangles (m, 3) between vertices (n, 3) in mm, in the unit's frame.
 
     Raises InputError where it is empty, has a coordinate that is not finite or beyond MOST_MM, or more than
-    MOST_TRIANGLES triangles. `flaws` tells whether the surface is closed.
+    MOST_TRIANGLES triangles. `flaws` checks that the surface is closed.
     """
 
     vertices: Vertices
@@ -146,8 +146,8 @@ def read_body(path: str | Path) -> Body:
 def flaws(body: Body) -> list[Flaw]:
     """Reasons why a surface does not bound one solid body; empty if it does.
 
-    Checked are open and inconsistently oriented edges, edges of more than two faces, self-intersection and,
-    only where these are in order, the number of separate bodies and the sign of the volume.
+    Checked are open and inconsistently oriented edges, edges of more than two faces and self-intersection.
+    Without these faults the number of separate bodies and the sign of the volume are checked.
     """
     v, t = body.vertices, body.triangles
     open_, crowded = _odd_edges(t)
@@ -193,7 +193,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
     """Reasons why a body without `flaws` cannot be the envelope of a unit of these dimensions.
 
     Checked are a size that suggests another unit of length, the extent along z against the unit's height, and
-    whether the chambers lie inside.
+    the chambers' position inside.
     """
     low, high = body.bounds
     size, own = float(np.ptp(body.bounds, axis=0).max()), float(np.ptp(np.array(d.bounds), axis=1).max())
@@ -215,7 +215,7 @@ def misfits(body: Body, d: Dimensions) -> list[Flaw]:
         found.append(
             Flaw(
                 f"it reaches from z = {low[2]:.4g} to {high[2]:.4g} mm, the unit from 0 to {d.height:.4g} mm",
-                "move it, or lengthen it past both ends; what is beyond them is cut off flat",
+                "move it, or lengthen it past both ends; the parts beyond them are cut off flat",
                 np.array([[0.0, 0.0, z] for z in (low[2], high[2])]),
             )
         )
@@ -322,7 +322,7 @@ def covering(d: Dimensions, body: Body | None) -> Dimensions:
 
 
 def half(body: Body) -> Body | None:
-    """The part at x >= 0 of a body that is its own mirror image across x = 0; None for any other body.
+    """The part at x >= 0 of a body that is symmetric about x = 0; None for any other body.
 
     Symmetric means that less than 1e-4 of the volume lies outside the mirror image. Raises InputError where
     the cut surface is no valid `Body`.
@@ -406,7 +406,7 @@ def _vertex(piece: Any) -> NDArray[np.float64]:
 
 
 def _cells(reach: float, cell: float) -> int:
-    """Cells beside the middle one that cover a distance from the axis."""
+    """Number of cells on one side of the middle one that cover a distance from the axis."""
     return max(1, int(np.ceil(reach / cell - 0.5 - 1e-9)))
 
 

@@ -28,7 +28,7 @@ ARM_MM = 40.0
 class Feature:
     """One dimension of the gauge to measure with calipers: nominal_mm in mm along `axis` "x", "y" or "z".
 
-    kind: "solid" for material, "gap" for a slot; where: its place on the gauge, in words.
+    kind: "solid" for material, "gap" for a slot; where: its place on the gauge, as text.
     """
 
     name: str
@@ -131,7 +131,7 @@ def strut_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
 def wall_coupon(d: Dimensions) -> tuple[Vertices, Triangles]:
     """A flat tension coupon as thick as the membrane's wall: vertices (n, 3) in mm, triangles (m, 3).
 
-    It stands upright in the xz plane, STRIP_MM wide over a gauge length of GAUGE_MM between wider grips.
+    It is upright in the xz plane, STRIP_MM wide over a gauge length of GAUGE_MM between wider grips.
     """
     from manifold3d import CrossSection, Manifold
 

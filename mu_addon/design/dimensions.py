@@ -16,11 +16,11 @@ class Dimensions:
     """Lengths of a unit in mm at its scale, as geometry and meshes take them.
 
     cell: the lattice cell U, which is also the pitch of the chambers; count: of chambers. R and r: outer
-    radii of the profile at a bladder's apex and at a neck; a and b: half-lengths of their parabola arcs, a
-    + b = U/2. wall: along the surface normal, wall_factors: of single chambers, () where all are alike;
-    wall_growth: by how much printing thickens the wall, which no factor multiplies. Counts of cells and `row`
-    are whole numbers, see `parameters.Envelope`. grading: of the struts, None for struts alike everywhere;
-    strut_growth: by how much printing thickens them, which no grading multiplies.
+    radii of the profile at a bladder's apex and at a neck; a and b: half-lengths of their parabola arcs, a +
+    b = U/2. wall: along the surface normal; wall_factors: of single chambers, () if all are equal;
+    wall_growth: thickness added by printing, which no factor multiplies. Counts of cells and `row` are whole
+    numbers, see `parameters.Envelope`. grading: of the struts, None for uniform struts; strut_growth:
+    diameter added by printing, which no grading multiplies.
 
     >>> from mu_addon.design import load_preset
     >>> d = load_preset("mu-1.5x").dimensions
@@ -102,7 +102,7 @@ class Dimensions:
 
     @property
     def joint_radius(self) -> float:
-        """Outer radius in mm where the arcs of bladder and neck meet with one slope: (R b + r a)/(a + b)."""
+        """Outer radius in mm at the joint of the arcs of bladder and neck: (R b + r a)/(a + b)."""
         return (self.R * self.b + self.r * self.a) / (self.a + self.b)
 
     @property

@@ -43,7 +43,7 @@ def figures(unit: Unit, printer: Printer, struts: Struts | None, volume_mm3: flo
 def estimated_volume(unit: Unit, struts: Struts | None) -> float:
     """Volume in mm3 of membranes, inlet and struts without a waveguide.
 
-    Where struts meet they are counted more than once: for the shipped presets it is 2 % above the solid's.
+    Junctions of struts are counted more than once: for the shipped presets it is 2 % above the solid's.
     """
     d = unit.dimensions
     boss = (d.inlet_radius + d.inlet_wall) ** 2 - d.inlet_radius**2

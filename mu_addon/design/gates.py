@@ -1,4 +1,4 @@
-"""Geometry checks (gates) of a printable solid: numbers that it must meet before it is written."""
+"""Geometry checks (gates) of a printable solid: required numbers before it is written."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class GateError(MuError):
 class Guide:
     """Measurements on the lattice with its waveguide, next to the values they must have; mm3 and counts.
 
-    cut_mm3: volume that wells, pockets and notches remove; strayed_mm3: the part of it that belongs to struts
-    or membrane instead of the waveguide.
+    cut_mm3: volume that wells, pockets and notches remove; strayed_mm3: the part of it removed from struts or
+    membrane instead of the waveguide.
     """
 
     genus: int
@@ -79,7 +79,7 @@ def check_solid(
 ) -> Gates:
     """Measure a surface of vertices (n, 3) in mm and triangles (m, 3), and require every gate.
 
-    plug: a Manifold that closes the inlet; sealed_volume: volume in mm3 that it then encloses, analytically.
+    plug: a Manifold that closes the inlet; sealed_volume: analytic volume in mm3 that it then encloses.
     lattice: genus and number of components of the bare lattice's solid; lattice_cycles: E - V + 1 of its
     graph. guide: the result of `check_waveguide`, if there is a waveguide. Raises GateError for the first
     gate that fails.
@@ -113,11 +113,11 @@ def check_solid(
 
 
 def check_waveguide(sensed: Any, bar: Any, cuts: Any, actuator: Sequence[Any], cycles: int) -> Guide:
-    """Measure the lattice united with its waveguide, and what the cuts remove; bodies are Manifolds in mm.
+    """Measure the lattice united with its waveguide, and the volume of the cuts; bodies are Manifolds in mm.
 
     sensed: lattice and waveguide; bar: the waveguide alone; cuts: its wells, pockets and notches; actuator:
-    its bodies; cycles: E - V + 1 of the lattice's graph with the waveguide's own edges. Raises GateError
-    where the cuts touch struts or membrane, or the result is in pieces or has another genus than `cycles`.
+    its bodies; cycles: E - V + 1 of the lattice's graph with the waveguide's edges. Raises GateError where
+    the cuts touch struts or membrane, or the result is in pieces or has another genus than `cycles`.
     """
     from manifold3d import Manifold, OpType
 

@@ -1,9 +1,9 @@
 """Graded struts: a field of factors on the struts' diameters over the envelope, from a few parameters.
 
-The factor at a point is the product of four: along the axis, linear between five values; across y, from 1
-on the axis to a value at either side; across x, from 1 in the bending plane to a value at both sides; and
-factors of single cells, which hold at the cells' centres and are interpolated between them. Struts take it at
-their nodes (`lattice.Lattice`). It is its own mirror image across x = 0, as the unit is.
+The factor at a point is the product of four. Along the axis: linear between five values. Across y: from 1 on
+the axis to a value at either side. Across x: from 1 in the bending plane to a value at both sides. Factors of
+single cells: valid at the cells' centres and interpolated between them. Struts take it at their nodes
+(`lattice.Lattice`). It is symmetric about x = 0, as the unit is.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def parsed(text: str) -> tuple[CellFactor, ...]:
     """The entries of a text such as "0 2 3: 0.8; * * 5: 1.2", in one order. Raises InputError.
 
     An entry is a cell's column, row and chamber, each a whole number or * for all, and its factor. Columns
-    count from 0 in the bending plane to either side alike, rows from 0 on the axis toward +y, chambers from 1
-    at the inlet.
+    count from 0 in the bending plane to both sides, rows from 0 on the axis toward +y, chambers from 1 at the
+    inlet.
     """
     found: dict[tuple[int | None, int | None, int | None], float] = {}
     for entry in text.split(";"):
@@ -104,7 +104,7 @@ def _refused(what: str, remedy: str) -> InputError:
 class Grading:
     """Section [grading]: factors on the struts' diameters at junctions and at mid-span, over the envelope.
 
-    They multiply. All are 1 by default: struts alike everywhere. `names` are the parameters that differ.
+    They multiply. All are 1 by default: uniform struts. `names` are the parameters that differ.
     """
 
     section: ClassVar[str] = "grading"
@@ -128,7 +128,7 @@ class Grading:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters that differ from their default; empty for struts alike everywhere."""
+        """Names of the parameters that differ from their default; empty for uniform struts."""
         return tuple(f.name for f in attrs.fields(Grading) if getattr(self, f.name) != f.default)
 
     @cached_property
@@ -141,8 +141,8 @@ class Grading:
 class Field:
     """The factors of a grading over an envelope; lengths in mm.
 
-    cell: edge of a cell; count: of chambers; half_x, y_minus, y_plus: cells beside that on the axis. Beyond
-    this envelope, as in a user-defined body, the outermost values go on.
+    cell: edge of a cell; count: of chambers; half_x, y_minus, y_plus: number of cells to each side of the one
+    on the axis. Beyond this envelope, as in a user-defined body, the outermost values apply.
     """
 
     grading: Grading
@@ -193,7 +193,7 @@ class Field:
         return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1) * self.cell
 
     def cells_of_factors(self, factors: ArrayLike) -> str:
-        """The text of `cells` that gives each cell its own factor, to two digits; (columns, rows, chambers).
+        """The text of `cells` with a factor for each cell, to two digits; (columns, rows, chambers).
 
         Out of bounds they are taken to the nearest bound.
 

@@ -143,7 +143,7 @@ class Gripper:
 class GripperGates:
     """Measurements on the gripper's solid, next to the values they must have; mm2, mm3 and counts.
 
-    See `build_gripper` for what is required of them.
+    See `build_gripper` for their required values.
     """
 
     components: int
@@ -164,7 +164,7 @@ class GripperGates:
 class GripperSolid:
     """Outward oriented surface of the whole gripper: vertices (n, 3) in mm, triangles (m, 3), its gates.
 
-    finger: the solid of one finger in its own frame.
+    finger: the solid of one finger in its frame.
     """
 
     vertices: Vertices
@@ -282,7 +282,7 @@ def _require(gates: GripperGates) -> None:
 def to_toml(gripper: Gripper, unit: str, comments: bool = True) -> str:
     """The gripper as TOML text, by default with unit, meaning and source of each value as comments.
 
-    unit: how the file names the fingers' unit, a preset's name or a TOML file beside it.
+    unit: the fingers' unit as named in the file, a preset or a TOML file in the same folder.
     """
     head = {
         "format": FORMAT,
@@ -326,7 +326,7 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Grippe
 
 
 def read_gripper(path: str | Path) -> Gripper:
-    """The gripper in a TOML file. Raises InputError with file, line and what to do."""
+    """The gripper in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
     try:
         text = file_text(path)

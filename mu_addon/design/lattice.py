@@ -67,8 +67,8 @@ class Graph:
 class Lattice(Graph):
     """A graph whose struts have thickness: radius in mm at their junctions and at mid-span.
 
-    factors (N,): of a grading at the nodes, or None for struts alike everywhere; growth: how much of the
-    radii in mm printing added, which no factor multiplies.
+    factors (N,): of a grading at the nodes, or None for uniform struts; growth: part of the radii in mm added
+    by printing, which no factor multiplies.
     """
 
     junction_radius: float
@@ -86,8 +86,8 @@ class Lattice(Graph):
     def radii(self, t: ArrayLike, rows: NDArray[Any] | slice = slice(None)) -> NDArray[np.float64]:
         """Radii (e, n) in mm of the struts `rows`, by default of all, at fractions t, (n,) or (e, n).
 
-        In a graded lattice the factor goes from that of a strut's first node to that of its second as
-        sin^2(pi t/2): level at both nodes, so that struts which meet there have one radius.
+        In a graded lattice the factor changes between a strut's nodes as sin^2(pi t/2), with zero slope at
+        both, so that struts that meet have one radius.
         """
         t = np.asarray(t, dtype=float)
         struts = self.struts[rows]
@@ -98,7 +98,7 @@ class Lattice(Graph):
 
     @property
     def node_factors(self) -> NDArray[np.float64]:
-        """Factors (N,) of the grading at the nodes; 1 where there is none."""
+        """Factors (N,) of the grading at the nodes; 1 without a grading."""
         return np.ones(len(self.grid)) if self.factors is None else self.factors
 
     @property
@@ -124,7 +124,7 @@ def lattice_of(d: Dimensions) -> Lattice:
 
 
 def with_struts(graph: Graph, d: Dimensions, is_graded: bool = True) -> Lattice:
-    """The graph with the struts of these dimensions, by their grading or, without `is_graded`, all alike."""
+    """The graph with the struts of these dimensions, graded or, without `is_graded`, uniform."""
     factors = d.grading.at(graph.nodes) if is_graded and d.grading is not None else None
     radii = d.junction_diameter / 2.0, d.midspan_diameter / 2.0
     return attrs.evolve(thickened(graph, *radii), factors=factors, growth=d.strut_growth / 2.0)

@@ -62,11 +62,11 @@ def _content(array: NDArray[Any]) -> tuple[Any, ...]:
 class LatticeKind:
     """One cell of a lattice, to be repeated along x, y and z.
 
-    nodes (n, 3): in a cell of side 1, within [0, 1]^3, those on faces and corners included; every coordinate
-    is a fraction with a denominator of at most 64. struts (e, 2): pairs of nodes, those that neighbours share
-    included. radius(t, junction_radius, midspan_radius): strut radius at t (array, 0 .. 1), symmetric about t
-    = 1/2. Raises InputError for nodes outside the cell or listed twice, struts that are missing, doubled,
-    invalid or cross, and a radius that is not symmetric and positive.
+    nodes (n, 3): in a cell of side 1, within [0, 1]^3, including those on faces and corners; every coordinate
+    is a fraction with a denominator of at most 64. struts (e, 2): pairs of nodes, including struts shared
+    with neighbours. radius(t, junction_radius, midspan_radius): strut radius at t (array, 0 .. 1), symmetric
+    about t = 1/2. Raises InputError for nodes outside the cell or listed twice, for missing, doubled, invalid
+    or crossing struts, and for a radius that is not symmetric and positive.
     """
 
     name: str
@@ -118,7 +118,7 @@ class LatticeKind:
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
-        """True for each node that lies in the interior of the cell, (n,), and belongs to no neighbour."""
+        """True for each node in the interior of the cell, (n,), not shared with a neighbour."""
         return np.asarray(((self.grid > 0) & (self.grid < self.divisions)).all(axis=1))
 
     @cached_property

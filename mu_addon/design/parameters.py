@@ -113,7 +113,7 @@ class Chambers:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters in use: `wall_factors` is none where chambers are alike."""
+        """Names of the parameters in use: `wall_factors` is empty if chambers are equal."""
         fields = (f.name for f in attrs.fields(Chambers))
         return tuple(name for name in fields if name != "wall_factors" or self.wall_factors)
 
@@ -435,7 +435,8 @@ class Unit:
         rules.check_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
 
     def evolve(self, **values: Any) -> Unit:
-        """The unit with other values of some parameters, by their names in its file; a rule sees all at once.
+        """The unit with other values of some parameters, by their names in its file; rules are checked after
+        all changes.
 
         Whole sections can be given, too. Raises InputError for a name that is no parameter's and for a value
         that does not fit.
@@ -510,7 +511,7 @@ class Unit:
 
     @property
     def grading_field(self) -> Field:
-        """The grading over the unit's own envelope."""
+        """The grading over the unit's envelope."""
         t = self.lattice
         u = self.scale * self.chambers.cell_mm
         return Field(self.grading, u, self.chambers.count, t.cells_x // 2, t.cells_y_minus, t.cells_y_plus)
@@ -551,8 +552,8 @@ def assumed(unit: Unit) -> list[Assumption]:
 def stated(unit: Unit) -> Iterator[tuple[str, Description, Any]]:
     """Section, description and value of every parameter in use, in the order of the unit's file.
 
-    Those that a section's `names` leaves out are not: of a wall those that its law does not use, of a grading
-    those that change nothing, of a material a default that came later.
+    Parameters that a section's `names` leaves out are not written: of a wall those that its law does not use,
+    of a grading those without effect, of a material a default that was added later.
     """
     for section in SECTIONS:
         values = getattr(unit, _attribute(section))
@@ -600,7 +601,7 @@ def from_toml(text: str, origin: str = "") -> Unit:
 
 
 def read_unit(path: str | Path) -> Unit:
-    """The unit in a TOML file. Raises InputError with file, line and what to do."""
+    """The unit in a TOML file. Raises InputError with file, line and remedy."""
     path = Path(path)
     try:
         text = file_text(path)

@@ -1,7 +1,7 @@
 """A unit as printed: nominal dimensions with every surface moved outward by the printer's offsets.
 
-Unchanged are pitch, envelope, end planes and anchors, which lattice cells and build plate hold, and the
-virtual inclusion, which is a choice of the model. A surface facing n moves by |D n| with D = diag(offset_xy,
+Unchanged are pitch, envelope, end planes and anchors, which lattice cells and build plate fix, and the
+virtual inclusion, which is part of the model. A surface facing n moves by |D n| with D = diag(offset_xy,
 offset_xy, offset_z), see `shapes.offset_along`.
 """
 
@@ -22,10 +22,10 @@ def as_printed(d: Dimensions, offset_xy: float, offset_z: float) -> Dimensions:
     """Dimensions of the part as printed: every surface moved outward by the print offsets in mm.
 
     offset_xy in the plane, offset_z along z; negative ones move inward. Struts and walls grow by twice the
-    offset, or by its mean round the struts and over the profile where the two differ. The outer profile stays
-    one of parabolas, with R + o, r + o and the joint moved along z so that it, too, lies as far outside:
-    equal offsets o then move it by o within 0.1 o everywhere. Caps grow by 2 offset_z inward, so that their
-    ends keep their planes; wells keep their depth.
+    offset, or by its mean round the struts and over the profile where the two differ. The outer profile
+    remains parabolic, with R + o, r + o and the joint moved along z so that it is offset equally: equal
+    offsets o then move the profile by o within 0.1 o everywhere. Caps grow by 2 offset_z inward, so that
+    their ends keep their planes; wells keep their depth.
     """
     if offset_xy == 0.0 and offset_z == 0.0:
         return d

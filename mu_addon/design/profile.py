@@ -1,9 +1,9 @@
 """The actuator's profile: parabola arcs for bladders and necks, and the cavity inside the wall.
 
-One period of length U = 2 (a + b): a bladder arc of half-length a about its apex (radius R), a neck arc
-of half-length b about its minimum (radius r); equal slopes where they meet give the joint radius
-(R b + r a)/(a + b). The cavity is the offset of that curve by the wall along its normal, cut flat by the
-two end caps; the wall may differ from chamber to chamber (`wall_factors`).
+One period of length U = 2 (a + b): a bladder arc of half-length a about its apex (radius R), a neck arc of
+half-length b about its minimum (radius r). Equal slopes at their joint give its radius (R b + r a)/(a + b).
+The cavity is the offset of that curve by the wall along its normal, cut flat by the two end caps; the wall
+may differ from chamber to chamber (`wall_factors`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ OFFSET_TOLERANCE = 5e-4
 def outer_radius(d: Dimensions, z: ArrayLike) -> Array:
     """Radius in mm (any shape) of the actuator's outer profile at heights z in mm (any shape).
 
-    Parabola arcs: R at a bladder's apex, r at a neck, equal slopes where they meet.
+    Parabola arcs: R at a bladder's apex, r at a neck, equal slopes at their joint.
 
     >>> from mu_addon.design import load_preset
     >>> outer_radius(load_preset("mu-1.0x").dimensions, [0.0, 6.25]).tolist()
@@ -61,7 +61,7 @@ def under_profile(d: Dimensions, s: Array, share: ArrayLike = 1.0) -> Array:
 
 
 def foot(d: Dimensions, z: ArrayLike) -> Array:
-    """Heights (any shape) in mm on the outer profile whose normals meet the cavity at heights z in mm.
+    """Heights (any shape) in mm on the outer profile whose normals reach the cavity at heights z in mm.
 
     By bisection: the cavity rises along the profile where the wall fits.
     """
@@ -88,8 +88,8 @@ def inner_arcs(d: Dimensions) -> list[Array]:
     """Inner profile as cubic Bezier arcs, one for each outer arc: poles (4, 2), radius and z in mm.
 
     Each approximates the outer arc's offset by the wall: ends and end tangents are those of the exact offset,
-    and it passes through the offset of the middle. Arcs are halved, inner and outer alike, until they keep
-    within OFFSET_TOLERANCE of the exact offset.
+    and it passes through the offset of the middle. Arcs are halved, inner and outer, until they are within
+    OFFSET_TOLERANCE of the exact offset.
     """
     return _offset_arcs(d, _splits(d))
 

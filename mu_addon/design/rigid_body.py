@@ -1,4 +1,4 @@
-"""Rigid bodies beside a unit, fixed in its frame, and the OBJ file that holds them."""
+"""Rigid bodies next to a unit, fixed in its frame, and their OBJ file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RigidBody:
 
 
 def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None = None) -> None:
-    """Raise InputError for a body that has `flaws` or overlaps the unit at rest; the message says where.
+    """Raise InputError, with the place, for a body that has `flaws` or overlaps the unit at rest.
 
     own: the body that replaces the lattice's box as envelope.
     """
@@ -43,7 +43,7 @@ def require_beside(bodies: Sequence[RigidBody], d: Dimensions, own: Body | None 
 
 
 def mirrored(bodies: Sequence[RigidBody]) -> bool:
-    """True if every body is its own mirror image across x = 0 and extends to both sides of that plane.
+    """True if every body is symmetric about x = 0 and extends to both sides of that plane.
 
     The bodies must have no `flaws`. Raises InputError as `half` does.
     """

@@ -47,7 +47,7 @@ def struts_beside_section(lattice: Lattice) -> Array:
 
 
 def _on_strut(unit: Unit, y: Array, z: Array) -> Array:
-    """Mask of the points on a strut beside the section, seen along x."""
+    """Mask of the points on a strut next to the section, seen along x."""
     lattice = lattice_of(unit.dimensions)
     rows = struts_beside_section(lattice)
     at = np.stack([y, z], axis=-1)

@@ -42,7 +42,7 @@ def cylinder(radius: float, low: float, high: float, n: int) -> Any:
 def revolved(polygon: Array, n: int) -> Any:
     """Body of n sides from a counter-clockwise half section (m, 2), radius and z in mm, turned around z.
 
-    A Manifold; its sections have the area of the circles that they stand for.
+    A Manifold; its sections have the area of the circles that they approximate.
     """
     from manifold3d import CrossSection
 
@@ -97,8 +97,7 @@ def ring(axis: Array, n: int) -> Array:
 def spindle(axis: Array, radii: Array, n: int, offset: ArrayLike | None = None) -> Any:
     """Manifold of n sides along `axis` (3,) in mm from the origin, with evenly spaced radii (m,) in mm.
 
-    offset (3,): outward move of its sides along x, y and z in mm, of which the part square to the axis is
-    taken.
+    offset (3,): outward move of its sides along x, y and z in mm; the part perpendicular to the axis is used.
     """
     from manifold3d import Manifold, Mesh64
 

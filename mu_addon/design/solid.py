@@ -42,8 +42,8 @@ QUALITY = {"interactive": Facets(64, 6, 12, 4), "export": Facets(192, 16, 32, 10
 class Solid:
     """A printable surface: vertices (n, 3) in mm, triangles (m, 3) facing outward, and the gates it passed.
 
-    window: that of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off:
-    length in mm, in the plane and along z, by which every surface was drawn inward to compensate the print
+    window: of its waveguide, None without one and for a path of nodes; bar: its waveguide. taken_off:
+    distance in mm, in the plane and along z, by which every surface was moved inward to compensate the print
     offset.
     """
 
@@ -57,7 +57,7 @@ class Solid:
 
     @property
     def volume_mm3(self) -> float:
-        """Volume in mm3 of what is printed, without the cavity."""
+        """Volume in mm3 of the printed material."""
         return self.gates.volume_mm3
 
     def mass_g(self, density_g_per_ml: float) -> float:
@@ -76,7 +76,7 @@ def build_solid(
 
     path: a `Window` of anchors, or lattice nodes (n, 3) in mm. quality: "interactive" or "export", the number
     of facets. body: a closed surface that the lattice is cut to in place of its box; loose ends of struts are
-    left out. take_off: print offset in mm, in the plane and along z: the drawing is made smaller by it
+    left out. take_off: print offset in mm, in the plane and along z. The drawing is made smaller by it
     (Minkowski), so that the print has the nominal size.
 
     Takes some seconds. Raises GateError where a check of the solid fails (genus, components, watertightness),
@@ -144,7 +144,7 @@ def chamber(unit: Unit) -> tuple[Vertices, Triangles]:
 
 
 def _drawn_offset(d: Dimensions, take_off: tuple[float, float]) -> NDArray[np.float64] | None:
-    """Outward move (3,) of the drawing's surfaces that undoes a printer's; None for none. InputError."""
+    """Outward move (3,) of the drawing's surfaces that undoes a printer's; None for no offset. InputError."""
     xy, z = (float(value) for value in take_off)
     if not xy and not z:
         return None
@@ -168,9 +168,9 @@ def with_waveguide(
 ) -> Any:
     """The lattice united with its waveguide, before wells and pockets are cut, as a Manifold in mm.
 
-    Struts that the bar replaces, and nodes where no others meet, are left out of `bare`, the lattice's solid;
-    those that meet it are thickened (`strut_radii`). offset (3,): outward move of all surfaces along x, y and
-    z in mm.
+    Struts that the bar replaces, and nodes without other struts, are left out of `bare`, the lattice's solid;
+    struts that touch the bar are thickened (`strut_radii`). offset (3,): outward move of all surfaces along
+    x, y and z in mm.
     """
     from manifold3d import Manifold, OpType
 
@@ -314,7 +314,7 @@ def _graded_solid(
 
 
 def _ends(ends: NDArray[np.int64]) -> frozenset[tuple[int, ...]]:
-    """A strut (2, 3) of the grid, whichever end comes first."""
+    """A strut (2, 3) of the grid, with its ends in either order."""
     return frozenset(tuple(end) for end in ends.tolist())
 
 

@@ -1,13 +1,13 @@
-"""The design as a chain of steps, of which each is evaluated again only where its inputs have changed.
+"""The design as a chain of steps; each is evaluated again only if its inputs have changed.
 
     profile -> chambers -> membranes
        \\-> cells -> trim -> grading -> struts
               \\-> anchors -> path -> wells
                                         \\-> solid, of all of them
 
-A step owns parameters of the unit and may read those of others. Its value is kept under a key of all its
-inputs, so a slider, an undo or another unit of the same shape costs only what is new. A muted step passes on
-what it would have changed.
+A step has parameters of the unit and may read those of other steps. Its value is cached under a key of all
+its inputs, so that a slider, an undo or another unit of the same shape recomputes only changed steps. A muted
+step passes its input on unchanged.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FINE = np.linspace(0.0, 1.0, 33)
 CLEARANCE = 0.018
 """Distance, in cells, that `trim` keeps between a strut's axis and the actuator: none shows inside."""
 KEPT = 12
-"""Number of cached values of a step: enough for an undo, a slider that goes back, and a few units."""
+"""Number of cached values of a step: enough for an undo, a slider moved back, and a few units."""
 
 
 @attrs.frozen
@@ -73,7 +73,7 @@ class StepInputs:
 class Section:
     """Half sections, radius and z in mm: outer profile (n, 2), inlet (4, 2), and cavity (m, 2) or None.
 
-    The inlet goes from the inner end of its bore out around the boss.
+    The inlet is drawn from the inner end of its bore out around the boss.
     """
 
     outer: Array
@@ -114,11 +114,11 @@ class Path:
 
 @attrs.frozen
 class Step:
-    """One step: its inputs, its own parameters, and its value when muted.
+    """One step: its inputs, its parameters, and its value when muted.
 
     gives: kind of its value: profile, surface, lattice, points, path or solid; after: steps before it, whose
     values `make` gets in this order; own and reads: parameters of the unit as `section.name`; chosen: fields
-    of StepInputs it also depends on; muting: effect of muting, in words, or "" if it cannot be muted; mute:
+    of StepInputs it also depends on; muting: describes the effect of muting, "" if it cannot be muted; mute:
     its value then, from the same arguments as `make`.
     """
 
@@ -149,14 +149,14 @@ class Stack:
     def value(self, name: str, given: StepInputs) -> Any:
         """The value of a step, evaluated with the steps before it where it is not cached.
 
-        Raises InputError for an unknown step, and what the steps raise.
+        Raises InputError for an unknown step, and the errors of the steps.
         """
         if name not in STEPS:
             raise _unknown(name)
         return self._value(name, given, keys(given))
 
     def keep(self, name: str, given: StepInputs, value: Any) -> None:
-        """Keep a step's value that was made elsewhere, in another process say."""
+        """Cache a step's value that was computed elsewhere, for example in another process."""
         self._values[name][keys(given)[name]] = value
 
     def has(self, name: str, given: StepInputs) -> bool:
@@ -164,9 +164,9 @@ class Stack:
         return keys(given)[name] in self._values[name]
 
     def again(self, name: str, given: StepInputs) -> Any:
-        """The value of a step, evaluated anew even if it is cached; earlier steps only where they are not.
+        """The value of a step, evaluated again even if cached; earlier steps only if they are not cached.
 
-        Raises InputError for an unknown step, and what the steps raise.
+        Raises InputError for an unknown step, and the errors of the steps.
         """
         if name not in STEPS:
             raise _unknown(name)
@@ -368,7 +368,7 @@ _ROW = ("waveguide.row",)
 
 
 def _rest(section: type[Chambers | Envelope | Waveguide]) -> tuple[str, ...]:
-    """The section's parameters that no other step owns, so that a new one has a step automatically."""
+    """The section's parameters without another step, so that a new one has a step automatically."""
     owned = {*_PROFILE, *_CHAMBERS, *_STRUTS, *_WELLS, *_ROW}
     return tuple(p for p in _all_of(section) if p not in owned)
 
@@ -394,7 +394,7 @@ STEPS: dict[str, Step] = {
             _membranes,
             ("profile", "chambers"),
             _rest(Chambers),
-            muting="the lattice stands without an actuator",
+            muting="a lattice without an actuator",
         ),
         Step(
             "cells",
@@ -405,7 +405,7 @@ STEPS: dict[str, Step] = {
             _rest(Envelope),
             _PITCH,
             ("body",),
-            muting="the actuator stands without a lattice",
+            muting="an actuator without a lattice",
         ),
         Step(
             "trim",

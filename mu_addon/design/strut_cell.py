@@ -55,7 +55,7 @@ class Facets:
 
 @attrs.frozen
 class StrutCell:
-    """A lattice's cell as it is printed, at scale: edge, nominal strut radii and print offsets in mm.
+    """A lattice's cell as printed, at scale: edge, nominal strut radii and print offsets in mm.
 
     offset_xy_mm, offset_z_mm: print offset in the plane and along the build axis z; skin_depth_mm,
     skin_factor: depth of the more cured skin, and its modulus over the core's. Raises InputError for a kind
@@ -173,7 +173,7 @@ def specimen_solid(cell: StrutCell, n: int, facets: Facets | None = None) -> tup
     """Closed surface of n x n x n cells in [0, n size]^3 mm: vertices (v, 3) in mm and triangles (t, 3).
 
     Raises InputError for n below 1, GateError for a surface that is open, in pieces, or of another genus than
-    E - V + 1 of the lattice's graph: struts then close the openings or touch where they share no node.
+    E - V + 1 of the lattice's graph, as when struts close openings or touch without a shared node.
     """
     if n < 1:
         raise InputError(f"{n} cells a side are too few", "specimen", "give 1 or more")
@@ -226,8 +226,8 @@ def depth_below_surface(cell: StrutCell, points: ArrayLike) -> Array:
 def _section_depth(cell: StrutCell, axis: Array, away: Array) -> Array:
     """Distance (n,) to the sides of a strut's section from places (n, 3) in it, less the strut's radius.
 
-    The least over all normals of (what the offset adds there - how far the place lies that way), which for a
-    convex section is the distance to its boundary.
+    The least, over all normals, of the offset minus the position along the normal: for a convex section the
+    distance to its boundary.
     """
     distance = np.linalg.norm(away, axis=1, keepdims=True)
     toward = np.divide(away, distance, out=np.zeros_like(away), where=distance > 0.0)

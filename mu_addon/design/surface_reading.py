@@ -53,8 +53,8 @@ _DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, Arithme
 def read_surface(content: bytes, name: str, most_triangles: int | None = None) -> tuple[Vertices, Triangles]:
     """Points (n, 3) and triangles (m, 3) of a file's content; polygons are triangulated in their plane.
 
-    name: of the file, whose suffix tells the type where the content does not. most_triangles: refuse an STL
-    file with more before it is parsed. Raises InputError with the line or number at fault.
+    name: of the file; its suffix gives the type if the content does not. most_triangles: an STL file with
+    more is refused before parsing. Raises InputError with the line or number at fault.
     """
     require_mesh(content[:64], name)
     kind = _kind(content) or PurePath(name).suffix.lower()
@@ -78,7 +78,7 @@ def require_mesh(content: bytes, name: str) -> None:
 
 
 def _kind(content: bytes) -> str:
-    """Suffix of the type that content is, "" where it does not tell."""
+    """Suffix of the content's type, "" if it is unknown."""
     if _binary_triangles(content) is not None or _SOLID.match(content):
         return ".stl"
     if content[:3] == b"ply":
@@ -87,7 +87,7 @@ def _kind(content: bytes) -> str:
 
 
 def _binary_triangles(content: bytes) -> int | None:
-    """Number of triangles of a binary STL, which may end in a few other bytes; None if it is none."""
+    """Number of triangles of a binary STL, which may end in a few other bytes; None for any other content."""
     count = int.from_bytes(content[80:84], "little")
     return count if len(content) >= 84 and 0 <= len(content) - 84 - 50 * count < 50 else None
 

@@ -1,7 +1,7 @@
 """Walls that differ from chamber to chamber: factors on the wall, and the thickness between two of them.
 
-A chamber's factor holds at its apex. Between two apices the factor goes from one to the other by a cubic with
-no slope at either end, so that the cavity has no kink; below the first and above the last it is theirs.
+A chamber's factor holds at its apex. Between two apices the factor follows a cubic with zero slope at both
+ends, so that the cavity has no kink. Below the first and above the last apex it is constant.
 """
 
 from __future__ import annotations

@@ -54,8 +54,8 @@ class Wall:
     """Section [wall]: the membrane's law beyond the small-strain moduli of [material].
 
     Those moduli are the long-term ones of a wall that has not been loaded. c2_over_c1 and c3_over_c1 shape
-    Yeoh's law, on which prony and ogden-roxburgh build; `names` are the parameters in use. The lattice keeps
-    its own law. Raises InputError for Prony shares that add up to more than LARGEST_SHARE.
+    Yeoh's law, on which prony and ogden-roxburgh build; `names` are the parameters in use. The lattice's law
+    is unchanged. Raises InputError for Prony shares that add up to more than LARGEST_SHARE.
     """
 
     section: ClassVar[str] = "wall"
@@ -171,7 +171,7 @@ class Wall:
         return self.law in ("prony", "ogden-roxburgh") or self.friction_share > 0
 
     def require_without_memory(self, what: str) -> None:
-        """Raise InputError where the stress depends on history; what: the job that does not support it."""
+        """Raise InputError if the stress depends on history; what: the job that does not support it."""
         if self.has_memory:
             raise InputError(
                 f"{what} does not support a wall with memory",
@@ -181,7 +181,7 @@ class Wall:
 
 
 def offered(law: str, friction_share: float) -> tuple[str, ...]:
-    """Names of the parameters to show beside a law, in the order of `Wall`.
+    """Names of the parameters to show with a law, in the order of `Wall`.
 
     friction_share: its value, 0 .. 10, without unit; 0 leaves out the yield stress.
     """

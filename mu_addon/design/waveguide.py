@@ -1,9 +1,10 @@
 """The optical waveguide: a square bar along lattice nodes with wells on its outer face and seats at its ends.
 
-Its path is a window of anchors or any chain of lattice nodes. A strut that it follows becomes the bar; every
-strut that meets it is nowhere thinner than the bar until its middle. Wells keep a constant pitch along the
-path, however it bends, and those that a strut or the membrane would cover are left out. At either end a
-light source or detector sits flat on the bar's end face, in a pocket that is open along its axis.
+Its path is a window of anchors or any chain of lattice nodes. It replaces the struts along its path. Every
+other strut that touches it is at least as thick as the bar up to the strut's middle. Wells keep a constant
+pitch along the path, however it bends, and those that a strut or the membrane would cover are left out. At
+either end a light source or detector sits flat on the bar's end face, in a pocket that is open along its
+axis.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ STRUT_GAP = 0.1
 """Least distance in mm between a well or a seat's pocket and a strut's surface."""
 
 ROOM = 1.0
-"""Length in mm, beyond the part's own, that is kept clear before a seat to insert the part."""
+"""Length in mm, beyond the part's, that is kept clear in front of a seat to insert the part."""
 
 _STEP = 0.15  # of the points by which boxes are separated from struts
 _LONGER = 0.25  # steps in mm by which an end is made longer, until its seat has room
@@ -68,9 +69,9 @@ class Bar:
 
     points (n, 3): its axis, both ends included; normals (n - 1, 3): outward normal of each leg's outer face;
     half: half its section; wells: boxes that are cut out of it; seats: one an end, or none; met (E, 2): mask
-    of the lattice's struts that meet it with their first and second end; replaced (E,): mask of struts that
-    the bar replaces; loops: number of steps of the path without a strut, each a loop more in the lattice's
-    graph; path_mm: length between its end nodes.
+    of the lattice's struts that touch it with their first and second end; replaced (E,): mask of struts that
+    the bar replaces; loops: number of steps of the path without a strut, each an additional loop in the
+    lattice's graph; path_mm: length between its end nodes.
     """
 
     points: Array
@@ -109,8 +110,8 @@ class Bar:
     def rings(self, offset: Array | None = None) -> Array:
         """Corners (n, 4, 3) in mm of the section at every point, around it, in the plane that halves a bend.
 
-        offset (3,): outward move of faces along x, y and z in mm; where two legs then have unequal sections,
-        they meet in the mean of their corners.
+        offset (3,): outward move of faces along x, y and z in mm; two legs with unequal sections meet in the
+        mean of their corners.
         """
         way, planes = self.directions, self.planes
         moves = np.zeros((len(way), 3)) if offset is None else _leg_moves(way, self.normals, offset)
@@ -160,9 +161,9 @@ class Bar:
 def waveguide(unit: Unit, path: Window | ArrayLike, within: Dimensions | None = None) -> Bar:
     """The waveguide along a window of anchors, or along a chain of lattice nodes (n, 3) in mm.
 
-    within: dimensions of the lattice it stands in, where that is not the unit's own. Raises InputError for a
-    path off the lattice's nodes, through the actuator, bent by more than SHARPEST_DEG, or without room for a
-    seat at an end.
+    within: dimensions of the lattice around it, if that is not the unit's. Raises InputError for a path off
+    the lattice's nodes, through the actuator, bent by more than SHARPEST_DEG, or without room for a seat at
+    an end.
     """
     d = unit.dimensions if within is None else within
     lattice = lattice_of(d)
@@ -236,7 +237,7 @@ def strut_radii(
 ) -> Array:
     """Radii (e, n) in mm of the struts `rows`, by default of all, at fractions t (n,), thickened at a bar.
 
-    met (e, 2): mask of the first and second ends that meet it. From that end to mid-span a strut's radius is
+    met (e, 2): mask of the first and second ends that touch it. From that end to mid-span a strut's radius is
     at least `least` mm; from there to the other end the added thickness fades as sin^2(pi t).
     """
     t = np.asarray(t, float)
@@ -248,7 +249,7 @@ def strut_radii(
 
 
 class _Struts:
-    """Struts beside a bar: their positions, and distances of points from them."""
+    """Struts near a bar: their positions, and distances of points from them."""
 
     def __init__(
         self, lattice: Lattice, met: NDArray[np.bool_], replaced: NDArray[np.bool_], half: float
@@ -275,7 +276,7 @@ class _Struts:
 
 
 def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
-    """Numbers of the lattice's nodes at points (n, 3); InputError where one is none."""
+    """Numbers of the lattice's nodes at points (n, 3). Raises InputError for a point that is not a node."""
     found = []
     for point in nodes:
         gap = np.linalg.norm(lattice.nodes - point, axis=1)
@@ -297,7 +298,7 @@ def _numbers(lattice: Lattice, nodes: Array, is_window: bool) -> list[int]:
 
 
 def _passed(lattice: Lattice, numbers: list[int]) -> list[int]:
-    """Numbers of all nodes that a chain of nodes passes through: of some kinds also between its own."""
+    """Numbers of all nodes that a chain of nodes passes, for some lattice kinds also between its nodes."""
     nodes, found = lattice.nodes, numbers[:1]
     for first, last in pairwise(numbers):
         way = nodes[last] - nodes[first]
@@ -349,8 +350,8 @@ def _bends(points: Array) -> Array:
 def _normals(points: Array) -> Array:
     """Outward normals (n - 1, 3) of each leg's outer face, handed on from leg to leg without a twist.
 
-    Where the legs let it, they look away from the actuator's axis: of all turns of the first normal the one
-    is taken whose normals, over the length, have the largest share in that direction.
+    The first normal is rotated so that the normals point away from the actuator's axis as much as possible,
+    averaged over the length.
     """
     way = _directions(points)
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -375,7 +376,7 @@ def _normals(points: Array) -> Array:
 
 
 def _leg_moves(way: Array, normals: Array, offset: Array) -> Array:
-    """Moves (n, 3) of the faces across, outer and beside of each leg."""
+    """Moves (n, 3) of the faces across, outer and lateral of each leg."""
     return np.stack([face_moves(v, offset) for v in (way, normals, np.cross(way, normals))], axis=1)
 
 
@@ -427,8 +428,8 @@ def _notches(face: Array, direction: Array) -> Array:
 def _seat(d: Dimensions, face: Array, outward: Array, normal: Array, length: float) -> Seat:
     """The seat at an end face (3,), its pocket opening along `outward`, its notch along `normal`.
 
-    Its foot is at the node, `length` mm before the face: a shelf further on would leave narrow slots between
-    itself, the bar and the struts' roots.
+    Its foot is at the node, `length` mm before the face: a shelf nearer the face would leave narrow slots
+    next to the bar and the struts' roots.
     """
     axes = np.stack([outward, normal, np.cross(outward, normal)])
     c, w, h = d.seat_clearance, d.seat_wall, d.waveguide_section / 2.0

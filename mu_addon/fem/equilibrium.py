@@ -154,8 +154,8 @@ class Equilibrium:
     def _with_friction(self, state: State, found: Callable[[State, bool], State]) -> State:
         """The equilibrium from a start, with its own bound of friction.
 
-        found: the equilibrium from a start with the bound held, called with False for the first. Raises
-        ConvergenceError.
+        found: the equilibrium from a start with the bound held; its second argument is False at the first
+        call. Raises ConvergenceError.
         """
         if self.model.self_contact is not None:
             self.model.self_contact.forget_candidates()

@@ -175,8 +175,8 @@ def _require_known(d: Dimensions, factors: Array) -> None:
         if shares.min() < low or shares.max() > high:
             raise InputError(
                 f"struts of {d.cell * shares.min():.3g} to {d.cell * shares.max():.3g} mm at their {part} "
-                f"are outside the {low * d.cell:.3g} to {high * d.cell:.3g} mm for which the homogenised stiffness "
-                "of graded struts is known for",
+                f"are outside the {low * d.cell:.3g} to {high * d.cell:.3g} mm for which "
+                "the homogenised stiffness of graded struts is known",
                 "[grading]",
                 'choose factors nearer to 1, or fidelity "resolved"',
             )

@@ -17,8 +17,8 @@ def build_findings(
 ) -> tuple[list[Finding], dict[str, float]]:
     """Findings on islands, cups, overhangs and bridges of a build, and the volumes of its cups in ml by name.
 
-    built: the part's cells along the build direction, one layer high; chambers: to tell islands
-    within them from those outside. The limits are the printer's.
+    built: the part's cells along the build direction, one layer high; chambers: to distinguish islands inside
+    them from those outside. The limits are the printer's.
     """
     begun = layers.islands(built, layers.regions(built, free=False))
     closed = layers.cups(built, layers.regions(built, free=True))

@@ -1,7 +1,7 @@
 """Runs of cells along the lines of a grid, and the connected parts they form.
 
-A grid whose cells are mostly alike along its lines has some hundred times fewer runs than cells: regions and
-chambers are found on the runs, in less time and memory than by a label for each cell.
+A grid whose cells are mostly equal along its lines has some hundred times fewer runs than cells. Finding
+regions and chambers on the runs takes less time and memory than a label for each cell.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _AT_ONCE = 16_000_000
 
 @attrs.frozen(eq=False)
 class Runs:
-    """Runs of cells along the last axis of a grid, in order, no two of which touch.
+    """Runs of cells along the last axis of a grid, in order, separated by gaps.
 
     line (r,): number of each run's line, counted over the other axes; start, end (r,): its first cell in the
     line, and the one after its last; cells: number of cells of a line.
@@ -56,7 +56,7 @@ class Runs:
         return Runs(line[order], start[order], end[order], self.cells)
 
     def of(self, line: Index, cell: Index) -> Index:
-        """Numbers (k,) of the runs that hold cells (k,) of lines (k,); -1 where there is none."""
+        """Numbers (k,) of the runs that contain cells (k,) of lines (k,); -1 without one."""
         width = self.cells + 2
         at = np.searchsorted(self.line * width + self.start, line * width + cell, side="right") - 1
         at = np.asarray(at, np.int64)
@@ -99,8 +99,8 @@ def runs_of(marked: NDArray[np.bool_]) -> Runs:
 def meeting(one: Runs, other: Runs, shift: int, reach: int = 0) -> tuple[Index, Index]:
     """Pairs of runs, numbers (p,) in `one` and (p,) in `other`, with cells over each other.
 
-    shift: offset of the other's line numbers. reach: include runs whose ends miss each other by so many
-    cells, 1 for cells that touch by a corner.
+    shift: offset of the other's line numbers. reach: include runs with ends this many cells apart, 1 for
+    cells that touch at a corner.
     """
     width = one.cells + 2
     line = (one.line + shift) * width

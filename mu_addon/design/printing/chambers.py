@@ -15,7 +15,7 @@ Index = NDArray[np.int64]
 DEEP = 6.0
 """Distances to the surface are resolved up to so many mm."""
 NARROWING = 0.55
-"""A pocket is a chamber if its way out is narrower than this share of its own greatest radius."""
+"""A pocket is a chamber if its way out is narrower than this share of its greatest radius."""
 MOST_OPENINGS = 12
 RUNGS = (3.0, 2.2, 1.6, 1.2, 0.9, 0.65, 0.45, 0.3)
 """Distances in mm from the surface at which pockets may separate from the outside, at most DEEP * NARROWING.
@@ -55,8 +55,8 @@ class Chamber:
 class DistanceField:
     """Distances of free cells' centres from the surface, DEEP mm at most.
 
-    squared: squares of the distances to the nearest solid cell's centre, in cells; 0 in the solid. What it
-    holds less half a cell is within half a cell of the distance to the surface.
+    squared: squares of the distances to the nearest solid cell's centre, in cells; 0 in the solid. Its value
+    minus half a cell is within half a cell of the distance to the surface.
     """
 
     grid: VoxelRows
@@ -150,8 +150,8 @@ def chambers(space: DistanceField, smallest_radius: float = 1.0) -> Chambers:
     """Pockets that narrow toward the outside, the largest first, with every way out that the grid resolves.
 
     smallest_radius: in mm, that the largest ball in a pocket must have at least. Ways out are found down to a
-    radius of about 0.87 of a cell; narrower ones cannot be told from a wall of cells. The squares of `space`
-    are used up.
+    radius of about 0.87 of a cell; narrower ones cannot be distinguished from a wall of cells. The squares of
+    `space` are used up.
     """
     grid = space.grid
     step = float(grid.step[0])
@@ -194,7 +194,7 @@ def chambers(space: DistanceField, smallest_radius: float = 1.0) -> Chambers:
 
 
 def _rungs(smallest_radius: float, step: float) -> list[float]:
-    """RUNGS that separate pockets of a radius from the outside on a grid, the greatest first; 0 is none.
+    """RUNGS that separate pockets of a radius from the outside on a grid, the greatest first; 0 for none.
 
     A pocket that is separate at a small distance from the surface is so at all greater ones. So of the rungs
     at which any pocket is deep enough only the greatest is needed.
@@ -227,8 +227,8 @@ def _deepest(squared: NDArray[np.uint16], first: Index, last: Index) -> tuple[in
 def _way_out(
     space: DistanceField, wide: Parts, outside: int, seed: Index, t: float, around: Box
 ) -> tuple[Index, float, Box]:
-    """Cells (n, 3) of the widest way from the seed to the outside where it is narrowest, none if there is
-    none; its radius there; and the part of the grid in which that is sure.
+    """The widest way from the seed to the outside, at its narrowest: cells (n, 3), empty if there is no way;
+    its radius; and the part of the grid in which that is certain.
 
     wide: parts farther than t mm from the surface as they were, with `outside` and the seed in two of them.
     Only `around` is looked at. There a way that leaves it counts as a way out: as long as that is the better
@@ -324,8 +324,7 @@ def _narrowest(
 
 
 def _passage(free: NDArray[np.bool_], wide: Parts, inner: int, outer: Index) -> Index:
-    """Cells (n, 3) of a shortest way from the parts `outer` to the part `inner` through what is free, with
-    its ends in them."""
+    """Cells (n, 3) of a shortest way from the parts `outer` to the part `inner` through free cells."""
     sides = np.concatenate([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
     size = np.array(free.shape)
 
@@ -357,7 +356,7 @@ def _passage(free: NDArray[np.bool_], wide: Parts, inner: int, outer: Index) -> 
 
 
 def _surface(parts: Parts, number: int) -> Index:
-    """Cells (n, 3) of a part by whose side there is a cell that is not of it."""
+    """Cells (n, 3) of a part that have a neighbour outside it."""
     first, last = parts.ends(parts.part == number)
     box = first.min(axis=0), last.max(axis=0) + 1
     body = np.zeros(box[1] - box[0] + 2, bool)

@@ -36,11 +36,11 @@ VOLUME_TOLERANCE = 0.02
 def against_nominal(
     vertices: Vertices, triangles: Triangles, nominal: tuple[Vertices, Triangles]
 ) -> list[Finding]:
-    """Findings on what a part lacks, or has more, than the nominal solid; both closed surfaces in mm.
+    """Findings on missing or additional parts relative to the nominal solid; both closed surfaces in mm.
 
-    Every strut of a lattice closes a tunnel: a part without one has a genus that is less by one, however it
-    is divided into facets. The genus must be the same, else `error`; a volume that differs by more than
-    VOLUME_TOLERANCE is a `warning`.
+    Every strut of a lattice closes a tunnel, so that a part without it has a genus smaller by one, for any
+    facets. The genus must be the same, else `error`; a volume that differs by more than VOLUME_TOLERANCE is a
+    `warning`.
     """
     found, wanted = genus(vertices, triangles), genus(*nominal)
     tunnels = Finding(
@@ -71,7 +71,7 @@ def against_nominal(
 
 
 def _difference(more: int) -> str:
-    """Meaning of a genus that differs, in words."""
+    """Meaning of a different genus, as text."""
     if not more:
         return ""
     if more < 0:
@@ -133,11 +133,11 @@ def check(
     unit, window: of the design, whose inlet, size, struts and wells are then checked too; direction: away
     from the platform. A surface that is not closed, inside out or of the wrong size is examined no further.
     `stages` may leave some out: layers need chambers, directions need chambers and thickness. stage: context
-    that is entered, with its name, for each stage. nominal: surface of the unit's own solid, which a surface
-    from elsewhere is compared with. verdict: called with the result before build directions are compared,
-    which adds no finding; share: called with the share of them that is done. in_body: a user-defined body has
-    the place of the lattice's box, so that of the drawing's size the height alone is known. Raises InputError
-    for a window that does not fit the unit.
+    that is entered, with its name, for each stage. nominal: surface of the unit's solid, for comparison with
+    a surface from elsewhere. verdict: called with the result before build directions are compared, which adds
+    no finding; share: called with the share of them done. in_body: a user-defined body replaces the lattice's
+    box, so that only the height of the drawing is known. Raises InputError for a window that does not fit the
+    unit.
     """
     vertices, triangles = stl_surface(stl_bytes(vertices, triangles))
     up = np.asarray(direction, float) / np.linalg.norm(direction)
@@ -300,7 +300,7 @@ def _size(vertices: Vertices, printer: Printer, unit: Unit | None, up: Array, in
 
 
 def _room(vertices: Vertices, printer: Printer, up: Array) -> Finding:
-    """True if the part fits the build volume on its supports, as it stands or turned about the direction."""
+    """True if the part fits the build volume on its supports, as oriented or rotated about the direction."""
     extent = np.ptp(vertices @ frame_along(up).T, axis=0)
     room, limit = printer.room, printer.limits["build_x_mm"]
     straight, turned = _flat(extent, room), _flat(extent[[1, 0, 2]], room)
@@ -343,7 +343,7 @@ def _flat(extent: Array, room_mm: tuple[float, float, float]) -> float:
 
 
 def _drawing(unit: Unit, window: Window | None, printer: Printer) -> list[Finding]:
-    """Findings from the drawing's own figures, with the print offsets of the unit."""
+    """Findings from the drawing's figures, with the print offsets of the unit."""
     d, printed = unit.dimensions, unit.printed
     strut, where, place = d.junction_diameter, "junctions", NOWHERE
     if d.grading is not None:

@@ -143,7 +143,7 @@ def _codes(cell: NDArray[np.int64]) -> NDArray[np.int64]:
 def _planes(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit normals (m, 3) of triangles, corners (m, 3, 3), and how deep (m,) in mm one passes through them.
 
-    The normal of a triangle without area is 0, and nothing passes through it.
+    The normal of a triangle without area is 0, and no edge crosses it.
     """
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(u, v)

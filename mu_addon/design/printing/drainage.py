@@ -19,7 +19,7 @@ from .voxels import frame_along
 
 
 def drainage_findings(solid: Any, chambers: Chambers, unit: Unit | None, printer: Printer) -> list[Finding]:
-    """Findings on whether every chamber of a Manifold in mm drains through its inlet and is tight otherwise.
+    """Findings on chambers of a Manifold in mm: each must drain through its inlet and be tight otherwise.
 
     With a unit the inlet's place is known, and the number of chambers that a plug in it seals off is checked
     exactly. Without one a chamber's widest way out is taken for its inlet, and others are warnings.
@@ -210,7 +210,7 @@ def necks(
 
     vertices (n, 3) in mm, triangles (m, 3); one (m,), other (m,): mark the triangles of either part. The
     curves are the minimum cut of the graph of triangles, whose links are as strong as the common edges are
-    long. An empty list where nothing connects the parts, or one is empty.
+    long. An empty list if the parts are not connected, or one is empty.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow

@@ -50,7 +50,7 @@ class Pieces:
 
 
 def edges(triangles: Triangles) -> Edges:
-    """Edges of triangles (m, 3), each once, and which edge every side belongs to."""
+    """Edges of triangles (m, 3), each once, and the edge of every side."""
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forward = sides[:, 0] < sides[:, 1]
     low, high = sides.min(axis=1), sides.max(axis=1)
@@ -94,7 +94,7 @@ def open_places(vertices: Vertices, triangles: Triangles) -> tuple[Points, int]:
 def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
     """Mask of triangles (m, 3) that face against the larger part, by area in mm2, of their surface; (m,).
 
-    vertices (n, 3) in mm. Triangles belong together where exactly two share an edge.
+    vertices (n, 3) in mm. Two triangles are joined if they alone share an edge.
     """
     from scipy.sparse.csgraph import connected_components
 
@@ -118,7 +118,7 @@ def turned(vertices: Vertices, triangles: Triangles) -> NDArray[np.bool_]:
 
 
 def _against_the_larger(links: Any, size: NDArray[Any]) -> NDArray[np.bool_]:
-    """Mask of patches (n,) that face against the larger part, by size (n,), of those they are linked to.
+    """Mask of patches (n,) that are oriented against the larger part, by size (n,), of the linked ones.
 
     links: between patches that face each other's way, as a sparse matrix (n, n).
     """
@@ -211,7 +211,7 @@ def winding(point: Points, corners: Points) -> float:
 
 
 def _shells(vertices: Vertices, triangles: Triangles, label: NDArray[np.integer]) -> list[Shell]:
-    """The shells of a surface, of which each triangle has a label (m,) from 0 on."""
+    """The shells of a surface, from the triangles' labels (m,), 0 and up."""
     members = members_of(label)
     p, q, r = (vertices[corner] for corner in triangles.T)
     # Volumes of tetrahedra over a point of the shell, not over a far origin: small shells keep their digits.

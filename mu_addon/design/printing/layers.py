@@ -1,7 +1,8 @@
 """A part built layer by layer: islands, cups, overhangs and spans.
 
 Layers are built from the platform in the direction of the grid's first axis. In a printer whose part hangs
-from the platform the film below the tank closes every layer; what the part encloses against it is a cup.
+from the platform, the film of the tank closes every layer. A volume that the part encloses against it is a
+cup.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class Cups:
 
 @attrs.frozen(eq=False)
 class Overhang:
-    """Regions of layers beyond what supports them: their farthest points (n, 3) in mm.
+    """Regions of layers beyond their support: their farthest points (n, 3) in mm.
 
     reach (n,): distance of these points from the supported part, in mm; bridge (n,): True if a region is
     supported from opposite sides.
@@ -133,7 +134,7 @@ def cups(grid: VoxelRows, free: Regions) -> Cups:
     """Cups: groups of free regions that are closed in from the sides and from the platform's side.
 
     free: the free regions in the same grid. Regions are joined in the order of building; while a group has
-    not met the outside, the film seals it. A cup's volume is that just before its group meets the outside, or
+    not met the outside, the film seals it. A cup's volume is that just before its group joins the outside, or
     that of the whole group if it never does.
     """
     parent = list(range(len(free.layer)))

@@ -32,7 +32,7 @@ class LimitPart:
 
     sizes (n,): of the features, in the limit's unit, ascending from the part's notched corner along x; of the
     weighed cube, the least and the largest possible density. best: the limit is the smallest, or the largest,
-    size that is made. how: the measurement, in words. make: the surface.
+    size that is printed. how: the measurement, as text. make: the surface.
     """
 
     limit: str
@@ -48,7 +48,7 @@ class LimitPart:
 
     @property
     def measure(self) -> str:
-        """Instructions of a measurement, in words, and where to write its result."""
+        """Instructions for a measurement, as text, and where to write its result."""
         return f"{MEANING[self.limit]}: write {self.how} into limits.csv"
 
 
@@ -217,7 +217,7 @@ def _bridge(span: float) -> Any:
 
 
 def _cup(volume_ml: float) -> Any:
-    """A round cup of that volume, as deep as it is wide, open toward the platform, on three legs."""
+    """A round cup of that volume, with depth equal to its width, open toward the platform, on three legs."""
     radius = (1000.0 * volume_ml / (2.0 * np.pi)) ** (1.0 / 3.0)
     deep, outside = 2.0 * radius, radius + _SOLID / 2
     cup = shapes.cylinder(outside, _LEG, _LEG + deep + _SOLID / 2, 2 * _FACETS)

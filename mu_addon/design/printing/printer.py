@@ -41,7 +41,7 @@ MEANING = {
 
 @attrs.frozen
 class Limit:
-    """Limit of a printer with a resin, its source, and whether it is assumed, measured or published.
+    """Limit of a printer with a resin, and its source: assumed, measured or published.
 
     The value's unit is the end of the limit's name in MEANING.
     """
@@ -79,7 +79,7 @@ class Printer:
         return self.limits[name].value
 
     def with_limits(self, limits: dict[str, Limit]) -> Printer:
-        """The printer with other limits in place of its own, by name."""
+        """The printer with some limits replaced, by name."""
         return attrs.evolve(self, limits={**self.limits, **limits})
 
     @property
@@ -101,7 +101,7 @@ def load_printer(name: str = DEFAULT) -> Printer:
 
 
 def read_printer(path: str | Path) -> Printer:
-    """The printer in a TOML file. Raises InputError with file, line or key, and what to do."""
+    """The printer in a TOML file. Raises InputError with file, line or key, and remedy."""
     path = Path(path)
     try:
         text = file_text(path)

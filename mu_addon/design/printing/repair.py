@@ -39,7 +39,7 @@ class Repair:
     """A repaired surface, vertices (n, 3) in mm and triangles (m, 3), and its changes.
 
     largest_move_mm: of a vertex. volume_before_mm3, volume_after_mm3: sums over the triangles, no volumes for
-    an open or flipped surface. remains: faults left since they have more than one remedy.
+    an open or flipped surface. remains: faults with more than one remedy, which are left.
     """
 
     vertices: Vertices
@@ -52,7 +52,7 @@ class Repair:
 
     @property
     def is_whole(self) -> bool:
-        """True if nothing remains to be repaired."""
+        """True if no fault remains."""
         return not self.remains
 
     def plain(self) -> dict[str, Any]:
@@ -80,8 +80,8 @@ def repaired(vertices: Vertices, triangles: Triangles, gap_mm: float = GAP_MM) -
     """Repair of a surface of vertices (n, 3) in mm and triangles (m, 3), where there is only one way to.
 
     gap_mm: largest distance of vertices of open edges that become one. In this order: remove triangles
-    without three corners, close gaps, remove doubled triangles, fill holes of one triangle, turn patches that
-    face against their neighbours, turn shells that are inside out.
+    without three corners, close gaps, remove doubled triangles, fill holes of one triangle, flip patches
+    oriented against their neighbours, flip shells that are inside out.
     """
     before = volume(vertices, triangles)
     changes: list[Change] = []
@@ -141,8 +141,7 @@ def _without_flat(triangles: Triangles) -> tuple[Triangles, int]:
 
 
 def _without_doubled(triangles: Triangles) -> tuple[Triangles, int]:
-    """Triangles without doubled ones: one of each set stays where its neighbours need one, none where they
-    close without it, all where neither closes the surface."""
+    """Triangles without doubled ones: one of a set or none, whichever closes the surface, else all."""
     key = np.sort(triangles, axis=1)
     _, group, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     group = np.ravel(group)
@@ -170,8 +169,8 @@ def _closed_gaps(
 ) -> tuple[Vertices, NDArray[np.int64], int, float]:
     """Merge vertices of open edges across gaps: vertices, new number of each, number merged, largest move.
 
-    A group of vertices that is wider than the gap stays: which of them belong together cannot be known. So do
-    the ends of one edge: merging them would take a face away, and close nothing.
+    A group of vertices wider than the gap is left: the pairs to merge are ambiguous. So are the ends of one
+    edge: merging them would remove a face without closing a gap.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -244,8 +243,8 @@ def _single_holes(triangles: Triangles) -> Triangles:
 def _inside_out(vertices: Vertices, triangles: Triangles) -> list[NDArray[np.int64]]:
     """Triangles of each shell of a closed surface that must turn: the outer ones that face inward, or all.
 
-    A shell within another may be a void or a solid of its own; it turns only where every shell must, as in a
-    file that is inside out as a whole.
+    A shell within another may be a void or a separate solid. It is flipped only if every shell is, as in a
+    file that is inside out.
     """
     found = faces.pieces(vertices, triangles)
     shells = [*found.bodies, *found.voids, *found.nested, *found.inside_out]

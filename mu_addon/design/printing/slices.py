@@ -25,8 +25,8 @@ class Slice:
 
     outlines: closed polygons (n, 2) in mm, in the plane of the section, counter-clockwise around material and
     clockwise around holes. area_mm2: of the material; enclosed_mm2: of the holes, whose resin can leave only
-    along the build, as in a chamber. open_chamber: polygons, likewise, of chambers that are not holes of this
-    section because its inlet opens it here; open_mm2: their area.
+    along the build, as in a chamber. open_chamber: polygons of chambers that are open here by their inlet and
+    therefore no holes; open_mm2: their area.
     """
 
     height_mm: float
@@ -118,7 +118,7 @@ class Layers:
     """A closed surface, vertices (n, 3) in mm and triangles (m, 3), whose sections are computed on demand.
 
     direction (3,): of the build, away from the platform. height_mm: of the whole part along it. chamber: the
-    closed surface of a chamber within it, which counts as enclosed where its inlet opens it, too. Raises
+    closed surface of a chamber within it, which counts as enclosed also where its inlet opens it. Raises
     InputError for a surface that encloses no volume.
     """
 
@@ -140,7 +140,7 @@ class Layers:
         self._chamber = None if chamber is None else _closed(chamber[0] @ self.frame.T, chamber[1])
 
     def filled(self, height_mm: float) -> Filled:
-        """The section at a height above the lowest point, as triangles in the part's own frame."""
+        """The section at a height above the lowest point, as triangles in the part's frame."""
         section = self._solid.slice(self._low + height_mm)
         enclosed = _filled(section) - section
         if self._chamber is not None:

@@ -13,7 +13,7 @@ from ..surface import Triangles, Vertices
 Array = NDArray[np.float64]
 
 START = 1e-3
-"""Distance in mm from the surface at which a ray starts, so that it does not meet its own triangle."""
+"""Distance in mm from the surface at which a ray starts, so that it does not hit its own triangle."""
 
 
 @attrs.frozen(eq=False)
@@ -64,8 +64,8 @@ def cast_rays(solid: Any, surface: Samples, side: int, reach: float) -> RayHits:
     """Rays through a Manifold from every sample, square to the surface and `reach` mm long.
 
     side: -1 inward, for thickness, +1 outward, for gaps. The distance is exact for parallel faces, and for
-    cylinders and balls through their centres; in a wedge it is the width square to one face. A ball that fits
-    inside is never wider than this.
+    cylinders and balls through their centres; in a wedge it is the width perpendicular to one face. A ball
+    that fits inside is never wider than this.
     """
     direction = side * surface.normals
     first = (surface.points + START * direction).tolist()

@@ -26,7 +26,7 @@ from .voxels import frame_along, voxel_rows
 Array = NDArray[np.float64]
 
 DIAMETER_MM = 2.0
-"""Diameter of a vent: a ball of it passes, and viscous resin does (assumed)."""
+"""Diameter of a vent: a ball of it passes, and viscous resin drains (assumed)."""
 THINNEST_MM = 1.2
 """Least thickness of a wall for a vent: a thinner one stretches, and holds no plug (assumed)."""
 THICKEST_MM = 12.0
@@ -69,7 +69,7 @@ class Vent:
         }
 
     def plug_surface(self) -> tuple[Vertices, Triangles]:
-        """The plug as a surface (n, 3), (m, 3), which stands on its head, on z = 0."""
+        """The plug as a surface (n, 3), (m, 3), with its head on z = 0."""
         frame = frame_along(self.inner - self.outer)
         at = -frame @ self.outer
         points, faces = printable(self.plug.transform(np.column_stack([frame, at]).tolist()))
@@ -95,8 +95,8 @@ def vented(vertices: Vertices, triangles: Triangles, direction: Sequence[float],
 
     Cups up to the printer's limit are left. Without a cup the list of vents is empty and the part is
     unchanged. A wall can take a vent if it is between THINNEST_MM and THICKEST_MM, square to the hole, with
-    the outside behind it. Raises GateError where the part is not closed, where no wall beside a cup can take
-    a vent, and where the result is not one body or still has a cup above the limit.
+    the outside behind it. Raises GateError if the part is not closed, no wall of a cup has room for a vent,
+    or the result is not one body or still has a cup above the limit.
     """
     from manifold3d import Error, Manifold, Mesh64, OpType
 
@@ -144,7 +144,7 @@ def _cups(solid: Any, up: Array, printer: Printer) -> Any:
 
 
 def _outside(solid: Any) -> Any:
-    """Return a function that tells whether a point (3,) in mm sees the box's outside in some direction."""
+    """Return a function: is the box's outside visible from a point (3,) in mm in some direction?"""
     low, high = np.array(solid.bounding_box()).reshape(2, 3)
     far = 2.0 * float(np.linalg.norm(high - low))
     ways = np.array(list(itertools.product((-1.0, 0.31, 1.0), repeat=3)))
@@ -188,7 +188,7 @@ def _vent(solid: Any, outside: Any, start: Array, up: Array, ml: float) -> Vent:
 
 
 def _placed(body: Any, at: Array, way: Array) -> Any:
-    """A Manifold that stands along z, moved to a place and turned along a direction, (3,) each."""
+    """A Manifold along z, moved to a place and rotated to a direction, (3,) each."""
     frame = frame_along(way)
     return body.transform(np.column_stack([frame.T, at]).tolist())
 

@@ -88,8 +88,8 @@ def chamber_walls(
 ) -> list[Finding]:
     """Finding on the thinnest wall in mm between chambers and the outside; empty without such a wall.
 
-    inward: rays from samples into the solid; between (s,): marks those from a chamber that end outside any;
-    facets_mm: distance by which flat facets may lie inside the curved wall.
+    inward: rays from samples into the solid; between (s,): marks those from a chamber to outside every
+    chamber; facets_mm: distance by which flat facets may lie inside the curved wall.
     """
     if not between.any():
         return []
