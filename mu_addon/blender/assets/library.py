@@ -82,7 +82,7 @@ def _titles() -> dict[str, str]:
 def _set_aside(names: set[str]) -> Iterator[None]:
     """Rename this file's objects, meshes and materials of these names temporarily.
 
-    Names are unique in a file: beside a unit with its preset's name, the preset would be "mu-1.0x.001".
+    Names are unique in a file: with a unit of that name in it, the preset would be "mu-1.0x.001".
     """
     data = [
         d

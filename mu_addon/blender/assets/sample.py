@@ -74,7 +74,7 @@ def _ranking(context: Any) -> list[Any]:
 
 
 def _obstacle(context: Any) -> list[Any]:
-    """A unit beside a box that it bends against, ready for *Motion Only*."""
+    """A unit next to a box that it bends against, ready for *Motion Only*."""
     root = _unit(context)
     root.mu_unit.study.command = "simulate"
     bpy.ops.mu.obstacle_box(size=(20.0, 12.0, 12.0), gap=0.6)
@@ -114,9 +114,9 @@ def _tree(context: Any) -> list[Any]:
 
 
 SCENES: dict[str, tuple[str, Callable[[Any], list[Any]]]] = {
-    "overview": ("Units whole, cut open with paths, and in a body of their own", _overview),
+    "overview": ("Units whole, cut open with paths, and in a user-defined body", _overview),
     "ranking": ("A unit with its candidate paths, ready for Place the Sensor", _ranking),
-    "obstacle": ("A unit beside a box that it bends against, ready for Motion Only", _obstacle),
+    "obstacle": ("A unit next to a box that it bends against, ready for Motion Only", _obstacle),
     "gripper": ("A gripper over a cube, ready for Grasp", _gripper),
     "measured": ("A unit with measured data, ready for Diagnose", _measured),
     "tree": ("A unit that follows the node tree of its steps", _tree),

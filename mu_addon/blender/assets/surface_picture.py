@@ -18,7 +18,7 @@ _MARGIN = 1.12
 
 
 def surface_pixels(points: Array, triangles: Array, colours: Array, size: int) -> Array:
-    """Pixels (size, size, 4) of a surface, sRGB from 0 to 1, rows from the bottom up; clear beside it.
+    """Pixels (size, size, 4) of a surface, sRGB from 0 to 1, rows from the bottom up; transparent around it.
 
     points (v, 3), triangles (t, 3), linear colours (t, 3). The nearest triangle is seen, lit on both sides.
     """

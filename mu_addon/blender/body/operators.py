@@ -15,7 +15,7 @@ from . import state as bodies
 
 
 def selected_meshes(context):
-    """Selected meshes that are no parts of a unit; raises InputError where there is none."""
+    """Selected meshes that are no parts of a unit; raises InputError without any."""
     found = [o for o in context.selected_objects if o.type == "MESH" and unit_object.root_of(o) is None]
     if not found:
         raise InputError("no mesh is selected besides the unit", "selection", "select a closed mesh")
@@ -23,7 +23,7 @@ def selected_meshes(context):
 
 
 def selected_mesh(context):
-    """The selected mesh that is not a part of a unit; raises InputError where there is none, or more."""
+    """The selected mesh that is not a part of a unit; raises InputError unless there is exactly one."""
     found = selected_meshes(context)
     if len(found) > 1:
         raise InputError(
@@ -33,7 +33,7 @@ def selected_mesh(context):
 
 
 def report_flaws(operator, root, found, sound):
-    """Mark the locations of a body's flaws and report them; the text `sound` if there are none."""
+    """Mark the locations of a body's flaws and report them; the text `sound` without any."""
     unit_object.mark(root, [place for flaw in found for place in flaw.places])
     if not found:
         operator.report({"INFO"}, sound)

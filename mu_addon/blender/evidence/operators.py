@@ -95,7 +95,11 @@ class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
 
     @classmethod
     def trouble(cls, root):
-        return "" if effects.inputs(root) else "The unit's simulation has no effects beside its parameters"
+        return (
+            ""
+            if effects.inputs(root)
+            else "The unit's simulation has no effects in addition to its parameters"
+        )
 
     def act(self, context, root):
         effects.keep(root, "")
@@ -103,7 +107,7 @@ class MU_OT_evidence_remove(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_evidence_motion(UnitOperator, bpy.types.Operator):
-    """Show an experiment on the timeline beside the unit, measured and simulated; once more hides it"""
+    """Show an experiment on the timeline next to the unit, measured and simulated; press again to hide it"""
 
     bl_idname = "mu.evidence_motion"
     bl_label = "Show Measured Motion"

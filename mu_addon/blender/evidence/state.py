@@ -63,7 +63,7 @@ class MeasuredFolder:
 
 @attrs.frozen(eq=False)
 class ShownVerdict:
-    """Result of a diagnosis: verdict.json and summary.json; stale: why it does not belong to the unit now."""
+    """Result of a diagnosis: verdict.json and summary.json; stale: why it is not of the present unit."""
 
     folder: Path
     status: str
@@ -164,25 +164,25 @@ def _stale(root: Any, inputs: dict[str, Any], unit: str) -> str:
     if found is None or found.measured is None:
         return "its measured data are not here"
     if any(inputs.get(key) != value for key, value in found.digest.items()):
-        return "it belongs to other measured data"
+        return "made with other measured data"
     try:
         now = shape_hash(to_unit(root.mu_unit))
     except MuError:
         now = ""
     # Without a unit's own file the verdict does not depend on the unit.
-    return "it belongs to other parameters" if unit and now != unit else ""
+    return "made with other parameters" if unit and now != unit else ""
 
 
 def mark_applied(root: Any, to_unit_: str, to_simulation: str) -> None:
     """Record, on the unit in its present state, that it gets the diagnosis's model.
 
-    In words: the part for its parameters, and the part for its simulation.
+    Texts: the part for its parameters, and the part for its simulation.
     """
     root.mu_evidence.applied = "\n".join([_model(root), _having(root), to_unit_, to_simulation])
 
 
 def applied(root: Any) -> str:
-    """Part of the diagnosis's model that the unit has, in words, or "": twice it would count twice."""
+    """Part of the diagnosis's model that the unit already has, as text, or "": it must not count twice."""
     model, before, to_unit_, to_simulation = (*root.mu_evidence.applied.split("\n"), "", "", "", "")[:4]
     try:
         now = _having(root)
@@ -195,7 +195,7 @@ def applied(root: Any) -> str:
 
 
 def _having(root: Any) -> str:
-    """Hash of the unit, and of the effects beside its parameters; raises InputError."""
+    """Hash of the unit, and of its further effects; raises InputError."""
     text = root.mu_unit.study.effects
     return shape_hash(to_unit(root.mu_unit)) + (hashlib.sha256(text.encode()).hexdigest() if text else "")
 
@@ -211,8 +211,8 @@ def _model(root: Any) -> str:
 class Course:
     """One experiment over time: time_s (n,), pressure_kPa (n,) and series by source.
 
-    series: `measured`, and `model` and `extended` where a diagnosis predicted them; of each the channels by
-    name, (n,) with nan where there is nothing.
+    series: `measured`, and `model` and `extended` if a diagnosis predicted them; for each the channels by
+    name, (n,), nan without a value.
     """
 
     time_s: Any

@@ -49,7 +49,7 @@ def hide(root: Any) -> None:
 
 
 def show(root: Any, name: str, course: Course, scene: Any) -> None:
-    """Show an experiment on the scene's timeline, in its own time, replacing any other."""
+    """Show an experiment on the scene's timeline, in its time, replacing any other."""
     hide(root)
     frame = _linked(root, FRAME, "Evidence", None)
     frame.hide_viewport = frame.hide_render = True

@@ -23,7 +23,7 @@ from ..unit.fields import exact
 from .properties import PARAMETERS_CHANGED, from_gripper, to_gripper
 
 PART = displays.GRIPPER
-"""Mark of the parts beside the gripper's own mesh: `cube`, and those that play the grasp."""
+"""Mark of the parts in addition to the gripper's mesh: `cube`, and those that play the grasp."""
 MOVING = "moving:"
 """Prefix of the names of the parts that play the grasp: `moving:SIDE`, `moving:cube`."""
 SIDES = ("left", "right")

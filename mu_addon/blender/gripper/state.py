@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def folder_of(root: Any) -> Path:
-    """Folder of the gripper's results: the one it names, else beside the .blend file, else the user's own."""
+    """Folder of the gripper's results: the one it names, else next to the .blend file, else the user's."""
     props = root.mu_gripper
     return studies.default_folder(props.folder, props.title, props.uuid)
 

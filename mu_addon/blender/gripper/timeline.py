@@ -20,7 +20,7 @@ from . import state as grasps
 from .properties import PARAMETERS_CHANGED
 
 CUT = "mu_cut"
-"""On a finger that plays the grasp: whether it is cut open."""
+"""On a finger that plays the grasp: True if it is cut open."""
 
 
 def parts(root: Any) -> list[Any]:
@@ -69,7 +69,7 @@ def _halves(folder: Path) -> Any:
 
 
 def _follow(root: Any) -> None:
-    """Cut a grasp that is played open, or close it, as the gripper's setting says."""
+    """Cut a played grasp open, or close it, by the gripper's setting."""
     shown = parts(root)
     if shown and bool(shown[0].get(CUT)) != root.mu_gripper.cut:
         with suppress(MuError):

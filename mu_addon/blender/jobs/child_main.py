@@ -1,7 +1,7 @@
 """Entry point of a child process, without bpy: `python child_main.py resume FOLDER --json`.
 
-It makes its own package importable as `mu_addon`, whatever Blender calls it. Processes that it starts run
-these lines, too, and find the package likewise.
+It makes its package importable as `mu_addon`, under any name in Blender. Processes that it starts run these
+lines, too, and find the package likewise.
 """
 
 import ctypes.util

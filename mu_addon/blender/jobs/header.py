@@ -1,6 +1,6 @@
 """Jobs at the right end of the status bar: the running one, the queue's length, and a notice at its end.
 
-Blender shows nothing of its own there. If the user hides the status bar they are at the end of the 3D view's
+Blender itself shows nothing there. If the user hides the status bar they are at the end of the 3D view's
 header.
 """
 
@@ -18,9 +18,9 @@ from . import start_child
 from .panel import shortened, whole
 
 WIDTH = 16
-"""Width of the bar in units of the interface, fixed while its words change."""
+"""Width of the bar in units of the interface, fixed while its text changes."""
 STAGE_LETTERS, NOTICE_LETTERS = 14, 64
-"""Letters that fit: a stage's name beside its number and the time left; a notice."""
+"""Number of letters that fit: of a stage's name with its number and the time left; of a notice."""
 
 
 def listed() -> list[str]:
@@ -133,7 +133,7 @@ def _running(layout, keys: list[str]) -> None:
 
 
 def _words(key: str) -> str:
-    """Result of an ended job in words."""
+    """Result of an ended job, as text."""
     child, title = start_child.child_of(key), start_child.title_of(key)
     if child.state == DONE:
         return f"Done in {spell(child.seconds)}: {title}"

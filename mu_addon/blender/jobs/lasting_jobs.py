@@ -1,7 +1,7 @@
 """Jobs that outlive Blender: recorded by each session, taken over by the next.
 
 A session has a folder, locked while it lives, with a file for each job. A later session that finds the folder
-unlocked takes over its jobs: they still run, or have ended meanwhile.
+unlocked takes over its jobs, running or ended.
 """
 
 from __future__ import annotations

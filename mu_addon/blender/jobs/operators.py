@@ -64,9 +64,9 @@ def job_operators(
 ) -> tuple[type, type, type]:
     """Operator classes mu.PREFIXcancel, mu.PREFIXdismiss and mu.PREFIXopen of a kind of job.
 
-    noun: the job in words; kept: what is left when it is stopped; first: what to do before there is a file;
-    base: operator of the object with the job; items: files to open, with paths by `path_of(root, what)`, by
-    default in the run's folder.
+    noun: name of the job; kept: results that remain when it is stopped; first: what to do before there is a
+    file; base: operator of the object with the job; items: files to open, with paths by `path_of(root,
+    what)`, by default in the run's folder.
     """
 
     def in_run(root: Any, what: str) -> Path:

@@ -10,7 +10,7 @@ from ..shared.panels import CHARACTERS, alert, large_button, wrapped
 from ..shared.wording import in_panel
 
 STAGE_LETTERS = 20
-"""Letters that fit into a panel's bar beside number and time left; a longer stage is only numbered."""
+"""Letters of a stage that fit into a panel's bar with number and time; a longer one is only numbered."""
 
 
 def start_button(layout, child, operator: str, icon: str, **settings) -> None:
@@ -31,7 +31,7 @@ def rounded(seconds: float) -> str:
 
 
 def job_state(layout, child, where: str, prefix: str = "") -> None:
-    """Draw the progress of a job's child while it runs, and its end; nothing without a child.
+    """Draw the progress and the end of a job's child; nothing without a child.
 
     where: name of the panel with the results; prefix: of the names of its operators.
     """
@@ -44,10 +44,10 @@ def job_state(layout, child, where: str, prefix: str = "") -> None:
 
 
 def whole(child, width: int = 0) -> tuple[float, str]:
-    """Finished share of a whole job, 0..1, and that, its stage, their number and time left in words.
+    """Finished share of a whole job, 0..1, and a text on share, stage, number of stages and time left.
 
-    A stage without a known fraction shows no share. width: most letters of the stage's name, 0 for all of it:
-    a longer one is only numbered.
+    A stage without a known fraction shows no share. width: largest number of letters of the stage's name, 0
+    for any; a longer one is only numbered.
     """
     if child.state == WAITING:
         return 0.0, "waiting for the job before it"
@@ -69,7 +69,7 @@ def whole(child, width: int = 0) -> tuple[float, str]:
 
 
 def shortened(text: str, width: int) -> str:
-    """A text of one line in at most so many letters, cut between words where it is longer."""
+    """A text of one line in at most so many letters, cut between words if longer."""
     return textwrap.shorten(text, width, placeholder=" ...")
 
 

@@ -33,14 +33,14 @@ class MU_AP_preferences(bpy.types.AddonPreferences):
 
 
 def deleted_with_it() -> str:
-    """Results that go when the extension is uninstalled, in words; "" where there are none."""
+    """Results that are deleted when the extension is uninstalled, as text; "" without any."""
     count = sum(place.is_dir() for place in user_folder("studies").iterdir())
     if not count:
         return ""
     of = "one unit or gripper" if count == 1 else f"{count} units or grippers"
     return (
         f"Uninstalling deletes the results of {of} in files that were never saved. "
-        "Save a file to keep its results beside it."
+        "Save a file to keep its results next to it."
     )
 
 

@@ -1,7 +1,7 @@
 """Slow parts of operators, computed in a separate process; the operator is called again once they exist.
 
-In background, where timers never fire, and for a script, which goes on with the result, they are computed
-at once.
+In background, where timers never fire, and for a script, which continues with the result, they are computed
+immediately.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _scripts = 0
 
 
 def at_once() -> bool:
-    """Return True if nobody waits at a window: in background, and while a script calls an operator."""
+    """Return True without a user at a window: in background, and while a script calls an operator."""
     return bool(bpy.app.background or _scripts)
 
 
@@ -73,7 +73,7 @@ class NotPrepared(Exception):
 
 
 _waiting: dict[str, tuple[NotPrepared, list[Callable[[], None]]]] = {}
-"""By key of a job: what it makes, and the calls at its end."""
+"""By key of a job: the thing that it makes, and the calls at its end."""
 
 
 def _kind(wanted: NotPrepared, root: Any) -> JobKind:

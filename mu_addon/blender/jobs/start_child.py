@@ -4,7 +4,7 @@ Jobs of minutes outlive Blender, unless the user decides otherwise, and the next
 (`sessions`); the others end with their session.
 
 Running jobs are kept here, in Python, and never in the .blend file, so that a file loaded later has no button
-stuck at "running". Nothing here writes to Blender's data.
+stuck at "running". This module does not write to Blender's data.
 """
 
 from __future__ import annotations
@@ -63,18 +63,18 @@ JOB_ENDED = Signal()
 _children: dict[str, Child] = {}
 _titles: dict[str, str] = {}
 _heavy: set[str] = set()
-"""Keys of jobs of which one runs at a time."""
+"""Keys of jobs that run one at a time."""
 _lasting: set[str] = set()
 """Keys of jobs that may outlive Blender."""
 
 
 def missing(modules: Sequence[str] = SOLVER) -> list[str]:
-    """Names of those modules that this Blender does not have."""
+    """Names of the modules that this Blender lacks."""
     return [name for name in modules if importlib.util.find_spec(name) is None]
 
 
 def lacking(modules: Sequence[str] = SOLVER) -> str:
-    """Names of those modules that this Blender does not have, in words; empty if it has all."""
+    """Names of the modules that this Blender lacks, as text; empty if it has all."""
     names = missing(modules)
     return f"Not in this Blender: {', '.join(names)}" if names else ""
 
@@ -98,9 +98,9 @@ def start(
 class JobKind:
     """A kind of job for objects of the scene, one at a time for each object.
 
-    name: of the kind; uuid_of, folder_of: identifier of a root object and folder of its run. title: the job
-    in words; heavy: takes the machine for minutes, so that only one such job runs at a time and others wait;
-    plan_of: its expected stages for an object; outlives: may outlive Blender, as the heavy ones may.
+    name: of the kind; uuid_of, folder_of: identifier of a root object and folder of its run. title: name of
+    the job; heavy: takes the machine for minutes, so that only one such job runs at a time and others wait;
+    plan_of: its expected stages for an object; outlives: may continue after Blender ends, as heavy ones may.
     """
 
     name: str
@@ -262,7 +262,7 @@ def _end_all() -> None:
 
 
 def _take_up() -> None:
-    """Watch the jobs of former sessions: they still run, or have ended meanwhile."""
+    """Watch the jobs of former sessions, running or ended."""
     for record in lasting_jobs.take_up():
         if record.key in running():
             continue

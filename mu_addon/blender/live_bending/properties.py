@@ -36,7 +36,7 @@ class MU_PG_live(bpy.types.PropertyGroup):
     )
     colour: EnumProperty(
         name="Colours",
-        description="What the colours of the bent unit show",
+        description="Quantity shown by the colours of the bent unit",
         items=[
             (PLAIN, "Plain", "The colours of the parts"),
             ("largest_stretch", "Stretch", "Largest principal stretch"),

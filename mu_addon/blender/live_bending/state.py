@@ -1,7 +1,7 @@
 """A unit bent while it is designed: the process that finds its shapes, and the objects that show them.
 
-The process (`usecases.live_bending`) waits between changes; a timer asks it once the parameters rest, and
-shows what it answers in the unit's own place. It ends while a job that takes the machine runs.
+The process (`usecases.live_bending`) waits between changes. A timer sends a request once the parameters rest,
+and shows the answer in the unit's place. It ends while a job that takes the machine runs.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from . import colours
 from .properties import COLOURED, PLAIN, PRESSED, SWITCHED
 
 RESTS_S = 0.35
-"""Seconds without a change after which the unit is bent anew."""
+"""Seconds without a change after which the unit is bent again."""
 TICK_S = 0.1
 
 
@@ -157,7 +157,7 @@ def _changed(root: Any) -> None:
 
 
 def _pressed(root: Any) -> None:
-    """Bend the shape to another pressure; beyond its largest one it is found anew."""
+    """Bend the shape to another pressure; beyond its largest one it is computed again."""
     live = of(root)
     if live is None or live.shape is None:
         return
@@ -203,7 +203,7 @@ def _tick() -> float | None:
 
 
 def _follow(root: Any, live: Live) -> None:
-    """Ask the process what is due, and show what it has found."""
+    """Send the process due requests, and show its answers."""
     if live.arrived is not None:
         live.shape, live.arrived = live.arrived, None
         place(root)
@@ -283,7 +283,7 @@ def _shape(root: Any, motion: Motion, answer: dict[str, Any]) -> Shape:
 
 
 def place(root: Any) -> None:
-    """Show a unit's latest shape in its own place."""
+    """Show a unit's latest shape in its place."""
     live = of(root)
     if live is None or live.shape is None:
         return
@@ -333,7 +333,7 @@ def _seen(root: Any, seen: bool) -> None:
 
 @persistent
 def _restored(*_: Any) -> None:
-    """After undo, redo or load: no shape is shown that belongs to another design or to no process."""
+    """After undo, redo or load: hide shapes of another design or without a process."""
     for root in unit_object.roots():
         if not root.mu_live.on or of(root) is None:
             if parts(root):
@@ -361,7 +361,7 @@ _CONNECTIONS = (
 
 
 def register() -> None:
-    """Register handlers and the signals that bend a unit anew."""
+    """Register handlers and the signals that bend a unit again."""
     add_handlers(_HANDLERS, _CONNECTIONS)
 
 

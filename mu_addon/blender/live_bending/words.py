@@ -1,4 +1,4 @@
-"""What live bending has found, in words: in the panel, and over the viewport."""
+"""Texts on the results of live bending, in the panel and over the viewport."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEAST_DEG = 0.1
 
 
 def draw(layout: Any, root: Any) -> None:
-    """Draw the switch, the slider beside it, and what was found; of the same height in every state."""
+    """Draw the switch, the slider next to it, and the result, with the same height in every state."""
     row = layout.row(align=True)
     row.use_property_split = False
     row.active = root.mu_unit.show == "preview"
@@ -34,7 +34,7 @@ def draw(layout: Any, root: Any) -> None:
 
 
 def words(root: Any) -> str:
-    """Angle with its error, or what is being done."""
+    """Angle with its error, or the current action."""
     live = state.of(root)
     if live is None:
         return ""

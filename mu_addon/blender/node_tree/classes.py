@@ -61,7 +61,7 @@ def node_class(kind: str) -> str:
 
 
 def attribute(setting: Setting) -> str:
-    """Name of a setting's property on its node: its own, unless Blender's nodes have one of that name."""
+    """Name of a setting's property on its node: the setting's, unless Blender's nodes use that name."""
     return f"{setting.name}_" if setting.name in bpy.types.Node.bl_rna.properties else setting.name
 
 

@@ -65,7 +65,7 @@ class _Flat:
         return (Source(self.prefix + node.name, socket.identifier),)
 
     def inside(self, node: Any) -> _Flat | None:
-        """Use of a group that a node stands for; None if it has no tree."""
+        """Use of a group by a node; None if it has no tree."""
         if node.node_tree is None:
             return None
         given = {s.identifier: self.sources(node, s.identifier) for s in node.inputs}

@@ -1,7 +1,7 @@
 """A unit that follows a node of a tree: one set of values, edited in the tree or the sidebar.
 
-Changes in the sidebar are written into the fields of the tree's nodes. A value set by a link or a driver
-belongs to the tree: it is restored, and the sidebar shows its source.
+Changes in the sidebar are written into the fields of the tree's nodes. A value set by a link or a driver is
+restored after a change in the sidebar, which shows its source.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _values(props: Any) -> dict[str, Any]:
 
 
 def _write(node: Any, path: str, value: Any) -> bool:
-    """Set a parameter in the node with its own field; return True if there is one."""
+    """Set a parameter in the node that has its field; return True if there is one."""
     if path == "path" and _lay_waveguide(node, bool(value)) and not value:
         return True
     for source in _upstream(node):
@@ -134,7 +134,7 @@ def _upstream(node: Any) -> Iterator[Any]:
 
 
 def _setting(node: Any, path: str) -> Setting | None:
-    """Setting of a node for the parameter of that path; None if it has none."""
+    """Setting of a node for the parameter of that path; None without one."""
     definition = node.definition
     if definition.kind == "set_parameter":
         ours = node.parameter == path and not node.mute
@@ -147,7 +147,7 @@ def _setting(node: Any, path: str) -> Setting | None:
 
 
 def _is_free(node: Any, setting: Setting) -> bool:
-    """Return True if a setting is the node's own field: neither a link nor a driver sets it."""
+    """Return True if a setting is set in the node's field, not by a link or a driver."""
     socket = next((s for s in node.inputs if s.identifier == setting.name), None)
     data = node.id_data.animation_data
     field = node.path_from_id(attribute(setting))

@@ -27,7 +27,7 @@ class TreeOperator(UnitOperator):
 
 
 def make_group(tree, nodes):
-    """Put nodes of a tree into a new group; return the node that stands for them. Raises InputError."""
+    """Put nodes of a tree into a new group; return its node. Raises InputError."""
     nodes = [node for node in nodes if node.bl_idname != "NodeFrame"]
     if not nodes:
         raise InputError("no node is selected", tree.name, "select the nodes of the group")
@@ -78,7 +78,7 @@ def make_group(tree, nodes):
 
 
 def take_apart(tree, node):
-    """Put a group's nodes in place of the node that stands for them. Raises InputError."""
+    """Replace a group's node by the nodes of the group. Raises InputError."""
     if node.node_tree is None:
         raise InputError("the group is empty", node.name, "choose its tree first")
     group = node.node_tree

@@ -33,7 +33,7 @@ _TEXTS = {
 
 
 def root_tree(context):
-    """Tree to be evaluated: the outermost of those open in the editor."""
+    """Tree to evaluate: the outermost one open in the editor."""
     path = getattr(context.space_data, "path", None)
     if path and path[0].node_tree is not None and path[0].node_tree.bl_idname == TREE:
         return path[0].node_tree
@@ -59,7 +59,7 @@ class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
     bl_label = "Evaluate"
     bl_options = {"REGISTER"}
 
-    node: StringProperty(name="Node", description="Evaluate this node and what it needs; empty: all")
+    node: StringProperty(name="Node", description="Evaluate this node and its sources; empty: all")
 
     @classmethod
     def trouble(cls, tree):

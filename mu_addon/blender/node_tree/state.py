@@ -64,7 +64,7 @@ def uuid_of(tree: Any) -> str:
 
 
 def folder_of(tree: Any) -> Path:
-    """Folder of a tree's runs: the one it names, else beside the .blend file, else the user's own."""
+    """Folder of a tree's runs: the one it names, else next to the .blend file, else the user's."""
     return default_folder(tree.mu_folder, tree.name, _number(tree))
 
 
@@ -193,7 +193,7 @@ def start(tree: Any, wanted: tuple[str, ...] = ()) -> Any:
 
 
 def _redraw_running() -> float | None:
-    """Show the running node, and those finished meanwhile."""
+    """Show the running node, and those finished since."""
     running = [tree for tree in trees() if RUN.is_running(tree)]
     for tree in running:
         child = RUN.child(tree)
@@ -232,7 +232,7 @@ def places(node: Any) -> tuple[str, ...]:
 
 
 def place_of(tree: Any, node: Any, what: str) -> Path | None:
-    """Path of a node's result, or None where the node has none."""
+    """Path of a node's result, or None without one."""
     found = classes.state_of(node)
     if what == "table":
         return folder_of(tree) / f"compare-{file_name(node.name)}.csv"

@@ -21,7 +21,7 @@ NO_OBSTACLE = "No obstacle yet: select a closed mesh and use it as one"
 
 
 class ObstacleOperator(UnitOperator):
-    """An operator on the obstacles of the active unit; greyed out, with the reason, where it has none."""
+    """An operator on the obstacles of the active unit; greyed out, with the reason, without any."""
 
     name: StringProperty(
         name="Obstacle", description="Name of its object. Empty: all of this unit", options={"SKIP_SAVE"}

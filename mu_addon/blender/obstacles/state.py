@@ -1,6 +1,6 @@
 """Obstacles of a unit: closed meshes of the scene that it may touch, rigid and fixed.
 
-They stay the user's own objects: after a change they are read again, in the unit's frame, and earlier
+They remain the user's objects. After a change they are read again, in the unit's frame, and earlier
 simulations with them become stale. Copies of an obstacle are obstacles; undo and deletion need no handling.
 """
 

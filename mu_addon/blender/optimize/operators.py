@@ -74,7 +74,7 @@ class MU_OT_optimize_unlist(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_optimize(ValidUnitOperator, bpy.types.Operator):
-    """Search for units that meet the targets, in a child process; units that were simulated are kept"""
+    """Search for units that meet the targets, in a child process; simulated units are kept"""
 
     bl_idname = "mu.optimize"
     bl_label = "Optimize"
@@ -132,7 +132,7 @@ class MU_OT_optimize_apply(_OfProposed, bpy.types.Operator):
 
 
 class MU_OT_optimize_add(_OfProposed, bpy.types.Operator):
-    """Add a proposed unit to the scene, beside the present one"""
+    """Add a proposed unit to the scene, next to the present one"""
 
     bl_idname = "mu.optimize_add"
     bl_label = "Add Beside"

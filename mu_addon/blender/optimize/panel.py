@@ -56,7 +56,7 @@ class MU_PT_optimize(UnitPanel, bpy.types.Panel):
 
 
 def start_words(root) -> str:
-    """Label of the button: the job, and its expected duration; a file's search has a length of its own."""
+    """Label of the button: the job, and its expected duration; a file states the length of its search."""
     if root.mu_optimize.source == "file" or not root.mu_optimize.freedoms:
         return "Optimize"
     found = optimization.findings(root)
@@ -150,7 +150,7 @@ def _freedoms(layout, root, props) -> None:
 
 
 def asked_title(target, name: str) -> str:
-    """Label beside a field of a target: its name and unit, for a curve the units of a pair."""
+    """Label next to a field of a target: its name and unit, for a curve the units of a pair."""
     unit = UNITS.get(target.kind, "")
     if name == "points":
         return f"kPa: {unit or 'value'}"

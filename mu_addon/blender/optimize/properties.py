@@ -34,7 +34,7 @@ FREE = {
 """Parameters that the panel offers to be free, by dotted name."""
 NAMED = {
     "lattice.kind": ("Lattice: Kind", "Kind of lattice cell; for struts as printed"),
-    PATH: ("Sensor: Path", "Path of the sensor; a target whose path is left empty is of it"),
+    PATH: ("Sensor: Path", "Path of the sensor, used for a target with an empty path"),
     RESIN: ("Resin", "Resin of the library: its moduli, density and elongation at break"),
 }
 """Choices by name instead of numbers: the label of each, and its description."""
@@ -43,7 +43,7 @@ AROUND = 0.25
 
 KINDS = [
     ("angle", "Angle", "Bending angle under a pressure, in degrees"),
-    ("tip_force", "Tip Force", "Force on a wall beside the tip under a pressure, in N"),
+    ("tip_force", "Tip Force", "Force on a wall next to the tip under a pressure, in N"),
     ("tip_position", "Tip Position", "Displacement of the tip under a pressure, in mm"),
     ("workspace", "Workspace", "Length of the tip's path over two pressures and rest, in mm"),
     ("stiffness", "Stiffness", "Force that moves the tip by 1 mm, the unit at rest, in N/mm"),

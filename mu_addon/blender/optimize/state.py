@@ -40,7 +40,7 @@ TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
 
 @attrs.frozen(eq=False)
 class Proposed:
-    """A proposed unit: its file and, as in summary.json, its targets, changes and reasons in words.
+    """A proposed unit: its file and, as in summary.json, its targets, and texts on changes and reasons.
 
     targets: of each the values of `TARGET_KEYS` and its standard_error; applied: True if the unit in the
     scene has its parameters.
@@ -58,8 +58,8 @@ class Proposed:
 class Findings:
     """Results of the optimisation in a unit's folder; other_start: of a unit with other parameters.
 
-    feasible: a unit met every target on the search's mesh; simulated: number of units that run simulated;
-    seconds: of its stages; in_the_way: names of the targets without which the others can be met.
+    feasible: a unit met every target on the search's mesh; simulated: number of units simulated by that run;
+    seconds: of its stages; in_the_way: names of targets, the others can be met without one of these.
     """
 
     folder: Path
@@ -274,7 +274,7 @@ def as_kept(unit: Unit) -> Unit:
 
 
 def proposed_unit(root: Any, number: int) -> Unit:
-    """Proposed unit of a number from 1, from its file; raises InputError where there is none."""
+    """Proposed unit of a number from 1, from its file; raises InputError without one."""
     found = findings(root)
     rows = () if found is None else found.proposed
     if not 1 <= number <= len(rows):

@@ -19,7 +19,7 @@ from ..unit.fields import path_symbol
 from . import ranking
 
 BETTER = "Mean deviation [mm], smaller is better"
-"""Note on a ranking's numbers, beside the lattice and in the panel."""
+"""Note on a ranking's numbers, next to the lattice and in the panel."""
 BESIDE = 190
 """Pixels taken by the legend of a field, to the left of this one."""
 
@@ -27,7 +27,7 @@ BESIDE = 190
 def lines(known: ranking.Known) -> list[str]:
     """Lines above the ramp: its quantity and, if the ranking is stale, a note."""
     if known.stale:
-        return ["Mean deviation", "stale: ranked with other parameters, hence grey"]
+        return ["Mean deviation", "stale (grey): ranked with other parameters"]
     return [BETTER]
 
 
@@ -73,7 +73,7 @@ def _draw() -> None:
 def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
     """Unit of the visible candidate paths, and these paths.
 
-    It is the active one, or another if that shows none: colours and legend go together.
+    It is the active one, or another if that shows none, so that the legend fits the colours.
     """
     active = unit_object.active_root(context)
     for root in [active, *(other for other in unit_object.roots() if other != active)]:

@@ -1,7 +1,7 @@
 """Choose the sensor path that the waveguide follows: by its button, or by a click on it in the 3D view.
 
-Blender reports a selection by an update of its dependency graph, in which no operator may be called: a timer
-makes the choice a moment later.
+Blender reports a selection by an update of its dependency graph, in which no operator may be called, so a
+timer makes the choice a moment later.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.

@@ -31,7 +31,7 @@ COLOURS = {
 
 
 def material(name: str):
-    """The material of that name, made with its colour where the file has none."""
+    """The material of that name, created with its colour if the file has none."""
     found = bpy.data.materials.get(name)
     if found is None:
         found = bpy.data.materials.new(name)

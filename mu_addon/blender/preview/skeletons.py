@@ -1,6 +1,6 @@
 """Values of the design's steps as arrays to draw, and candidate paths.
 
-All of it is for display and takes milliseconds; printed or simulated geometry comes from the core.
+It is for display only and takes milliseconds; printed or simulated geometry comes from the core.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Skeleton:
     """A mesh to draw: vertices (n, 3) in mm, edges (e, 2), faces, a list of (m, k) arrays, and attributes.
 
     attributes: values (n,) at the vertices by name, integers or not; slots: number of the material of each
-    face, or None; smooth: whether faces are shaded smooth, all or each; inputs: further inputs, by name, of
-    the node group that skins it.
+    face, or None; smooth: smooth shading of all faces or of each; inputs: further inputs, by name, of its
+    node group.
     """
 
     vertices: Floats
@@ -169,8 +169,8 @@ def bar(found: Bar | None) -> Skeleton | None:
 def candidates(unit: Unit, cut: bool) -> dict[str, Skeleton]:
     """Every candidate path by name on the lattice's face toward +x or, with `cut`, on its section.
 
-    All of them run along one column of anchors, where they would cover each other: seen from +x each has its
-    true length and height, in a separate lane. A ranking moves none of them.
+    All of them run along one column of anchors and would cover each other. Seen from +x each has its true
+    length and height, in a separate lane. A ranking moves none of them.
     """
     d = unit.dimensions
     at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0

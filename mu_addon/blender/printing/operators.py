@@ -89,7 +89,7 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
 
 
 def _path_of(root, what):
-    """File or folder for `what`; log and errors are of the latest job."""
+    """File or folder by its name `what`; log and errors are of the latest job."""
     if what in (printing.EXPORT, printing.SPECIMENS, printing.FILE_CHECK):
         return printing.folder_of(root, what)
     if what == "file_report":

@@ -104,7 +104,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
         if marks.mark_objects(root):
             layout.prop(settings, "marker")
             if marks.marked(root) != found.digest:
-                wrapped(layout, "The marks belong to an earlier check: mark again", "INFO")
+                wrapped(layout, "The marks are from an earlier check: mark again", "INFO")
         _directions(layout, settings, found)
         layout.operator("mu.print_open", text="Report", icon="URL").what = "report"
 
@@ -186,12 +186,12 @@ def _directions(layout, settings, found) -> None:
 
 
 def _ml(volume: float) -> str:
-    """A volume in ml in words; one too small to matter has no digits."""
+    """A volume in ml as text; a negligible one has no digits."""
     return f"{volume:.2g} ml" if volume >= 0.01 else "below 0.01 ml"
 
 
 def direction_words(direction) -> str:
-    """A build direction (3,) in the unit's frame in words: "tilted 35° to +x +y"."""
+    """A build direction (3,) in the unit's frame as text: "tilted 35° to +x +y"."""
     length = math.hypot(*direction)
     if not length:
         return "none is set"

@@ -1,4 +1,4 @@
-"""Print settings of a unit, kept on its root object beside its parameters."""
+"""Print settings of a unit, kept on its root object with its parameters."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -84,7 +84,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
     )
     compensate: EnumProperty(
         name="Compensate",
-        description="Whether the print offset is subtracted from the nominal geometry",
+        description="Subtract the print offset from the nominal geometry",
         items=[
             ("none", "Nothing", "Nominal geometry"),
             ("unit", "Print Offsets", "The offsets of this unit, see Print Offsets"),

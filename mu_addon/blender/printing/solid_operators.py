@@ -56,7 +56,9 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
     filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
     quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="export")
     nodes: BoolProperty(
-        name="Lattice Nodes as Text", description="Also write the nodes' coordinates beside it", default=False
+        name="Lattice Nodes as Text",
+        description="Also write the nodes' coordinates into the same folder",
+        default=False,
     )
 
     def invoke(self, context, event):

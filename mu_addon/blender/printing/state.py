@@ -1,6 +1,6 @@
 """Checks, exports and specimens of a unit: the job, folders, findings and files.
 
-A unit has one job for the printer at a time, beside its simulation.
+A unit has one job for the printer at a time, in addition to its simulation.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 CHECK, FILE_CHECK, EXPORT, SPECIMENS = "check", "check-file", "export", "specimens"
-"""Jobs for the printer, and their folders in the unit's study folder; the check of a file has its own."""
+"""Jobs for the printer, and their folders in the unit's study folder; the check of a file has another."""
 NEEDED = ("scipy", "manifold3d", "matplotlib")
 """Modules that these jobs need; STEP also needs gmsh, and reports that itself."""
 MANIFEST = "manifest.json"
@@ -46,7 +46,7 @@ OWN = "own.json"
 
 @attrs.frozen(eq=False)
 class Checked:
-    """Result of a check: check.json and its digest; stale: why it does not belong to the unit now."""
+    """Result of a check: check.json and its digest; stale: why it is not of the present unit."""
 
     folder: Path
     stale: str
@@ -152,7 +152,7 @@ def trouble(root: Any, command: str) -> str:
 
 
 def own_body(root: Any) -> bool:
-    """Return True if the user's own body replaces the lattice's box."""
+    """Return True if a user-defined body replaces the lattice's box."""
     return bool(bodies.fingerprint(root))
 
 
@@ -168,7 +168,7 @@ def write_inputs(root: Any, command: str, folder: Path) -> None:
 
 
 def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    """Check of the unit; one in the user's own body is checked by its STL, which is built first."""
+    """Check of the unit; one in a user-defined body is checked by its STL, which is built first."""
     from ...usecases.check_print.job import LAYOUT, Job
 
     up = tuple(exact(x) for x in root.mu_print.up)
@@ -224,7 +224,7 @@ def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
-    """Write the solid of a unit in the user's own body, and its origin."""
+    """Write the solid of a unit in a user-defined body, and its origin."""
     solid = unit_object.solid_of(root, unit)
     content = stl_bytes(solid.vertices, solid.triangles)
     write_bytes(folder / "own.stl", content)
@@ -267,13 +267,13 @@ def _stale(root: Any, shape: list[str], up: list[float], limits: str) -> str:
     """Return the reason why a check is not of the unit in its present state, or ""."""
     try:
         if _shape(root, to_unit(root.mu_unit)) != shape:
-            return "it belongs to other parameters"
+            return "made with other parameters"
         if printer_text(printer_of(root)) != limits:
-            return "it belongs to another printer"
+            return "made with another printer"
     except MuError as error:
         return error.what
     same = (Vector(up).normalized() - Vector(root.mu_print.up).normalized()).length < 1e-3
-    return "" if same else "it belongs to another build direction"
+    return "" if same else "made with another build direction"
 
 
 def checked_file(root: Any) -> dict[str, Any] | None:
@@ -297,7 +297,7 @@ def checked_file(root: Any) -> dict[str, Any] | None:
 
 @attrs.frozen(eq=False)
 class Exported:
-    """Manifest of an export; stale: why it does not belong to the unit now."""
+    """Manifest of an export; stale: why it is not of the present unit."""
 
     folder: Path
     stale: str
@@ -322,4 +322,4 @@ def exported(root: Any) -> Exported | None:
         same = _shape(root, to_unit(root.mu_unit)) == of
     except MuError:
         same = False
-    return Exported(path.parent, "" if same else "they belong to other parameters", found)
+    return Exported(path.parent, "" if same else "made with other parameters", found)

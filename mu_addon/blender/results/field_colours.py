@@ -25,8 +25,7 @@ STOPS = (
     (0.678, 0.864, 0.190),
     (0.993, 0.906, 0.144),
 )
-"""Initial colours of the ramp, sRGB; the user may change them, and the legend follows. Those of the map of
-reports, written out: a window would stand still while matplotlib is imported."""
+"""Initial colours of the ramp, sRGB, which the user may change; as numbers, since matplotlib loads slowly."""
 TABLE = 128
 """Number of distinct colours in solid shading."""
 COLOUR = "mu_field_colour"
@@ -41,7 +40,7 @@ class Field:
     """A field: its attribute, its name, its unit and its description.
 
     amount: colours begin at 0; rare: percent of its values, at either end, that the range ignores; spots: 0
-    but for few locations, which alone set the range.
+    except at few locations, which alone set the range.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Key to a motion's colours, drawn over the viewport: ramp, values, unit, time and pressure.
 
-Names stand above the shown objects. It is drawn with the viewport and is not part of a render; if the legend
-is in the scene (`legend_object`), only names are drawn.
+Names are drawn above the shown objects. It is drawn with the viewport and is not part of a render; if the
+legend is in the scene (`legend_object`), only names are drawn.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def lines(root: Any, motion: Any, scene: Any) -> list[str]:
         found.append(f"{contact.name}: {force:.2f} N")
     findings = studies.findings(root)
     if findings is None or findings.stale:
-        found.append("stale: belongs to other parameters")
+        found.append("stale: of other parameters")
     elif findings.caveat:
         found.append(findings.caveat.partition(":")[0])
     return found
@@ -99,13 +99,13 @@ def subject(context: Any) -> Any | None:
 
 
 def beside_tools(area: Any) -> float:
-    """Width in pixels of the toolbar over the viewport's left, 0 where there is none."""
+    """Width in pixels of the toolbar over the viewport's left, 0 without one."""
     tools = next((region for region in area.regions if region.type == "TOOLS"), None)
     return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
 
 
 def field_ramp(root: Any, ends: tuple[float, float], scale: float, left: float) -> None:
-    """Draw a unit's ramp with the values of a range beside it, `left` pixels from the view's left."""
+    """Draw a unit's ramp with the values of a range, `left` pixels from the view's left."""
     low, high = ends
     if high > low:
         marks = [((value - low) / (high - low), f"{value:.4g}") for value in ticks(low, high)]

@@ -1,7 +1,7 @@
 """The legend as objects in the scene, so that renders have it: a ramp, its values, unit, time and pressure.
 
-A bar beside the unit, a child of its root, with texts; a user may move, turn or scale it. Its colours are the
-field material's ramp, unlit, so that light does not change them.
+A bar next to the unit, a child of its root, with texts; a user may move, rotate or scale it. Its colours are
+the field material's ramp, unlit, so that light does not change them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from . import field_colours, legend
 from . import motion as motion_parts
 
 BAR, HEAD, TICK = "bar", "head", "tick"
-"""Roles of the legend's objects: its bar, the text above it, or a value beside it."""
+"""Roles of the legend's objects: its bar, the text above it, or a value next to it."""
 WIDTH, TEXT = 0.08, 0.065
 """Width of the bar and height of its letters, in heights of the bar."""
 # Read from +x with z up: the side from which a cut unit shows its inside.
@@ -36,7 +36,7 @@ def bar_of(root: Any) -> Any | None:
 
 
 def show(root: Any) -> Any:
-    """Put a legend beside the shown objects, or update it; raises InputError without a motion."""
+    """Put a legend next to the shown objects, or update it; raises InputError without a motion."""
     motion = motion_parts.motion_of(root)
     if motion is None or not motion_parts.parts(root):
         raise InputError("no motion is shown, so no colours", "On the Model", "show a motion first")

@@ -1,9 +1,9 @@
 """A study's motion in the scene: objects that deform on the timeline and carry its fields.
 
-The first one replaces the unit's design in its own place, the others stand beside it. Positions come from
-point caches in the study folder, which Blender plays by itself; the fields of the frame are written before it
-is drawn. An object is a child of the unit's root and identified by the custom property `mu_motion_part`:
-"NAME|BODY", NAME a path or model_a, BODY one of `REGIONS` or `PRINT`; and by `mu_run`, of which run.
+The first one replaces the unit's design, the others are next to it. Positions come from point caches in the
+study folder, which Blender plays; the fields of the frame are written before it is drawn. An object is a
+child of the unit's root and identified by two custom properties: `mu_motion_part` "NAME|BODY", with NAME a
+path or model_a and BODY one of `REGIONS` or `PRINT`; and `mu_run`, its run.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def parts(root: Any) -> list[Any]:
 
 
 def shown(root: Any) -> list[tuple[str, str]]:
-    """Pairs (name, `mesh` or `print`) that are shown, Model A first, each beside the one before."""
+    """Pairs (name, `mesh` or `print`) that are shown side by side, Model A first."""
     found = {_pair(part) for part in parts(root)}
     return sorted(found, key=lambda pair: (pair[0] != MODEL_A, len(pair[0]), pair[0], pair[1]))
 
@@ -150,9 +150,9 @@ def _follow(uuid: str) -> None:
 
 
 def arrange(root: Any) -> None:
-    """Put the first motion in the unit's place, the others beside it, opposite to the bending direction.
+    """Put the first motion in the unit's place, the others next to it, opposite to the bending direction.
 
-    With `on_unit` off, all of them stand beside the design.
+    With `on_unit` off, all of them are next to the design.
     """
     motion = motion_of(root)
     if motion is None:
@@ -182,7 +182,7 @@ def _see(root: Any) -> None:
 
 
 def is_seen(root: Any, part: Any) -> bool:
-    """Return True if a part is visible, by itself or in the unit's place."""
+    """Return True if a part is visible, as an object or in the unit's place."""
     if part.get(displays.ON_UNIT):
         return bool(unit_object.shows_result(root) and root.visible_get())
     return bool(part.visible_get())
@@ -236,7 +236,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
 
 
 _prints: dict[tuple[str, str], Played] = {}
-"""Fields of printed bodies, by object and unit: they belong to a solid, which may change."""
+"""Fields of printed bodies, by object and unit: they depend on a solid, which may change."""
 
 
 def vertices_of(mesh: Any) -> Any:
@@ -274,7 +274,7 @@ def _plays(part: Any, file: Path) -> bool:
 
 
 def play(part: Any, file: Path, step_s: float) -> None:
-    """Let an object play a point cache of its vertices, samples `step_s` apart, in its own time."""
+    """Let an object play a point cache of its vertices, samples `step_s` apart, in its time."""
     modifier = part.modifiers.get("Motion") or part.modifiers.new("Motion", "MESH_CACHE")
     modifier.cache_format = "PC2"
     modifier.filepath = studies.relative(file)
@@ -290,7 +290,7 @@ def step_of(file: Path) -> float:
 
 
 def _keep_time(part: Any, step_s: float, scene: Any) -> None:
-    """Let a part play its cache in its own time at the scene's frame rate.
+    """Let a part play its cache in its time at the scene's frame rate.
 
     Blender takes sample number `frame_scale` frame - `frame_start`; its mode in seconds divides by the rate
     twice.
@@ -342,7 +342,7 @@ def _fields_of(motion: Motion, name: str, region: str, skin: Skin) -> dict[str, 
 def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
     """Data of a played part, from memory or from the files; None if they are gone or of another mesh.
 
-    motion: that of the root, where the caller has asked for it already.
+    motion: that of the root, if the caller has it already.
     """
     motion = motion or motion_of(root)
     if motion is None:
@@ -370,7 +370,7 @@ def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
 
 
 def _replayed(root: Any, part: Any, motion: Motion) -> Played | None:
-    """Fields of a printed body; after a file was loaded, from its own vertices."""
+    """Fields of a printed body; after a file was loaded, from its vertices."""
     key = part.name_full, root.mu_unit.uuid
     kept = _prints.get(key)
     if kept is None or kept.motion is not motion:

@@ -118,7 +118,7 @@ class MU_OT_motion_range(MotionOperator, bpy.types.Operator):
 
 
 class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
-    """Add the legend to the scene beside the unit, so that renders show it, or remove it"""
+    """Add the legend to the scene next to the unit, so that renders show it, or remove it"""
 
     bl_idname = "mu.motion_legend"
     bl_label = "Legend in Renders"

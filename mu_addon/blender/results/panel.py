@@ -30,7 +30,7 @@ PICTURE = 13.0
 
 
 def _of(name: str) -> str:
-    """Owner of a motion, in words."""
+    """Owner of a motion, as text."""
     return "Without a sensor" if name == MODEL_A else f"Path {path_symbol(name)}"
 
 

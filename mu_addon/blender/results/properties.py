@@ -1,4 +1,4 @@
-"""Display of a unit's motion, kept on its root object, beside its parameters."""
+"""Display of a unit's motion, kept on its root object with its parameters."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
@@ -92,7 +92,7 @@ class MU_PG_motion(bpy.types.PropertyGroup):
     )
     on_unit: BoolProperty(
         name="On the Unit",
-        description="Show the first motion in the unit's own place instead of beside the design",
+        description="Show the first motion in place of the design instead of next to it",
         default=True,
         update=_on_unit,
     )

@@ -16,9 +16,9 @@ from ..simulate import study_folder as studies
 
 _motions: FileCache[Motion] = FileCache()
 _apart: dict[Any, tuple[Motion, Motion, Any, str]] = {}
-"""By both folders, motion and cut: both motions, the distances, and words on them."""
+"""By both folders, motion and cut: both motions, the distances, and a text on them."""
 _words: dict[str, str] = {}
-"""By UUID of the unit: words on the last difference."""
+"""By UUID of the unit: text on the last difference."""
 
 
 def motion_of(root: Any) -> Motion | None:
@@ -94,7 +94,7 @@ def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
 
 
 def difference_words(root: Any) -> str:
-    """Words on the difference to another run: why there is none, or how much."""
+    """Text on the difference to another run: its size, or why there is none."""
     return _words.get(root.mu_unit.uuid, "")
 
 

@@ -18,7 +18,7 @@ from ..unit.fields import path_symbol, sentence
 from . import runs
 
 ROWS = 4
-"""Number of runs that the list shows at once."""
+"""Number of runs that the list shows."""
 COLUMN = 8
 """Letters in a line of a column of the comparison."""
 
@@ -60,7 +60,7 @@ def found_in(run) -> str:
 
 
 def draw_runs(layout, root) -> None:
-    """Draw every run of a unit, the latest first, and when the shown one ended; nothing without runs."""
+    """Draw every run of a unit, the latest first, and the end time of the shown one; nothing without runs."""
     run, every = studies.shown_run(root), studies.runs_of(root)
     if not every:
         return
@@ -80,7 +80,7 @@ def draw_runs(layout, root) -> None:
 
 
 class MU_PT_comparison(UnitPanel, bpy.types.Panel):
-    """The shown run beside another one: parameters that differ, angles, J, time"""
+    """Compare the shown run with another one: parameters that differ, angles, J, time"""
 
     bl_idname = "MU_PT_comparison"
     bl_parent_id = "MU_PT_results"

@@ -1,7 +1,7 @@
-"""Folders of runs when the file is saved: moved beside it, and found again from another place.
+"""Folders of runs when the file is saved: moved next to it, and found again after moving the file.
 
-A unit or a gripper of a file that was never saved keeps its runs in the user's own folder. Saving moves them
-beside the file, which stores a relative path. Saving elsewhere leaves them in place and changes that path.
+A unit or a gripper of a file that was never saved keeps its runs in the user's folder. Saving moves them next
+to the file, which stores a relative path. Saving elsewhere leaves them in place and changes that path.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _after_save(*_: Any) -> None:
 
 
 def _moved(root: Any, old: Path, blend: Path) -> Path:
-    """The folder beside the file, if it could be moved there; else its present place."""
+    """The folder next to the file, if it could be moved there; else its present place."""
     new = studies.beside(blend, old.name)
     try:
         if not unit_runs.move_home(old, new):

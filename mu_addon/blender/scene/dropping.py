@@ -1,6 +1,6 @@
 """Files dropped into a view: a unit or a node tree as TOML, a closed surface as envelope or obstacle.
 
-If several of Blender's own importers take a file, too, Blender asks which.
+If Blender's importers also accept a file, Blender asks for one.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.

@@ -1,8 +1,8 @@
-"""Repair after Blender's own gestures: duplicates, deletions, hiding, collections, units.
+"""Repair after Blender's gestures: duplicates, deletions, hiding, collections, units.
 
-Gestures ignore units. After each one this module checks all of them, once, and repairs what is wrong. It
-writes nothing if nothing is wrong, so that its own changes cause only one further check. Undo and redo
-restore states from before a repair; the same check follows them.
+Gestures ignore units. After each gesture this module checks all units, once, and repairs faults. It writes
+nothing without a fault, so that its changes cause only one further check. Undo and redo restore states from
+before a repair; the same check follows them.
 """
 
 from __future__ import annotations

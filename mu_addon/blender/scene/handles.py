@@ -69,12 +69,12 @@ HANDLES = {
         "", "", lambda d: ((0.0, 0.0, -d.inlet_length - d.cell), (0.0, 0.0, 1.0)), 1.0, (0.95, 0.3, 0.6)
     ),
 }
-"""A cell is one of `count` along the unit, by which its end moves: a gain of 0 stands for that."""
+"""A cell is one of `count` along the unit, by which its end moves: a gain of 0 denotes that."""
 ITEMS = [
     ("wall", "Wall", "Thickness of the chambers' wall"),
     ("bladder", "Bladder Ø", "Diameter of the bladders, with the cell that they are tied to"),
     ("cell", "Cell", "Cell of the lattice, with the bladders that are tied to it"),
-    (PRESSURE, "Pressure", "Pressure of the shown motion: goes to its frame"),
+    (PRESSURE, "Pressure", "Pressure of the shown motion: jumps to its frame"),
 ]
 
 
@@ -124,7 +124,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
     bl_label = "Drag"
     bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR"}
 
-    what: EnumProperty(name="What", description="What the mouse changes", items=ITEMS)
+    what: EnumProperty(name="What", description="Quantity that the mouse changes", items=ITEMS)
 
     @classmethod
     def description(cls, context, properties):
@@ -289,7 +289,7 @@ class MU_WT_size(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context, layout, tool):
-        """Draw what the mouse changes, and its value."""
+        """Draw the quantity that the mouse changes, and its value."""
         chosen = tool.operator_properties("mu.drag")
         layout.row(align=True).prop(chosen, "what", expand=True)
         root = unit_object.active_root(context)

@@ -1,4 +1,4 @@
-"""Position of a new unit or gripper: at the 3D cursor or, if something is there, beside it."""
+"""Position of a new unit or gripper: at the 3D cursor or, if it is occupied, next to it."""
 
 from __future__ import annotations
 

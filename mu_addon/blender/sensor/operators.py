@@ -96,7 +96,7 @@ class MU_OT_sensor_disconnect(UnitOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_pause(SessionOperator, bpy.types.Operator):
-    """Release the port for another program, or open it again; the session goes on"""
+    """Release the port for another program, or open it again; the session continues"""
 
     bl_idname = "mu.sensor_pause"
     bl_label = "Release Port"
@@ -126,7 +126,7 @@ class MU_OT_sensor_mark(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_freeze(UnitOperator, bpy.types.Operator):
-    """Freeze the plot, or resume it; recording goes on in any case"""
+    """Freeze the plot, or resume it; recording continues in any case"""
 
     bl_idname = "mu.sensor_freeze"
     bl_label = "Freeze"
@@ -256,7 +256,7 @@ class MU_OT_sensor_zero(SessionOperator, bpy.types.Operator):
 
 
 class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
-    """Show or hide the simulated unit beside the design, bent to the sensor's angle"""
+    """Show or hide the simulated unit next to the design, bent to the sensor's angle"""
 
     bl_idname = "mu.sensor_twin"
     bl_label = "Show Twin"
@@ -269,7 +269,7 @@ class MU_OT_sensor_twin(MotionOperator, bpy.types.Operator):
 
 
 def _path_of(root, what):
-    """File or folder for `what`."""
+    """File or folder by its name `what`."""
     session = sensor.of(root)
     if what == "recording":
         return session.watched.folder if session else studies.folder_of(root) / sensor.RECORDINGS

@@ -225,7 +225,7 @@ def _twin(layout, root):
         wrapped(body, words, {twin.LIVE: "CHECKMARK", twin.OUTSIDE: "ERROR"}.get(state, "INFO"))
         found = studies.findings(root)
         if found is not None and found.stale:
-            wrapped(body, "Its motion belongs to other parameters: simulate again", "ERROR")
+            wrapped(body, "Its motion is of other parameters: simulate again", "ERROR")
 
 
 CLASSES = (MU_PT_sensor,)

@@ -61,7 +61,7 @@ class Session:
     child: Child
     watched: Watched
     traces: Traces | None = None
-    """Channels and angles over the last seconds; None until the channels are known, or to start anew."""
+    """Channels and angles over the last seconds; None until the channels are known, or to restart."""
     frozen: Traces | None = None
     """Content of the frozen plot."""
     ranges: dict[str, tuple[float, float]] = attrs.field(factory=dict)

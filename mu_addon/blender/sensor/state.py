@@ -63,7 +63,7 @@ def others(root: Any) -> list[str]:
 
 
 def find_ports() -> list[tuple[str, str]]:
-    """Look for serial ports: pairs of name and words; raises InputError without pyserial."""
+    """Look for serial ports: pairs of name and description; raises InputError without pyserial."""
     from ...sensing.sources import ports
 
     _found_ports[:] = [(p.identity or p.device, f"{p.description}, {p.device}") for p in ports()]
@@ -129,7 +129,7 @@ def chosen(root: Any) -> tuple[str, str | float]:
 
 
 def calibration_file(root: Any) -> Path:
-    """File of the applied calibration: the one the user chose, else the unit's own."""
+    """File of the applied calibration: the one the user chose, else the unit's."""
     chosen_file = root.mu_sensor.calibration
     if chosen_file:
         return Path(bpy.path.abspath(chosen_file))
@@ -137,7 +137,7 @@ def calibration_file(root: Any) -> Path:
 
 
 def calibration(root: Any) -> tuple[Any, str]:
-    """The unit's calibration or None, and why there is none; read again only when its file changes."""
+    """The unit's calibration, or None and the reason; read again only when its file changes."""
     path = calibration_file(root)
     known = _calibrations.read([path], lambda: _read_calibration(path))
     return known or (None, f"There is no {path}" if root.mu_sensor.calibration else "")

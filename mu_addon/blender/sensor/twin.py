@@ -1,4 +1,4 @@
-"""The twin: the simulated unit, beside the design, bent to the angle of the real sensor.
+"""The twin: the simulated unit, next to the design, bent to the angle of the real sensor.
 
 It moves between Model A's states and never beyond them. A signal outside the calibration or the simulated
 motion leaves the last pose, in red, with the reason above it.
@@ -76,7 +76,7 @@ def _shape(root: Any) -> _Shape:
 
 
 def show(root: Any) -> None:
-    """Put the twin beside the unit, on the side that it bends to, at rest. Raises InputError."""
+    """Put the twin next to the unit, on the side that it bends to, at rest. Raises InputError."""
     shape = _shape(root)
     hide(root)
     wide = float(np.ptp(shape.motion.mesh.nodes[:, 1]))

@@ -1,8 +1,8 @@
-"""Effects named by a diagnosis beside a unit's parameters, kept with the unit for its next simulation.
+"""Effects named by a diagnosis that are no parameters, kept with the unit for its next simulation.
 
-They are stored as the diagnosis wrote them, a model.toml of these effects alone, with the interval of each
-parameter: a text on the unit's root, so that undo, copies and the .blend file need no handling. It is read
-without the simulator's packages, which a Blender may lack.
+They are stored as a model.toml of these effects alone, with the interval of each parameter. It is a text on
+the unit's root, so that undo, copies and the .blend file need no handling. It is read without the simulator's
+packages, which a Blender may lack.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Folders of a unit's runs, the shown one, and whether it belongs to the unit's present design."""
+"""Folders of a unit's runs, the shown run, and its comparison with the present design."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Findings:
 
     @property
     def caveat(self) -> str:
-        """Known error of the run's model, in words; empty for printed struts on the default mesh."""
+        """Known error of the run's model, as text; empty for printed struts on the default mesh."""
         if not self.run.printed:
             return CONTINUUM
         return COARSE.format(self.run.refine) if self.run.refine < REFINE.default else ""
@@ -70,16 +70,16 @@ class ContactForce:
 
 
 def folder_of(root: Any) -> Path:
-    """The unit's own folder, with its runs and everything else made of it.
+    """The unit's folder, with its runs and all other results.
 
-    The one that it names, else one beside the .blend file, else one in the user's own folder.
+    The one that it names, else one next to the .blend file, else one in the user's folder.
     """
     props = root.mu_unit
     return default_folder(props.study.folder, props.title, props.uuid)
 
 
 def default_folder(named: str, title: str, uuid: str) -> Path:
-    """The named folder, else one for a title beside the .blend file, else in the user's own."""
+    """The named folder, else one for a title next to the .blend file, else in the user's folder."""
     if named:
         return Path(bpy.path.abspath(named))
     name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', title).strip('-.') or 'unit'}-{uuid[:8]}"
@@ -89,7 +89,7 @@ def default_folder(named: str, title: str, uuid: str) -> Path:
 
 
 def beside(blend: Path, name: str) -> Path:
-    """Folder of a unit, by its own name, beside a .blend file."""
+    """Folder of a unit, by its name, next to a .blend file."""
     return blend.with_name(f"{blend.stem}.mu") / name
 
 
@@ -157,7 +157,7 @@ def choose(root: Any, run: Run) -> None:
 
 
 def remember(root: Any) -> None:
-    """Store which run is shown, so that it stays while the unit has none of its own."""
+    """Store the shown run, so that it stays while the unit has no run."""
     run, study = shown_run(root), root.mu_unit.study
     if run is not None and study.run != run.key:
         study.run, study.run_design = run.key, ""

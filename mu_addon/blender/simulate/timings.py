@@ -26,7 +26,7 @@ def _file() -> Path:
 
 
 def _every() -> dict[str, Any]:
-    """What the file holds, by refinement of the mesh."""
+    """Content of the file, by refinement of the mesh."""
     path = _file()
     return _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
 

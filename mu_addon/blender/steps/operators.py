@@ -51,7 +51,7 @@ def _annotations(step: Step) -> dict:
 
 
 class _OfStep(UnitOperator):
-    """Sets a step's own parameters, as far as they are given, and runs the step again."""
+    """Sets the given parameters of a step, and runs the step again."""
 
     bl_options = {"REGISTER", "UNDO"}
     step: Step
@@ -142,7 +142,7 @@ class MU_OT_mute(UnitOperator, bpy.types.Operator):
         description="Step of the design",
         items=[(step.name, step.name.capitalize(), step.muting) for step in STEPS.values() if step.muting],
     )
-    muted: BoolProperty(name="Mute", description="Whether the step is left out", default=True)
+    muted: BoolProperty(name="Mute", description="Leave the step out", default=True)
 
     def act(self, context, root):
         with updates.paused():

@@ -49,7 +49,7 @@ def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
 
 
 def own_parameters(step: Step) -> list[tuple[str, str]]:
-    """(section, name) of a step's own parameters."""
+    """(section, name) of a step's parameters."""
     return [(section, name) for section, name in (path.split(".") for path in step.own)]
 
 

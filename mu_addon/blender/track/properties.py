@@ -140,7 +140,7 @@ class MU_PG_bench(bpy.types.PropertyGroup):
 
 
 def missing(clip: Any) -> str:
-    """Missing settings of a clip before it can be measured, in words; "" if it is complete."""
+    """Missing settings of a clip before it can be measured, as text; "" if it is complete."""
     bench, names = clip.mu_bench, {track.name for track in clip.tracking.tracks}
     if len(names) < 2:
         return "Place markers first: Ctrl-click them in the clip, two on the base and two on the tip"

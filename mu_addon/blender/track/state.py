@@ -1,4 +1,4 @@
-"""Markers tracked by Blender's own movie clip tracker, in an open editor or without a window."""
+"""Markers tracked by Blender's movie clip tracker, in an open editor or without a window."""
 
 from __future__ import annotations
 

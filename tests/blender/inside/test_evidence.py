@@ -111,8 +111,8 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
     assert not bpy.ops.mu.evidence_apply.poll()
     table = blocks / "block_1.csv"
     table.write_text(table.read_text().replace("0.1,", "0.11,"))
-    assert "Stale: it belongs to other measured data" in drawn()
-    stale = "The diagnosis is stale: it belongs to other measured data"
+    assert "Stale: made with other measured data" in drawn()
+    stale = "The diagnosis is stale: made with other measured data"
     assert stale in refused(bpy.ops.mu.evidence_apply)
 
 
@@ -316,7 +316,7 @@ def test_motion_is_kept_undone_replaced_and_leaves_nothing_behind(tmp_path, clog
     assert "measured" in evidence_motion.reading(root, bpy.context.scene)[1]
     # Other parameters: what was predicted for the unit as it was is not shown any more.
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "Stale: it belongs to other parameters" in drawn()
+    assert "Stale: made with other parameters" in drawn()
     assert bpy.ops.mu.evidence_motion(experiment=first.name) == {"FINISHED"}
     assert {mark.partition("|")[0] for mark in parts(root)} == {"", "measured"}
     assert bpy.ops.mu.evidence_motion(experiment="") == {"FINISHED"}

@@ -202,26 +202,26 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     bpy.ops.mu.print_marks()
     root.mu_unit.chambers.wall_mm = 1.0  # a rebuild leaves them, and the panel says that they are old
     assert len(marks.mark_objects(root)) == 3
-    assert "Stale: it belongs to other parameters" in drawn()
+    assert "Stale: made with other parameters" in drawn()
     assert "The check is stale" in refused(bpy.ops.mu.print_marks)
     root.mu_unit.chambers.wall_mm = 0.9
     write_check(root, [finding("cup", "warning", [[0, 0, 0]])])
-    assert "marks belong to an earlier check" in drawn().replace("  ", " ")
+    assert "marks are from an earlier check" in drawn().replace("  ", " ")
     assert bpy.ops.mu.print_clear() == {"FINISHED"}
     assert not marks.mark_objects(root)
 
     assert bpy.ops.mu.print_up(direction=(0.6, 0, 0.8)) == {"FINISHED"}
-    assert "Stale: it belongs to another build direction" in drawn()
+    assert "Stale: made with another build direction" in drawn()
     bpy.ops.mu.print_up()
     assert "Stale" not in drawn()
     bpy.ops.mu.path(name="alpha4")
-    assert "Stale: it belongs to other parameters" in drawn()
+    assert "Stale: made with other parameters" in drawn()
     bpy.ops.mu.path(name="none")
     own = tmp_path / "mine.toml"
     text = (printing.folder_of(root, "check") / "printer.toml").read_text()
     own.write_text(text.replace("value = 0.6", "value = 0.8"))
     root.mu_print.printer, root.mu_print.printer_file = "own", str(own)
-    assert "Stale: it belongs to another printer" in drawn()
+    assert "Stale: made with another printer" in drawn()
     assert bpy.ops.mu.print_check.poll()
     own.write_text(text.replace("value = 0.6", "value = -1"))
     assert "is not a number above zero" in refused(bpy.ops.mu.print_check)
@@ -230,7 +230,7 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     sheet.write_text("limit,sizes,measured\nwall_mm,0.2 0.9,0.5\n")
     root.mu_print.limits_file = str(sheet)
     assert printing.printer_of(root)["wall_mm"] == 0.5
-    assert "Stale: it belongs to another printer" in drawn()
+    assert "Stale: made with another printer" in drawn()
     sheet.write_text("limit,sizes,measured\nwall_mm,0.2 0.9,5.0\n")
     assert "the part has 0.2 to 0.9" in refused(bpy.ops.mu.print_check)
 
@@ -281,7 +281,7 @@ def test_an_export_as_chosen(tmp_path):
     assert "Done in" in texts
     assert "Stale: they belong" not in texts
     root.mu_unit.chambers.wall_mm = 1.0
-    assert "Stale: they belong to other parameters" in drawn()
+    assert "Stale: made with other parameters" in drawn()
     manifest = printing.exported(root).folder / "manifest.json"
     whole = manifest.read_text()
     manifest.write_text("{}")
@@ -446,7 +446,7 @@ def test_a_body_of_ones_own_is_checked_by_its_solid():
     assert not found.stale, child.error
     assert abs(found.found["figures"]["x_mm"] - 40.0) < 0.1
     bpy.ops.mu.body_remove()
-    assert "Stale: it belongs to other parameters" in drawn()
+    assert "Stale: made with other parameters" in drawn()
 
 
 def test_the_words_of_a_direction_fit_beside_their_button():

@@ -49,7 +49,7 @@ def no_assets() -> Iterator[None]:
 
 
 def _build(tree, asked: Group) -> None:
-    """Build a group anew; modifiers that use it keep their values, by the name of the input."""
+    """Rebuild a group; modifiers that use it keep their values, by the name of the input."""
     users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
     kept = [modifier_inputs(modifier) for modifier in users]
     tree.nodes.clear()

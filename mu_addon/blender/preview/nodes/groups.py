@@ -11,9 +11,9 @@ from .wiring import Wiring
 
 
 class Group(NamedTuple):
-    """A node group: its name and version, its description as an asset, what builds it, groups that it uses.
+    """A node group: its name and version, its description as an asset, its builder, groups that it uses.
 
-    build: fills an empty tree; it is given the tree and the groups of `uses`. A higher version is built anew.
+    build: fills an empty tree; it is given the tree and the groups of `uses`. A higher version is rebuilt.
     """
 
     name: str
@@ -155,11 +155,11 @@ LABELLED = Group(
     _labelled,
     (TUBES.name,),
 )
-"""A tube with its name beside its lower end: candidate paths, which a click on tube or name selects."""
+"""A tube with its name next to its lower end: candidate paths, which a click on tube or name selects."""
 COLOUR_FIELD = Group(
     "MU Colour Field",
     1,
     "Scales a point attribute from a range to 0 .. 1 and stores it as `mu_colour`, for a material's ramp",
     _colour_field,
 )
-"""A physical value at the points, scaled to 0 .. 1 for a colour ramp; the value itself stays as it is."""
+"""A physical value at the points, scaled to 0 .. 1 for a colour ramp; the value itself is unchanged."""

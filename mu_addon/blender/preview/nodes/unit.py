@@ -1,7 +1,7 @@
 """A unit's one mesh, skinned: struts as tubes, anchors as balls, everything else unchanged.
 
-Or, on the unit itself, the objects that play a study's motion in its place, so that a click on them selects
-the unit, and moving the unit moves them.
+Or, on the unit itself, the objects that play a study's motion in its place. A click on them selects the unit,
+and moving the unit moves them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A square bar along a user's own curves, with wells in one face at a constant pitch."""
+"""A square bar along a user's curves, with wells in one face at a constant pitch."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TEXT = (
 
 
 def _build(tree) -> None:
-    """A square swept along the curve; boxes at every pitch, cut out of it or shown in it.
+    """A square swept along the curve, with boxes at every pitch, cut out of it or shown in it.
 
     The wells rotate with the curve's normal; their number follows its length.
     """

@@ -31,7 +31,7 @@ class Wiring:
         return self._inputs.outputs[name]
 
     def node(self, kind: str, settings: dict[str, Any] | None = None, **inputs: Any):
-        """Add a node; `settings` are its own, `inputs` values or sockets to link from.
+        """Add a node; `settings`: of the node; `inputs`: values, or sockets to link from.
 
         A name in `inputs` has _ for a space; False_ and True_ are the sockets of a switch.
         """
@@ -70,7 +70,7 @@ class Wiring:
     def smooth(self, mesh: Any, selection: Any = None):
         """The mesh, shaded smooth; the node's first input is called Geometry before 5.0 and Mesh since.
 
-        selection: a socket that says of which faces; the others are flat, with sharp edges around them.
+        selection: a socket that selects faces; the others are flat, with sharp edges around them.
         """
         node = self.node("GeometryNodeSetShadeSmooth")
         self.tree.links.new(mesh, node.inputs[0])
