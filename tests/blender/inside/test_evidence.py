@@ -157,7 +157,7 @@ def applied(folder, clogged):
     unit = to_unit(root.mu_unit)
     assert not effects.named_effects(root)
     assert "With named effects" not in drawn(panels.MU_PT_simulate)
-    assert "no effects beside" in refused(bpy.ops.mu.evidence_remove)
+    assert "no effects in addition" in refused(bpy.ops.mu.evidence_remove)
     bpy.ops.ed.undo_push(message="diagnosed")
     assert bpy.ops.mu.evidence_apply() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="applied")
