@@ -59,10 +59,10 @@ def add(commands: Commands[Any]) -> None:
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Design the gripper and simulate its grasp."""
     from ..design.gripper import load_gripper, read_gripper
-    from ..usecases.grip.grasp import Cube
     from ..usecases.grip.job import Job, detailed
     from ..usecases.grip.phases import read_phases, shipped_phases
     from ..usecases.grip.run import USE_CASE
+    from ..usecases.grip.settings import Cube
 
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)

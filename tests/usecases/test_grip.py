@@ -20,10 +20,11 @@ from mu_addon.files import read_npz
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.pc2 import read_pc2
-from mu_addon.usecases.grip.grasp import Cube, Grip, grasp
+from mu_addon.usecases.grip.grasp import grasp
 from mu_addon.usecases.grip.motion_files import even, write_halves
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
+from mu_addon.usecases.grip.settings import Cube, Grip
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from tests.headless.processes import homogenised
 

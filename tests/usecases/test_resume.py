@@ -31,7 +31,7 @@ from mu_addon.usecases.fit_material import job as fit
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
-from mu_addon.usecases.grip.grasp import Cube, Grip
+from mu_addon.usecases.grip.settings import Cube, Grip
 from mu_addon.usecases.homogenize import job as homogenize
 from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.optimize import job as optimize

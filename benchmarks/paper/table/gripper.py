@@ -29,8 +29,8 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.batch import CandidateBatch
 from mu_addon.placement.candidates import candidate_paths, evaluation, moved_points, roi, with_sensor
 from mu_addon.run.cache import Cache, key
-from mu_addon.usecases.grip.grasp import Cube, Grip, obstacle_of
-from mu_addon.usecases.grip.settings import SIDES
+from mu_addon.usecases.grip.grasp import obstacle_of
+from mu_addon.usecases.grip.settings import SIDES, Cube, Grip
 from mu_addon.usecases.simulate_and_place.job import grasp
 
 from ..inclusion_rules import RULES, sensor_share

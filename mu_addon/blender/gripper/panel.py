@@ -7,7 +7,7 @@ import bpy
 from ...design.gripper import SECTIONS
 from ...design.quantity import describe
 from ...usecases.grip.phases import WORDS
-from ..jobs.panel import job_state, start_button
+from ..jobs.panel import job_state, start_button, timed
 from ..shared.panels import RootPanel, alert, wrapped
 from ..unit.fields import field
 from . import object as gripper_object
@@ -67,7 +67,8 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
             column.prop(props, "friction")
             layout.prop(props, "self_contact")
         child = grasps.GRASP.child(root)
-        start_button(layout, child, "mu.grasp", "PLAY")
+        name = "Make the Part" if props.detail == "part" else "Grasp"
+        start_button(layout, child, "mu.grasp", "PLAY", text=timed(name, grasps.announced(root)))
         job_state(layout, child, "see below", JOB)
         found = grasps.of(root)
         if found is None:

@@ -15,9 +15,12 @@ from ...errors import MuError
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import write_run
 from ...run.progress_estimate import Plan
+from ...usecases.grip.expected import GRASP_OF, expected_plan, stage_of
+from ...usecases.grip.settings import COARSE_REFINE, COARSE_STEP_S, REFINE, STEP_S
 from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
+from ..simulate import timings
 from ..unit.fields import exact
 from . import object as gripper_object
 from .properties import to_gripper
@@ -32,20 +35,52 @@ def folder_of(root: Any) -> Path:
     return studies.default_folder(props.folder, props.title, props.uuid)
 
 
-def _plan_of(root: Any) -> Plan:
-    from ...usecases.grip.job import plan_of
+def plan_of(root: Any) -> Plan:
+    """Expected stages of the gripper's job, with the seconds of each."""
+    return _expected(root)[0]
 
-    return plan_of(job_of(root))
+
+def announced(root: Any) -> tuple[float, bool]:
+    """Expected seconds of the gripper's job, and True if its grasp was measured on this machine."""
+    plan, known = _expected(root)
+    return sum(seconds for _, seconds in plan), known
 
 
-GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True, plan_of=_plan_of)
+def _expected(root: Any) -> tuple[Plan, bool]:
+    """The plan, and True if measured: a grasp of such detail, of this cube if there was one, else of any."""
+    props = root.mu_gripper
+    sides = [_side(props)] if props.detail != "part" else []
+    coarse = props.detail == "quick"
+    refine, step_s = (COARSE_REFINE, COARSE_STEP_S) if coarse else (REFINE.default, STEP_S)
+    taken = timings.measured(_detail(refine, step_s, props.self_contact))
+    grasped = [seconds for name, seconds in taken.items() if name.startswith(GRASP_OF)]
+    if grasped:
+        taken = {**{stage_of(side): grasped[-1] for side in sides}, **taken}
+    plan = [(name, taken.get(name, s)) for name, s in expected_plan(sides, refine, step_s, True)]
+    return plan, "solid" in taken and (not sides or bool(grasped))
+
+
+def _detail(refine: float, step_s: float, self_contact: bool) -> str:
+    return f"grasp {refine:g} {step_s:g}{' apart' * self_contact}"
+
+
+def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
+    """Detail of a finished grasp, and the seconds of its stages."""
+    asked = parse_toml(file_text(folder / "grip.toml"), "grip.toml")
+    summary = parse_json(file_bytes(folder / "summary.json"), "summary.json")
+    detail = _detail(asked["mesh"]["refine"], asked["grip"]["step_s"], asked.get("self_contact", False))
+    return detail, summary["seconds"]
+
+
+GRASP = JobKind("grip", lambda root: root.mu_gripper.uuid, folder_of, "grasp", heavy=True, plan_of=plan_of)
+timings.READERS[GRASP.name] = _timed
 
 
 def job_of(root: Any) -> Job:
     """Grasp job from a gripper's properties; raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
-    from ...usecases.grip.grasp import Cube, Grip
     from ...usecases.grip.job import Job, detailed
+    from ...usecases.grip.settings import Cube, Grip
 
     props = root.mu_gripper
     grasps = props.detail != "part"

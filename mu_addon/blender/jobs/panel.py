@@ -30,6 +30,12 @@ def rounded(seconds: float) -> str:
     return f"{hours}{minutes % 60} min".removesuffix(" 0 min")
 
 
+def timed(name: str, announced: tuple[float, bool]) -> str:
+    """Label of a button with its job's expected seconds: "about" if measured on this machine."""
+    seconds, measured = announced
+    return f"{name}, {'about' if measured else 'perhaps'} {rounded(seconds)}"
+
+
 def job_state(layout, child, where: str, prefix: str = "") -> None:
     """Draw the progress and the end of a job's child; nothing without a child.
 

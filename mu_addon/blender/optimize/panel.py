@@ -7,7 +7,7 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
-from ..jobs.panel import job_state, rounded, start_button
+from ..jobs.panel import job_state, start_button, timed
 from ..results import thumbnails
 from ..shared.panels import UnitPanel, alert, wrapped
 from ..shared.wording import in_panel
@@ -62,7 +62,7 @@ def start_words(root) -> str:
     found = optimization.findings(root)
     measured = found is not None and "search" in found.seconds
     seconds = sum(seconds for _, seconds in optimization.plan_of(root))
-    return f"Optimize, {'about' if measured else 'perhaps'} {rounded(seconds)}"
+    return timed("Optimize", (seconds, measured))
 
 
 def _more(layout, props) -> None:

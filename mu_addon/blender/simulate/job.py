@@ -40,7 +40,7 @@ def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
     runs = (run for run in studies.runs_of(root) if run.printed and run.refine == refine)
     alike = (run.summary.get("seconds") for run in runs)
     own = next((s for s in alike if isinstance(s, dict) and {*names} - {"report"} <= {*s}), {})
-    taken = {**timings.measured(refine), **own}
+    taken = {**timings.measured(f"{refine:g}"), **own}
 
     def seconds(name: str) -> float:
         value = taken.get(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..jobs import start_child
-from ..jobs.panel import job_state, rounded, start_button
+from ..jobs.panel import job_state, start_button, timed
 from ..shared.panels import UnitPanel, folded_place, wrapped
 from . import effects
 from .job import SIMULATION, announced
@@ -56,8 +56,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
 
 def start_words(root) -> str:
     """Label of the button: the job, and its expected duration from measurements on this machine."""
-    seconds, measured = announced(root)
-    return f"Simulate, {'about' if measured else 'perhaps'} {rounded(seconds)}"
+    return timed("Simulate", announced(root))
 
 
 def _effects(layout, root) -> None:

@@ -1,8 +1,9 @@
-"""Durations of simulations' stages on this machine, used to announce a new one."""
+"""Durations of jobs' stages on this machine, used to announce a new one."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,15 @@ from ..shared.file_cache import UNREADABLE, FileCache
 LEAST_SHARE = 0.05
 """A stage that took less than this share of its earlier time was cached, and is not a measurement."""
 
+
+def _of_simulation(folder: Path) -> tuple[str, dict[str, Any]]:
+    run = unit_runs.read_run(folder)
+    return f"{run.refine:g}", run.summary["seconds"]
+
+
+READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {"simulate": _of_simulation}
+"""By kind of job: function of a finished run's folder that returns its detail and its stages' seconds."""
+
 _kept: FileCache[dict[str, dict[str, float]]] = FileCache()
 
 
@@ -26,42 +36,41 @@ def _file() -> Path:
 
 
 def _every() -> dict[str, Any]:
-    """Content of the file, by refinement of the mesh."""
+    """Content of the file, by detail: of a simulation, the refinement of its mesh."""
     path = _file()
     return _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
 
 
-def measured(refine: float) -> dict[str, float]:
-    """Seconds of each stage of the last simulation on such a mesh here; empty before the first one."""
-    found: Any = _every().get(f"{refine:g}")
+def measured(detail: str) -> dict[str, float]:
+    """Seconds of each stage of the last job of that detail here; empty before the first one."""
+    found: Any = _every().get(detail)
     if not isinstance(found, dict):
         return {}
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
 
 
-def note(refine: float, seconds: dict[str, float]) -> None:
-    """Store the seconds of a simulation's stages if it ended well. Raises OutputError."""
-    before = measured(refine)
+def note(detail: str, seconds: dict[str, float]) -> None:
+    """Store the seconds of the stages of a job that ended well. Raises OutputError."""
+    before = measured(detail)
     real = {name: s for name, s in seconds.items() if s >= LEAST_SHARE * before.get(name, 0.0)}
-    write_text(_file(), json.dumps({**_every(), f"{refine:g}": {**before, **real}}, indent=1) + "\n")
+    write_text(_file(), json.dumps({**_every(), detail: {**before, **real}}, indent=1) + "\n")
 
 
 def _ended(key: str) -> None:
     child = start_child.child_of(key)
-    if child is None or child.state != DONE or not key.endswith(":simulate"):
+    read = READERS.get(key.rpartition(":")[2])
+    if child is None or child.state != DONE or read is None:
         return
     try:
-        run = unit_runs.read_run(child.folder.parent)
-        seconds = run.summary.get("seconds")
-        if isinstance(seconds, dict):
-            note(run.refine, {str(name): float(s) for name, s in seconds.items()})
+        detail, seconds = read(child.folder.parent)
+        note(detail, {str(name): float(s) for name, s in seconds.items()})
     except (MuError, *UNREADABLE):
         # A failure to store the timings is not reported; the results are there.
         return
 
 
 def register() -> None:
-    """Connect to the end of simulations."""
+    """Connect to the end of jobs."""
     start_child.JOB_ENDED.connect(_ended)
 
 

@@ -25,10 +25,10 @@ from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..export.job import Job as ExportJob
 from ..export.job import resin_of as export_resin
 from ..export.run import USE_CASE as EXPORT
-from ..grip.grasp import Cube
 from ..grip.job import Job as GripJob
 from ..grip.job import detailed
 from ..grip.run import USE_CASE as GRIP
+from ..grip.settings import Cube
 from ..homogenize.job import Job as HomogenizeJob
 from ..homogenize.job import frictions_of
 from ..homogenize.job import resin_of as lattice_resin

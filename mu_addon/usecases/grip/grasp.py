@@ -15,10 +15,8 @@ import numpy as np
 
 from ...design.anchors import anchor_points
 from ...design.gripper import Gripper
-from ...design.settings import FRICTION
 from ...errors import ConvergenceError, InputError
 from ...fem.bending_angle import TipSection
-from ...fem.dead_loads import STANDARD_GRAVITY
 from ...fem.equilibrium import Equilibrium
 from ...fem.kinematics import probe
 from ...fem.materials import Materials
@@ -31,9 +29,8 @@ from ...fem.self_contact import SelfContact
 from ...fem.state import State
 from ...fem.time_stepping import simulate_in_time
 from ...meshing.mesh import Mesh
-from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
 from .phases import WORDS, Phases
-from .settings import BEYOND, DENSITY
+from .settings import Cube, Grip
 
 Array = np.ndarray[Any, Any]
 
@@ -44,66 +41,9 @@ COMES_FROM = 1.5
 # The balance of weight and friction is found to this share of the weight, with so many tries.
 BALANCE = 1e-3
 MOST_SECANTS = 8
-MOST_SIDE_MM = 200.0
 # Steps in mm by which a cube is pulled out of the grasp, and how far at most.
 PULL_STEP_MM = 1.0
 PULL_MOST_MM = 10.0
-
-
-def _side(_: object, field: attrs.Attribute[float], value: float) -> None:
-    if not 0.0 < value <= MOST_SIDE_MM:
-        raise InputError(
-            f"a cube with a side length of {value:g}", field.name, f"give mm, above 0 to {MOST_SIDE_MM:g}"
-        )
-
-
-@attrs.frozen
-class Cube:
-    """A rigid cube: its side in mm, and its density in g/ml.
-
-    The default is solid PLA: assumed, since the paper names neither material nor mass; a hollow print is
-    lighter.
-    """
-
-    side_mm: float = attrs.field(validator=_side)
-    density_g_per_ml: float = DENSITY.field()
-
-    @property
-    def mass_g(self) -> float:
-        """Mass of the whole cube."""
-        return self.density_g_per_ml * self.side_mm**3 / 1e3
-
-    @property
-    def weight_N(self) -> float:
-        """Weight of the whole cube."""
-        return self.mass_g * 1e-6 * STANDARD_GRAVITY
-
-
-@attrs.frozen
-class Grip:
-    """Contact of fingers and cube.
-
-    friction: the lower end of known values. beyond_mm: assumed, the tips' edges then meet both cubes near the
-    middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see `Obstacle`.
-    step_s: longest interval between instants.
-    """
-
-    friction: float = FRICTION.field()
-    beyond_mm: float = BEYOND.field()
-    pressure_MPa: float = 0.02
-    depth_mm: float = 0.1
-    stick_mm: float = 0.1
-    halvings: int = 2
-    step_s: float = 0.5
-
-    def __attrs_post_init__(self) -> None:
-        if not 0.0 < self.step_s <= 2.0:
-            raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
-
-
-_OF_STRUTS = {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1}
-OF_FIDELITY: dict[str, dict[str, Any]] = {HOMOGENISED: {}, RESOLVED: _OF_STRUTS, SOLID: _OF_STRUTS}
-"""Values of `Grip` for each fidelity: struts bear on few small areas, and their faces are small."""
 
 
 @attrs.frozen(eq=False)

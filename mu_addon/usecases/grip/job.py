@@ -17,13 +17,10 @@ from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.progress_estimate import Plan
 from ...sensing.guide import Optics
 from ...toml_writer import toml_text
-from ..simulate_and_place.expected import BY_REFINEMENT
-from .grasp import OF_FIDELITY, Cube, Grip
+from .expected import expected_plan
 from .phases import Phases, read_phases, shipped_phases
-from .settings import COARSE_REFINE, REFINE, SIDES
+from .settings import COARSE_REFINE, COARSE_STEP_S, OF_FIDELITY, REFINE, SIDES, STEP_S, Cube, Grip
 
-PRINTED_PACE = 3.0
-"""Factor on the seconds of a grasp by printed struts."""
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
     "grip.toml",
@@ -57,7 +54,7 @@ def detailed(coarse: bool, refine: float | None = None, solid_struts: bool = Fal
     """Detail of a quick look, or of a whole run; refine: replaces its refinement."""
     own = COARSE_REFINE if coarse else REFINE.default
     mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity_of(solid_struts))
-    return Detail(mesh, 1.0 if coarse else 0.5)
+    return Detail(mesh, COARSE_STEP_S if coarse else STEP_S)
 
 
 @attrs.frozen
@@ -121,12 +118,5 @@ def read_job(folder: Path) -> Job:
 
 def plan_of(job: Job) -> Plan:
     """Stages of a grasp with the expected seconds of each on two cores."""
-    finer = (job.mesh.refine / REFINE.default) ** BY_REFINEMENT
-    seconds = 140.0 * finer / job.grip.step_s
-    if job.mesh.resolved:
-        seconds *= PRINTED_PACE
     sides = [cube.side_mm for cube in job.cubes]
-    plan = [("solid", 5.0), *([("mesh", 5.0 * finer)] if sides else [])]
-    plan += [(f"grasp of {side:g} mm", seconds) for side in sides]
-    plan += [("light", 4.0 * len(sides) / job.grip.step_s)] if sides else []
-    return [*plan, ("report", 6.0 if sides else 3.0)]
+    return expected_plan(sides, job.mesh.refine, job.grip.step_s, job.mesh.resolved)

@@ -7,6 +7,7 @@ from typing import Any
 
 from ...run.context import RunContext
 from ...run.usecase import UseCase
+from .expected import GRASP_OF
 from .job import LAYOUT, Job, plan_of, read_job
 from .report import write_report
 from .stages import Gripping
@@ -33,5 +34,4 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     return lines
 
 
-KEPT = ("grasp of",)
-USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of, kept=KEPT)
+USE_CASE = UseCase("grip", LAYOUT, read_job, grip, console_summary, plan=plan_of, kept=(GRASP_OF,))

@@ -28,10 +28,12 @@ from ...run.progress import Progress
 from ...sensing.embedded_waveguide import Joints, embed_waveguide
 from ...sensing.light_signal import Signal, traced_signal
 from ..simulate_and_place.job import in_time_newton
-from .grasp import Cube, Grasp, Lift, grasp
+from .expected import stage_of
+from .grasp import Grasp, Lift, grasp
 from .job import Job
 from .motion_files import write_grasp
 from .phases import MEANING
+from .settings import Cube
 
 Array = np.ndarray[Any, Any]
 
@@ -122,7 +124,7 @@ class Gripping:
         job, name = self.job, f"cube-{cube.side_mm:g}"
         apart = self_contact_of(job.gripper.unit, self.mesh) if job.self_contact else None
         entry = self._key("grasp", attrs.astuple(cube), job.phases.text())
-        with self.progress.stage(f"grasp of {cube.side_mm:g} mm"):
+        with self.progress.stage(stage_of(cube.side_mm)):
             kept = self.cache.get("grasp", entry)
             if kept is None:
                 found = grasp(

@@ -13,6 +13,7 @@ from mu_addon.blender.gripper import state as grasps
 from mu_addon.blender.gripper import timeline as grasp_motion
 from mu_addon.blender.gripper.properties import to_gripper
 from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.simulate import timings
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.drawing import PARTS
 from mu_addon.design.gripper import load_gripper
@@ -20,8 +21,8 @@ from mu_addon.design.gripper import to_toml as gripper_toml
 from mu_addon.design.parameters import to_toml
 from mu_addon.files import write_npz
 from mu_addon.report.pc2 import write_pc2
-from mu_addon.usecases.grip.grasp import Grip
 from mu_addon.usecases.grip.job import read_job
+from mu_addon.usecases.grip.settings import Grip
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -173,6 +174,26 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     ended(child)
     assert "SIGSEGV" in drawn()
     assert bpy.ops.mu.grasp_open(what="errors") == {"FINISHED"}
+
+
+def test_the_button_says_what_a_grasp_will_take_by_what_was_measured_here(tmp_path, monkeypatch):
+    monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
+    root = held()
+    props = root.mu_gripper
+    props.folder, props.cube_mm = str(tmp_path / "out"), 20.0
+    assert "Grasp, perhaps " in drawn()
+    grasps.write_inputs(root, tmp_path / "out")
+    seconds = {"solid": 3.0, "mesh": 5.0, "grasp of 20 mm": 582.0, "light": 4.0, "report": 6.0}
+    (tmp_path / "out" / "summary.json").write_text(json.dumps({"seconds": seconds}), encoding="utf-8")
+    timings.note(*timings.READERS["grip"](tmp_path / "out"))
+    assert "Grasp, about 10 min" in drawn()
+    assert dict(grasps.plan_of(root))["grasp of 20 mm"] == 582.0, "and the bar counts by the same figure"
+    props.cube_mm = 12.5
+    assert "Grasp, about 10 min" in drawn(), "another cube takes about as long"
+    props.self_contact = False
+    assert "Grasp, perhaps " in drawn(), "another model does not"
+    props.detail = "part"
+    assert "Make the Part, perhaps 10 s" in drawn()
 
 
 def write_folder(folder):
