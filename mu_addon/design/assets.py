@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from ..errors import InputError, did_you_mean
@@ -57,5 +58,10 @@ def asset_file(folder: str, what: str, name: str, kind: str = "") -> Path:
 
 
 def _kind(path: Path) -> str:
-    """The value of `kind = ...` in a TOML file; empty without one."""
+    """The value of `kind = ...` in a TOML file, empty without one; read again only when it changes."""
+    return _kind_of(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=256)
+def _kind_of(path: Path, changed_ns: int) -> str:
     return str(parse_toml(file_text(path), str(path)).get("kind", ""))

@@ -34,6 +34,7 @@ LOAD_AFTER_S, LOAD_EVERY_S = 1.0, 0.1
 WRITERS = (
     "tomlkit",
     "mu_addon.evidence.effect",
+    "mu_addon.evidence.prediction.specimen",
     "mu_addon.evidence.unit_effects",
     "mu_addon.fem.newton_settings",
     "mu_addon.placement.graph",
@@ -45,8 +46,10 @@ WRITERS = (
     "mu_addon.usecases.export.specimens",
     "mu_addon.usecases.check_print.job",
     "pyparsing",
+    "PIL.Image",
     "PIL.PngImagePlugin",
     "dateutil.parser",
+    "kiwisolver",
     "matplotlib",
 )
 """Modules that write a job's inputs or colour a result, each loaded in a tenth of a second; no solver."""

@@ -202,9 +202,13 @@ def paint(root: Any, parts: list[tuple[Any, bool]]) -> None:
 def set_range(material: Any, field: str, ends: tuple[float, float]) -> None:
     """Let a material that `material_of` made colour an attribute over a range."""
     nodes = material.node_tree.nodes
-    nodes["Field"].attribute_name = field
+    # What is set already is left: each write makes Blender build the material anew, at every step of a drag.
+    if nodes["Field"].attribute_name != field:
+        nodes["Field"].attribute_name = field
     for name, value in zip(("From Min", "From Max"), ends, strict=True):
-        nodes["Range"].inputs[name].default_value = value
+        socket = nodes["Range"].inputs[name]
+        if socket.default_value != np.float32(value):
+            socket.default_value = value
 
 
 def write_colours(root: Any, mesh: Any, values: Any | None, ends: tuple[float, float] | None = None) -> None:
@@ -220,4 +224,5 @@ def write_colours(root: Any, mesh: Any, values: Any | None, ends: tuple[float, f
         found = colours(root, np.nan_to_num(values), ends)
         found[np.isnan(values)] = plain
     attribute.data.foreach_set("color", np.ascontiguousarray(found).ravel())
-    mesh.color_attributes.active_color = mesh.color_attributes[COLOUR]
+    if mesh.color_attributes.active_color_name != COLOUR:
+        mesh.color_attributes.active_color_name = COLOUR

@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
+from ..preview import nodes
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
 from ..shared.registration import add_handlers, remove_handlers
@@ -129,10 +130,9 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
     A root's scale records the unit that its size is right for, an obstacle's property does; both are undone
     with the object. A scaled parent's factor is divided out. An unlocked root is left to the user.
     """
-    wanted = scene_units.mm(bpy.context.scene)
     moved = set()
     for root in roots:
-        own = scene_units.true_scale(root, bpy.context.scene)
+        own = scene_units.true_scale(root, _scene_of(root))
         if own is None or not all(root.lock_scale) or all(abs(s - own) <= 1e-5 * own for s in root.scale):
             continue
         if root.parent is None:
@@ -140,7 +140,7 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
         root.scale = (own,) * 3
         moved.add(root)
     for obj in touched:
-        own = obj.mu_obstacle.mm
+        own, wanted = obj.mu_obstacle.mm, scene_units.mm(_scene_of(obj))
         if own and abs(own - wanted) <= 1e-6 * wanted:
             continue
         # A file of an older extension does not record the unit: the scene's is assumed.
@@ -148,6 +148,12 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
             obj.location *= wanted / own
             obj.scale *= wanted / own
         obj.mu_obstacle.mm = wanted
+
+
+def _scene_of(obj: Any) -> Any:
+    """Scene whose units an object is sized in: the one that is seen if it is there, else its own."""
+    seen, own = bpy.context.scene, obj.users_scene
+    return seen if seen in own or not own else own[0]
 
 
 def _above(obj: Any) -> Iterator[Any]:
@@ -208,6 +214,9 @@ def _after_import(imported: Any) -> None:
     """Give appended units an identity other than in the file that they come from."""
     _size_instances({item.id for item in imported.import_items if isinstance(item.id, bpy.types.Collection)})
     objects = [item.id for item in imported.import_items if isinstance(item.id, bpy.types.Object)]
+    if objects:
+        groups = (item.id for item in imported.import_items)
+        nodes.unite([group for group in groups if isinstance(group, bpy.types.GeometryNodeTree)])
     if not any(displays.editable(obj) and displays.uuid_of(obj) for obj in objects):
         return
     for obj in objects:

@@ -124,7 +124,8 @@ def put_candidates(root: Any, unit: Unit, shown: bool) -> None:
             colour = "MU Waveguide"
         _put(root, name, path, colour, "MU Labelled Tube")
     tubes = {name.removeprefix(CANDIDATE): beside(root, name) for name in drawn if name != FREE}
-    ranking.colour_and_label(root, tubes)
+    if tubes:
+        ranking.colour_and_label(root, tubes)
     for child in list(root.children):
         name = child.get(displays.PART)
         if name is not None and name != FLAWS and name not in drawn:

@@ -24,7 +24,7 @@ def stage_of(side_mm: float) -> str:
 def expected_plan(sides_mm: Sequence[float], refine: float, step_s: float, printed: bool) -> Plan:
     """Stages of a grasp of cubes with the expected seconds of each on two cores.
 
-    refine: of the mesh; step_s: longest time between instants; printed: True for struts as printed.
+    refine: of the mesh; step_s: longest interval between instants; printed: True for struts as printed.
     """
     finer = (refine / REFINE.default) ** BY_REFINEMENT
     seconds = 140.0 * finer / step_s

@@ -324,6 +324,34 @@ def test_appended_it_is_a_unit_of_its_own(tmp_path):
     assert len({root.mu_unit.uuid for root in unit_object.roots()}) == 2
 
 
+def test_appended_beside_another_it_has_one_skin(tmp_path):
+    file, *_ = library(tmp_path / "there")
+    first = add(preset="mu-0.75x")
+    for _ in range(2):
+        fetched(file, "stored", link=False)
+    first.mu_unit.path = "alpha4"
+    graph = bpy.context.evaluated_depsgraph_get()
+    skinned = {len(root.evaluated_get(graph).data.vertices) for root in unit_object.roots()}
+    assert len(unit_object.roots()) == 3
+    assert len(skinned) == 1, skinned
+    group = bpy.data.node_groups["MU Unit"]
+    assert [[m.node_group for m in root.modifiers] for root in unit_object.roots()] == [[group]] * 3
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "here.blend"))
+    assert not [tree.name for tree in bpy.data.node_groups if "." in tree.name]
+
+
+def test_a_unit_of_another_scene_keeps_the_size_of_its_own(tmp_path):
+    root = add(preset="mu-0.75x")
+    scale = root.scale.x
+    other = bpy.data.scenes.new("metres")
+    other.unit_settings.scale_length = 1.0 if scale == 1.0 else 0.001
+    bpy.context.window.scene = other
+    bpy.context.view_layer.update()
+    gestures.look()
+    assert root.scale.x == scale
+
+
 def test_from_a_scene_of_millimetres_it_comes_into_one_of_metres_true_in_size_and_place(tmp_path):
     file, tall, _ = library(tmp_path / "there")
     bpy.ops.wm.open_mainfile(filepath=str(file))

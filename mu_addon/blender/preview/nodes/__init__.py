@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -48,10 +49,40 @@ def no_assets() -> Iterator[None]:
             tree.asset_data.description, tree.asset_data.catalog_id = description, catalogue
 
 
-def _build(tree, asked: Group) -> None:
-    """Rebuild a group; modifiers that use it keep their values, by the name of the input."""
+def unite(trees) -> None:
+    """Let the file's own groups take the place of copies that came with an import, "MU Unit.001".
+
+    A copy has no users then, and Blender does not save it. By both a unit would be skinned twice.
+    """
+    for tree in trees:
+        name = re.sub(r"\.\d{3,}$", "", tree.name)
+        own = group(name) if name in _ALL and name in bpy.data.node_groups else tree
+        if own == tree or tree.library is not None:
+            continue
+        with _inputs_kept(tree, own):
+            tree.user_remap(own)
+        tree.asset_clear()
+        tree.use_fake_user = False
+
+
+@contextmanager
+def _inputs_kept(tree, after) -> Iterator[None]:
+    """Keep the inputs, by name, of modifiers that use a tree while it is built anew or gives way."""
     users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
     kept = [modifier_inputs(modifier) for modifier in users]
+    yield
+    for modifier, values in zip(users, kept, strict=True):
+        for name, default in input_defaults(after).items():
+            set_modifier_input(modifier, name, values.get(name, default))
+
+
+def _build(tree, asked: Group) -> None:
+    """Rebuild a group; modifiers that use it keep their values, by the name of the input."""
+    with _inputs_kept(tree, tree):
+        _fill(tree, asked)
+
+
+def _fill(tree, asked: Group) -> None:
     tree.nodes.clear()
     tree.interface.clear()
     asked.build(tree, *(group(name) for name in asked.uses))
@@ -59,9 +90,6 @@ def _build(tree, asked: Group) -> None:
         tree.asset_data.description = asked.text
         tree.asset_data.catalog_id = CATALOGUE
     tree["mu_version"] = asked.version
-    for modifier, values in zip(users, kept, strict=True):
-        for name, default in input_defaults(tree).items():
-            set_modifier_input(modifier, name, values.get(name, default))
 
 
 def skin(obj, name: str):
