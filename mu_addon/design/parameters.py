@@ -435,8 +435,7 @@ class Unit:
         rules.check_printed(self.dimensions, self.print.offset_xy_mm, self.print.offset_z_mm)
 
     def evolve(self, **values: Any) -> Unit:
-        """The unit with other values of some parameters, by their names in its file; rules are checked after
-        all changes.
+        """The unit with other values of some parameters, by name; rules are checked after all changes.
 
         Whole sections can be given, too. Raises InputError for a name that is no parameter's and for a value
         that does not fit.

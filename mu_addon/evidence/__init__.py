@@ -1,5 +1,4 @@
-"""Evidence: measured data against the model: causes of the misfit, their significance, and the gain by
-correcting them.
+"""Evidence: causes of a model's misfit to measured data, their significance, and the gain of correcting them.
 
 `diagnose` takes experiments and a `Simulator` of them and returns a `Verdict`: the effects that explain the
 misfit, those that cannot be told apart, the gain on data held out, and the experiment to make next. An

@@ -170,8 +170,7 @@ def _plain_tests(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def structure(table: Sequence[Dependence]) -> tuple[str, ...]:
-    """Names of the quantities that the residual depends on, strongest first, at a false-alarm rate of
-    `FALSE_ALARM`.
+    """Quantities that the residual depends on, strongest first, at a false-alarm rate of `FALSE_ALARM`.
 
     The rate is divided by the number of tests (Bonferroni).
     """
@@ -652,8 +651,7 @@ def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def _moved(fitter: Fitter, fit: Fit) -> tuple[float, str, int]:
-    """The clearest jump between two experiments, in standard deviations and as text, and the number of tried
-    ones.
+    """The clearest jump between two experiments, in standard deviations, as text, and the number tried.
 
     Of channels whose one zero is fitted for all experiments: a reglued marker or a moved camera has another
     one from then on.

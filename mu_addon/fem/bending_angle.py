@@ -80,8 +80,7 @@ def tip_faces(mesh: Mesh) -> tuple[Array, Array, Array]:
 
 
 def _tip_areas(mesh: Mesh, found: tuple[Array, Array, Array] | None = None) -> tuple[Array, Array]:
-    """Tip nodes with weights that integrate over the solid part of the end plane, a third of a triangle a
-    node.
+    """Tip nodes with weights that integrate over the end plane's solid part, a third of a triangle each.
 
     On quadratic triangles these nodes are the mid-edge ones, which makes the rule exact to degree 2. found:
     the `tip_faces`.

@@ -126,8 +126,7 @@ class Carried:
         return found, self._turns
 
     def operators(self, u: Array) -> Array:
-        """Derivatives (1 + 2 k, 3, 3) of a node's displacement: by itself, and by the unknowns of its beam
-        nodes.
+        """Derivatives (1 + 2 k, 3, 3) of a node's displacement, by itself and by its beam nodes' unknowns.
 
         The k shares come first, then the k slopes by rotation vectors.
         """

@@ -342,8 +342,8 @@ class SelfContact:
         return np.asarray(total[self._nodes])
 
     def by_places(self, u: Array, along: Sequence[Array]) -> tuple[list[Array], list[Array]]:
-        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by the displacements, and by the
-        positions of the undeformed nodes, which the displaced ones follow.
+        """Derivatives (n, 3) in N of v . forces, for each v of `along`, by displacements and undeformed
+        positions.
 
         u and v: displacements (n, 3) in mm, which stay; gap and stiffness stay, too. Without friction.
         """

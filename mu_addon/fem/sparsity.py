@@ -59,8 +59,7 @@ class Pattern:
 
 
 def with_entries(pattern: Pattern, rows: Array, columns: Array, free: Array) -> tuple[Pattern, Array]:
-    """A pattern with additional entries (j,) of the lower triangle, and the new positions (nnz,) of the old
-    ones.
+    """A pattern with additional entries (j,) of the lower triangle, and new positions (nnz,) of the old.
 
     free (f,): number 3 node + axis of each unknown. The order is computed again: the old one made the factor
     of a unit with touching walls 2.5 times slower, and 10 times with more room for contact.

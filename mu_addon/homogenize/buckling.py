@@ -75,9 +75,7 @@ class SymmetryBreakingModes:
         self._order = list(_BREAKING)
 
     def lost(self, u: Array) -> Signs | None:
-        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm; None if there is no such
-        mode.
-        """
+        """Signs of a part whose tangent is not positive definite at u (n, 3) in mm, or None."""
         values = self.model.tangent(u, 0.0, self.parameters)
         for signs in self._order:
             try:

@@ -37,8 +37,7 @@ FINE = 0.1
 
 @attrs.frozen
 class Handle:
-    """An arrow: its parameter (none for the pressure), position and direction in the unit's frame, growth
-    of the value in mm for a millimetre of its end, and colour."""
+    """An arrow of a parameter (none for the pressure): place and direction in the unit's frame, gain, colour."""
 
     section: str
     name: str

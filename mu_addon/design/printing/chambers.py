@@ -227,8 +227,8 @@ def _deepest(squared: NDArray[np.uint16], first: Index, last: Index) -> tuple[in
 def _way_out(
     space: DistanceField, wide: Parts, outside: int, seed: Index, t: float, around: Box
 ) -> tuple[Index, float, Box]:
-    """The widest way from the seed to the outside, at its narrowest: cells (n, 3), empty if there is no way;
-    its radius; and the part of the grid in which that is certain.
+    """The neck of the widest way from the seed to the outside: cells (n, 3), radius, and certain part of the
+    grid.
 
     wide: parts farther than t mm from the surface as they were, with `outside` and the seed in two of them.
     Only `around` is looked at. There a way that leaves it counts as a way out: as long as that is the better

@@ -130,8 +130,7 @@ def orientations(
     own: Array,
     share: Callable[[float], None] | None = None,
 ) -> list[Build]:
-    """Ranked builds along 26 directions, the part's present one `own` (3,), and eight at 20 degrees to the
-    best of these.
+    """Ranked builds along 26 directions, the present one `own` (3,), and eight at 20 degrees to the best.
 
     vertices (n, 3) in mm and triangles (m, 3); in_chamber (s,) and the other arguments are as in `build`;
     share: called with the share of the directions that is done.

@@ -60,8 +60,7 @@ def read_job(folder: Path) -> Job:
 
 
 def record(job: Job, folder: Path, context: RunContext) -> Path:
-    """Record into a new folder within the run's, and return it. Recordings of stopped runs stay in its
-    folder.
+    """Record into a new folder within the run's, next to those of stopped runs; return it.
 
     Raises InputError, OutputError, and MuError where the recording was stopped early.
     """

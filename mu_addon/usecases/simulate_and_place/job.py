@@ -252,8 +252,7 @@ class Job:
     def texts_in(
         self, folder: Path, run: Mapping[str, Any] = MappingProxyType({})
     ) -> tuple[dict[str, str], bool]:
-        """Texts for a folder, with the still valid inputs of further stages there; True if it belongs to
-        them.
+        """Texts for a folder, with the still valid inputs of further stages there; True if they fit.
 
         So `design` in the folder of a `place` of the same unit keeps its results. run: more for the table
         [run], which decides no figure. Raises InputError for a study.toml that cannot be used.

@@ -101,8 +101,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
 
 
 def _bars(study: Study) -> dict[str, tuple[list[int], EmbeddedWaveguide]]:
-    """Anchors' numbers and waveguide of every candidate path; one without room for it is left out with a
-    warning.
+    """Anchors' numbers and waveguide of every candidate path; one without room is left out with a warning.
 
     Raises InputError if no path has room.
     """

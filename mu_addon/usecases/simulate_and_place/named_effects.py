@@ -123,8 +123,7 @@ class NamedEffects:
         return any(name in IN_TIME for name in self.values)
 
     def effective_kPa(self, time_s: Array, pressure_kPa: Array) -> Array:
-        """Effective pressure (n,) in kPa at which the unit without the effects in time would stand, from
-        rest.
+        """Effective pressure (n,) in kPa on the unit without the effects in time, from rest.
 
         time_s, pressure_kPa (n,): of the supply, linear in between.
         """
