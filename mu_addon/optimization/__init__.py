@@ -1,8 +1,8 @@
 """Optimization: targets and freedoms of a design, gradients by adjoints, and the search for units that meet
 them.
 
-`gradients` differentiates what is read off a body in equilibrium by any number of freedoms; `evaluate` does
-so for a unit; `search_units` proposes units from what it finds, by a surrogate that knows values and slopes.
+`gradients` differentiates quantities of a body in equilibrium by any number of freedoms; `evaluate` does so
+for a unit; `search_units` proposes units by a surrogate that interpolates values and slopes.
 
     >>> from mu_addon.optimization import Freedom
     >>> Freedom("chambers.wall_mm", 0.6, 1.4).at(0.5)

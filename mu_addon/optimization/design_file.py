@@ -50,10 +50,9 @@ class Design:
     resin's modulus as a share of it, for the proposals' uncertainty. document: the file's own tables;
     material: the resin's, for density and elongation at break. orientation_deg: of the unit under its weight,
     0 hanging, tip down, turned about x; None: without weight. robust: targets must be met within the
-    uncertainty. materials: the resins that the freedom `resin` is among, by name; body: a closed surface in
-    place of the lattice's box, in the unit's frame; self_contact: of walls and struts of a resolved unit.
-    why_homogenised: what the printed body cannot answer, where no fidelity is given and for that alone the
-    lattice is homogenised, else "".
+    uncertainty. materials: choices of the freedom `resin`, by name; body: a closed surface in place of the
+    lattice's box, in the unit's frame; self_contact: of walls and struts of a resolved unit. why_homogenised:
+    the quantities that need a homogenised lattice, if no fidelity is given, else "".
     """
 
     unit: Unit
@@ -110,7 +109,7 @@ class Design:
 
     @property
     def start(self) -> tuple[Any, ...]:
-        """The unit's own values of the freedoms; of path and resin the file's, or the first."""
+        """The unit's values of the freedoms; for path and resin those of the file, or the first."""
         return tuple(
             f.value_of(self.unit)
             if f.is_of_unit
@@ -123,7 +122,7 @@ class Design:
     def unit_of(self, design: tuple[Any, ...]) -> Unit:
         """The unit with values of the freedoms; raises InputError where it breaks a rule, or leaves its body.
 
-        Of another resin wall and lattice have its modulus, in proportion; a modulus that is free goes first.
+        With another resin the moduli of wall and lattice change in proportion; a free modulus has priority.
         """
         own = [(f, v) for f, v in zip(self.freedoms, design, strict=True) if f.is_of_unit]
         found = changed_unit(
@@ -331,7 +330,7 @@ def _places_of(
 
 
 def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fixed: Mapping[str, Any]) -> str:
-    """Quantities that need a homogenised lattice, in words, or ""."""
+    """Quantities that need a homogenised lattice, as text, or ""."""
     for target in targets:
         if target.kind in OF_SENSOR:
             return f"{target.kind} needs a sensor, which a printed body would have in its mesh"

@@ -135,7 +135,7 @@ class Freedom:
 
 
 def parameters() -> dict[str, Description]:
-    """Every parameter of a unit by its dotted name; `scale` stands alone."""
+    """Every parameter of a unit by its dotted name; `scale` has no section."""
     head = {d.name: d for d in describe(Unit)}
     return head | {f"{s.section}.{d.name}": d for s in SECTIONS for d in describe(s)}  # type: ignore[attr-defined]
 
@@ -154,7 +154,7 @@ def parameter_of(unit: Unit, name: str) -> Any:
 def changed_unit(unit: Unit, freedoms: Sequence[Freedom], values: Sequence[Any]) -> Unit:
     """The unit with other values of some freedoms, and of the parameters tied to them; raises InputError.
 
-    All at once, so that a rule sees the whole change.
+    All changes are made together, so that rules check the result.
     """
     sections: dict[str, dict[str, Any]] = {}
     head: dict[str, Any] = {}

@@ -7,7 +7,7 @@ With r(u, p) = 0 the equilibrium at freedoms p, a quantity q(u, p) changes by
 K the tangent at the state, whose factor serves every quantity. lambda . dr at fixed u is linear in the places
 of the nodes, shares and ties, so one pass over the elements (`fem.sensitivity`) gives it for all freedoms. A
 freedom then costs no assembly: it takes the difference of these between two bodies with the freedom moved a
-little either way. Both have the same elements: the mesh is morphed, not made anew, so there is no mesher's
+little either way. Both have the same elements: the mesh is morphed, not made again, so there is no meshing
 noise in it. Source: the discrete semi-analytic adjoint, e.g. Haftka and Guerdal, Elements of Structural
 Optimization, ch. 7. Its known error under large rotations is of first order in the step; central differences
 do not have it.

@@ -314,8 +314,7 @@ class Stretch:
 def _solid(mesh: Mesh, elements: Array, volumes: Array) -> Array:
     """Volumes (e, q) in mm3 of some elements' quadrature points, as far as they are filled.
 
-    Points filled by less than half count less and less, and by less than a quarter not at all, as they are
-    hardly supported.
+    The weight of points filled by less than half falls to 0 at a quarter, as they are hardly supported.
     """
     if not mesh.resolved:
         return volumes
@@ -438,7 +437,7 @@ def _tip_slope(structure: Structure, along: Array) -> Array:
 
 
 def _whole_x(structure: Structure, vector: Array) -> Array:
-    """A vector (3,) of a part as one of the whole body: nothing moves across a mirror plane."""
+    """A vector (3,) of a part as one of the whole body: components across mirror planes are 0."""
     mirrored = [axis in structure.model.mesh.symmetry for axis in AXES]
     return np.where(mirrored, 0.0, vector)
 

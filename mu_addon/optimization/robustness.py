@@ -48,7 +48,7 @@ class Verified:
 
     @property
     def is_robust(self) -> bool:
-        """True if it meets every target robustly, and is printable where that was asked for."""
+        """True if it meets every target robustly and, if requested, is printable."""
         return not self.why and bool(self.robust.all()) and self.print_worst != "error"
 
 
@@ -86,7 +86,7 @@ def verified(
 
 
 def _print_check(unit: Unit, printer: Printer, body: Body | None) -> tuple[str, tuple[str, ...]]:
-    """The worst severity of the printability check, and its findings that are not a pass, in words."""
+    """The worst severity of the printability check, and its findings other than passes, as text."""
     try:
         solid = build_solid(unit, body=None if body is None else envelope(body, unit.dimensions))
     except MuError as error:

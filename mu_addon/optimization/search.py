@@ -323,7 +323,7 @@ class _Search:
         return min(factors)
 
     def _improved(self, number: int, before: int, weights: Array) -> bool:
-        """True if a design is better for some weights than all of those before."""
+        """True if a design is better for some weights than all earlier ones."""
         if not self.observed[number].sound:
             return False
         rows = [o for o in self.observed[:before] if o.sound]

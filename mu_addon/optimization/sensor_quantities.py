@@ -29,8 +29,7 @@ STATIONS = 51
 class Disturbance:
     """Deviation J_hat in mm of the backbone by the sensor along a path, the mean over some pressures in kPa.
 
-    Pressures weighed alike; `place` weighs them by the time that its
-    protocol spends there.
+    Equally weighted pressures; `place` weighs them by the time that its protocol spends there.
     """
 
     name: str

@@ -98,7 +98,7 @@ class Target:
 
     @property
     def words(self) -> str:
-        """The target in words."""
+        """The target as text."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind in ("walls_apart", "printable"):
             return "yes"

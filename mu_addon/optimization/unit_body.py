@@ -90,7 +90,7 @@ class UnitBody:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The unit's own mesh. Raises InputError and MeshingError."""
+        """The unit's mesh. Raises InputError and MeshingError."""
         m = self.mechanics
         return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
 
@@ -120,7 +120,7 @@ class UnitBody:
     def moved(self, unit: Unit) -> Structure:
         """Another unit on this one's mesh, morphed; it shares this one's buffers (`relocated`).
 
-        Raises InputError where the unit breaks a rule and MeshingError where it needs a mesh of its own.
+        Raises InputError if the unit breaks a rule, MeshingError if it needs a separate mesh.
         """
         printed = self.mechanics.as_printed(unit)
         mesh = self.mesh if printed.printed == self.printed.printed else self.morph.to(printed, checked=False)

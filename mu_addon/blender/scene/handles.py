@@ -37,7 +37,7 @@ FINE = 0.1
 
 @attrs.frozen
 class Handle:
-    """An arrow of a parameter (none for the pressure): place and direction in the unit's frame, gain, colour."""
+    """An arrow of a parameter (or the pressure): place and direction in the unit's frame, gain, colour."""
 
     section: str
     name: str

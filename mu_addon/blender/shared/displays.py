@@ -1,4 +1,4 @@
-"""Objects that display something of a unit or gripper beside it: candidate paths, motions, marks, a legend.
+"""Objects that display results of a unit or gripper: candidate paths, motions, marks, a legend.
 
 Each is a child of the root object, or of another such child, and carries one of these marks, which names its
 content, and its owner's UUID. `scene.gestures` lets them follow their root: deleted, hidden and moved to
@@ -36,11 +36,11 @@ OWNER = "mu_of"
 """On each: UUID of its unit or gripper."""
 
 ON_UNIT = "mu_on_unit"
-"""On a hidden motion's object: the unit shows it in its own place."""
+"""On a hidden motion's object: the unit shows it in its place."""
 
 
 def on_unit(root: Any, mark: str = MOTION) -> list[Any]:
-    """Objects with a mark whose shape a unit shows in its own place, by name."""
+    """Objects with a mark whose shape a unit shows in its place, by name."""
     found = (child for child in root.children if child.get(mark) and child.get(ON_UNIT))
     return sorted(found, key=lambda child: str(child.name))
 

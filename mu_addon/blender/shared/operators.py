@@ -49,7 +49,7 @@ def reports_errors(execute):
 
 
 def _again(uuid: str, name: str, values: dict) -> None:
-    """Call an operator once more on a unit, as one step to undo; where the unit is gone, do nothing."""
+    """Call an operator once more on a unit, as one undo step; do nothing if the unit is gone."""
     root, windows = by_uuid(uuid), bpy.context.window_manager.windows
     if root is not None and windows:
         with bpy.context.temp_override(window=windows[0], object=root, active_object=root):

@@ -34,7 +34,7 @@ FIRST = {
     ),
     "waveguide": ("row", "well_pitch_mm"),
 }
-"""Parameters of a section that are always shown; others are folded. A section not named has none."""
+"""Parameters of a section that are always shown; others are folded. Other sections have none."""
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 
@@ -116,7 +116,7 @@ def large_button(layout, operator: str, icon: str, **settings) -> None:
 def parameter(column, root, section: str, d: Description) -> None:
     """Draw the field of one parameter; if it breaks a rule red, with the nearest valid value as a button.
 
-    The button stands beside the field, so that nothing below it moves.
+    The button is next to the field, so that nothing below it moves.
     """
     group = getattr(root.mu_unit, section)
     found = broken(root)

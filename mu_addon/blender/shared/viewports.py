@@ -24,7 +24,7 @@ def areas() -> Iterator[Any]:
 
 
 def frame(objects: Iterable[Any], only: Any | None = None) -> None:
-    """Frame objects in every 3D view or in one, from its own side; in background too, for saved files."""
+    """Frame objects in every 3D view or in one, from its present side; also in background."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
     corners = np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])

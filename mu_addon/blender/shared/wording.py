@@ -1,4 +1,4 @@
-"""Errors of the core in the words of the panels: fields by their labels, not by names in files."""
+"""Errors of the core as shown in panels: with labels of fields in place of names in files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A broken rule in the words of the panel: the fault, its fields, and valid values."""
+"""A broken rule for the panel: the fault, its fields, and valid values."""
 
 from __future__ import annotations
 

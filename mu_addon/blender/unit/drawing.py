@@ -1,4 +1,4 @@
-"""Drawing of a root object: values of the design's steps as one mesh, and candidate paths beside it.
+"""Drawing of a root object: values of the design's steps as one mesh, and candidate paths.
 
 The mesh carries, at its points, their part (`mu_part`, a number of `PARTS`), their skin (`mu_skin`, see
 `preview.nodes.unit`) and the radius of struts and anchors in mm.

@@ -133,7 +133,7 @@ def true_scale(unit, d: Description) -> float:
 
 
 def shown_value(group, d: Description, value: float) -> str:
-    """A value of a parameter in words: a length at the unit's scale."""
+    """A value of a parameter as text: a length at the unit's scale."""
     if d.unit != "mm":
         return f"{value:.6g}"
     return f"{value * true_scale(group.id_data.mu_unit, d):.6g} mm"

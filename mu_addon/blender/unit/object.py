@@ -115,7 +115,7 @@ def make_active(context: Any, obj: Any) -> None:
 
 
 def delete(root: Any) -> None:
-    """Remove a unit with its displays; the user's own children stay."""
+    """Remove a unit with its displays; the user's children are kept."""
     meshes = [root.data, root.mu_unit.preview, root.mu_unit.solid, root.mu_unit.envelope]
     for child in root.children_recursive:
         if child.get(displays.OWNER) == root.mu_unit.uuid:
@@ -195,7 +195,7 @@ def separate(root: Any) -> None:
 
 
 def show(root: Any) -> None:
-    """Show preview, solid or result, as the unit's properties say; if that is missing, the preview."""
+    """Show preview, solid or result by the unit's properties; if that is missing, the preview."""
     props = root.mu_unit
     if root.mode == "EDIT" or props.preview is None:
         return
@@ -222,13 +222,13 @@ def show(root: Any) -> None:
 
 
 def hide_candidates(root: Any) -> None:
-    """Hide the candidate paths; setting what is set already would draw the whole unit again."""
+    """Hide the candidate paths; setting an unchanged property would draw the whole unit again."""
     if root.mu_unit.candidates:
         root.mu_unit.candidates = False
 
 
 def shows_result(root: Any) -> bool:
-    """Return True if the motion of a study is seen in the unit's own place."""
+    """Return True if the motion of a study is shown in the unit's place."""
     return root.mu_unit.show == RESULT and bool(displays.on_unit(root))
 
 

@@ -24,7 +24,7 @@ _pending: set[str] = set()
 
 
 def schedule(root) -> None:
-    """Schedule a rebuild of a unit's preview; at once in background, where timers never fire."""
+    """Schedule a rebuild of a unit's preview; rebuild at once in background, where timers never fire."""
     if updates.are_paused() or not root.mu_unit.uuid:
         return
     if bpy.app.background:
