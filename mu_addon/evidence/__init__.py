@@ -1,7 +1,7 @@
 """Evidence: causes of a model's misfit to measured data, their significance, and the gain of correcting them.
 
 `diagnose` takes experiments and a `Simulator` of them and returns a `Verdict`: the effects that explain the
-misfit, those that cannot be told apart, the gain on data held out, and the experiment to make next. An
+misfit, those that cannot be distinguished, the gain on data held out, and the experiment to make next. An
 `Effect` is a mechanism with parameters that leave the model unchanged at their null.
 """
 

@@ -10,7 +10,7 @@ from .residuals import Dependence, structure
 
 # False-positive probability of naming any effect of the library.
 FALSE_ALARM_RATE = 5e-4
-# Rivals within this delta chi squared (99 % for two parameters) cannot be told apart.
+# Rivals within this delta chi squared (99 % for two parameters) cannot be distinguished.
 RIVAL_DELTA_CHI2 = 9.2
 # Share of an effect's amplitude by which another valid law of its mechanism may differ from the library's: an
 # effect with a smaller gain beside it is not named.

@@ -15,7 +15,7 @@ from .results import Floats, Path, RankingResult, SideView
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette: told apart by readers with any kind of colour vision.
+# Okabe and Ito's palette: distinguishable with any kind of colour vision.
 CHOSEN = "#D55E00"
 BY_LENGTH = ("#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 BY_START = ("-", "--", ":", "-.")

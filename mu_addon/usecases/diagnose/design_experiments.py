@@ -53,7 +53,7 @@ NOISE = {
 SENSITIVITIES_S = 1.5
 # Half of the variance wanders, as slowly as a tenth of the longest record.
 SLOW = 0.1
-# Effects that look as much alike as this cannot be told apart.
+# Effects that look as much alike as this cannot be distinguished.
 ALIKE = 0.95
 
 

@@ -326,7 +326,7 @@ def advice(verdict: Verdict) -> str:
 def _asked(verdict: Verdict) -> str:
     if verdict.proposal is not None:
         doubted = [c for c in verdict.selection.causes if c.rivals]
-        it = "tells these causes apart"
+        it = "distinguishes these causes"
         if len(doubted) > 1:
             it = f"shows whether one is {alternatives([doubted[0].effect, *doubted[0].rivals])}"
         return f"{_upper(verdict.proposal.what)}. It {it}."
