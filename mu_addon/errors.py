@@ -52,7 +52,7 @@ class OutputError(MuError):
 def did_you_mean(name: str, names: Iterable[str], alike: float = 0.6) -> str:
     """`; did you mean x?` for the most similar of the names, "" where none is similar.
 
-    alike: least similarity, from 0 to 1.
+    alike: least similarity of a suggestion, from 0 to 1.
     """
     # Imported late: only a message needs it.
     from difflib import get_close_matches

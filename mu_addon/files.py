@@ -182,8 +182,8 @@ def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
 def write_npz(path: Path, arrays: Mapping[str, Any], packed: bool = True) -> None:
     """Write named `arrays` to `path`; equal arrays make equal bytes; raises OutputError.
 
-    packed: compress them, unless so strongly that `read_npz` would refuse them. Not what a window reads:
-    unpacking holds it up.
+    packed: compress them, unless so strongly that `read_npz` would refuse them. Not for files that a window
+    reads: unpacking is slow.
     """
     # Packed in memory: on a full disk an archive fails again when it is deleted, with a traceback.
     archive = io.BytesIO()

@@ -19,7 +19,7 @@ def add(commands: Commands[Any]) -> None:
 
     command = commands.add_parser(
         "resume",
-        help="Resume a stopped run, or run again what the inputs in a folder describe.",
+        help="Resume a stopped run, or repeat a run from the inputs in its folder.",
         epilog="example: run.py resume out/mu-1.0x",
     )
     command.add_argument(

@@ -61,7 +61,7 @@ def add_calibration(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--calibration",
         metavar="FILE",
-        help="Calibration, the calibration.toml of `calibrate`: angles are displayed beside voltages.",
+        help="Calibration, the calibration.toml of `calibrate`: angles are displayed with voltages.",
     )
 
 

@@ -49,7 +49,7 @@ def add_changes(
     x: wp.array2d(dtype=f64),
     y: wp.array2d(dtype=f64),
 ):
-    """Add to y what single systems add to the matrix they share: entries by rows (c,) of some systems."""
+    """Add to y the products with single systems' additions to the shared matrix: entries by rows (c,)."""
     c = wp.tid()
     s = system[c]
     total = f64(0.0)

@@ -85,7 +85,7 @@ class MaterialData:
         return tuple(layer.history.numpy().copy() for layer in self.layers if layer.history.shape[2])
 
     def restore(self, kept: Sequence[Array]) -> None:
-        """Set each law's history (k, q, h) to what `kept` returned, in the same order."""
+        """Set each law's history (k, q, h) to a result of `kept`, in the same order."""
         remembering = [layer.history for layer in self.layers if layer.history.shape[2]]
         for history, values in zip(remembering, kept, strict=True):
             history.assign(np.ascontiguousarray(values))

@@ -1,4 +1,4 @@
-"""Self-contact: a barrier that keeps the pieces of a body's surface apart, walls and struts alike."""
+"""Self-contact: a barrier between pieces of a body's surface, of walls and struts."""
 
 from __future__ import annotations
 

@@ -33,8 +33,8 @@ class Elasticity:
     """Effective elasticity of a lattice with three mirror planes: C (6, 6) in MPa, in Voigt's notation.
 
     Order xx, yy, zz, yz, xz, xy with engineering shears; entries that vanish by symmetry are 0.
-    relative_density: share of the volume that is solid. C11, C12, C44 and what follows from them are those of
-    the nearest cubic material, means over the axes; `cubic_error` is its relative distance.
+    relative_density: share of the volume that is solid. C11, C12, C44 and derived figures are those of the
+    nearest cubic material, means over the axes; `cubic_error` is its relative distance.
     """
 
     C: Array = attrs.field(converter=_tensor)
@@ -136,7 +136,7 @@ def young_modulus(C: Array, directions: ArrayLike) -> Array:
 
 
 def effective_tensor(mesh: Mesh, materials: Materials, box: Sequence[float] | None = None) -> Elasticity:
-    """Effective elasticity, at small strain, of the periodic body of which a mesh is one eighth, [0, box] mm.
+    """Effective elasticity, at small strain, of a periodic body from the mesh of its eighth, [0, box] mm.
 
     The mesh and its mirror images in its six sides make up the body (`octant.Octant`). box (3,) in mm: by
     default the mesh's. Energies are those of exact small-strain solutions on the mesh, so never below the

@@ -86,8 +86,8 @@ COMMON = (
 class Kind:
     """A kind of experiment.
 
-    needs: groups of columns, of which at least one must be complete; may_have: further columns; timed: time_s
-    is required; needs_keys, may_have_keys: keys of experiments.toml beyond `COMMON`; fewest: least number of
+    needs: groups of columns, at least one must be complete; may_have: further columns; timed: time_s is
+    required; needs_keys, may_have_keys: keys of experiments.toml beyond `COMMON`; fewest: least number of
     rows; marked: it may have columns of markers.
     """
 

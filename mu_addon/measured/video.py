@@ -63,8 +63,8 @@ class View:
     base: two markers that are fixed to the base; places_mm: (y, z) in mm of each in the unit's frame; tip:
     two markers on the tip, or None if no angle is wanted; camera: "+x" or "-x", its side of the unit. The
     scale is mm_per_pixel, or follows from ruler_mm, the distance of the two markers `ruler`, or from the
-    base. follow_base: whether places and angle are relative to the base in each frame, for a camera or clamp
-    that moves.
+    base. follow_base: True to measure places and angle relative to the base in each frame, for a moving
+    camera or clamp.
     """
 
     base: Pair
@@ -83,7 +83,7 @@ class Motion:
 
     angle_deg: rotation of the tip's pair relative to the base's since rest, positive toward +y; None without
     a tip. noise_px: standard deviation in pixels of one coordinate of a marker, from the distance of pairs on
-    rigid parts. remarks: what is unusual.
+    rigid parts. remarks: unusual features.
     """
 
     names: tuple[str, ...]

@@ -24,7 +24,7 @@ UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattic
 
 @attrs.frozen
 class FactorList:
-    """A parameter that is a text of factors by place, any of which may be free: "grading.cells[0 2 *]".
+    """A parameter that is a text of factors by place; each factor may be free: "grading.cells[0 2 *]".
 
     key: of a [[freedom]] table, names the place; place: its notation, with an example. factors: from a text,
     by the text of their place; text: the inverse; both raise InputError.

@@ -69,7 +69,7 @@ def gradients(
 
     pairs: for each freedom a function that makes the two bodies; called in order, one held at a time but for
     quantities without a slope. solved: `adjoint` of the same quantities, found here where it is not given.
-    Raises IndefiniteError at an unstable state, and what making a body raises.
+    Raises IndefiniteError at an unstable state, and the errors of making a body.
     """
     solved = solved or adjoint(structure, states, quantities)
     changes = _changes(structure, states, solved)

@@ -144,8 +144,8 @@ def representative_pressures(trajectory: Trajectory) -> Array:
 class Influence:
     """Displacement (s, p, 3, m) in mm of p points in s states by each element's stiffening, to first order.
 
-    pressure_MPa (s,): of the states. Values are for one element of the whole body made stiffer by the factor
-    1 + e, divided by e; an element of a half mesh stands for itself without its mirror image.
+    pressure_MPa (s,): of the states. A value is the change for one element of the whole body made stiffer by
+    the factor 1 + e, divided by e; an element of a half mesh counts without its mirror image.
     """
 
     pressure_MPa: Array

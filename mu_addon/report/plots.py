@@ -139,7 +139,7 @@ def _scale_bar(axes: Any, middle: float, z: float, length: float) -> None:
 def angle_against_pressure(pressure_kPa: Floats, angle_deg: Floats) -> str:
     """SVG of the bending angle (k,) in degrees against pressure (k,) in kPa, in the order of computation.
 
-    The angles at the lowest and at the highest pressure are written beside them.
+    The angles at the lowest and at the highest pressure are labelled.
     """
     with canvas(WIDTH, 3.1) as (figure, svg):
         axes = figure.add_axes((0.14, 0.16, 0.82, 0.78))

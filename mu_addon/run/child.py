@@ -119,7 +119,7 @@ class Child:
         return new
 
     def cancel(self) -> None:
-        """Ask it to stop; it keeps what it has finished. It is killed later if it does not respond."""
+        """Ask it to stop; it keeps its finished results. It is killed later if it does not respond."""
         if self.state == WAITING:
             self.state = CANCELLED
         if self.state == RUNNING and self._asked is None:

@@ -171,7 +171,7 @@ def _read(path: Path) -> str:
 
 
 def _set_aside(folder: Path, patterns: Iterable[str]) -> None:
-    """Move an earlier run's inputs and results to stale/, replacing what was set aside before."""
+    """Move an earlier run's inputs and results to stale/, replacing those set aside before."""
     stale = folder / "stale"
     try:
         if stale.is_dir():

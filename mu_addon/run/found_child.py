@@ -64,7 +64,7 @@ class FoundChild(Child):
         """Do nothing: it has been started."""
 
     def cancel(self) -> None:
-        """Ask it to stop; it keeps what it has finished."""
+        """Ask it to stop; it keeps its finished results."""
         if self.state == RUNNING and self._asked is None:
             self._asked = time.monotonic()
             self._signal(signal.SIGTERM)

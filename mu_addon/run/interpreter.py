@@ -21,7 +21,7 @@ _LIBRARY_FOLDERS = ("site-packages", "dist-packages")
 
 
 def interpreter(blender: str = "") -> list[str]:
-    """Command that runs a Python file: this Python or, if it has no file of its own, Blender's.
+    """Command that runs a Python file: this Python or, if it is part of Blender, Blender's.
 
     blender: path of Blender's program, if any. Raises InputError where there is neither.
     """

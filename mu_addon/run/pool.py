@@ -45,7 +45,7 @@ class Pool:
                 return self._pool.submit(work, *arguments)
 
     def result(self, future: Future[Found]) -> Found:
-        """Wait for the result. Raises what the work raised, and MuError if a process died."""
+        """Wait for the result. Raises the work's error, and MuError if a process died."""
         with self._errors():
             return future.result()
 
@@ -76,7 +76,7 @@ def each(
 ) -> Iterator[tuple[int, Found]]:
     """Number of each finished task, with the result of `work`, a module-level function.
 
-    what: names the work in errors. The processes end with the iteration. Raises what `work` raises, and
+    what: names the work in errors. The processes end with the iteration. Raises the error of `work`, and
     MuError if a process dies.
     """
     if workers == 1 or len(tasks) < 2:

@@ -258,7 +258,7 @@ def shares_done(folder: Path) -> dict[str, float]:
 
 
 def remaining(plan: Plan, done: dict[str, float], kept: Iterable[str]) -> Plan:
-    """The plan's stages, with the seconds of what is not done yet.
+    """The plan's stages, with the seconds of the remaining work.
 
     kept: beginnings of the names of stages whose finished work a folder's cache holds; the others run again.
     """

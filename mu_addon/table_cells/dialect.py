@@ -106,7 +106,7 @@ def _share(cells: Sequence[str]) -> float:
 def _quoted(lines: Sequence[str], begin: int, delimiter: str) -> int:
     """Number of lines of a row: more than one if quotes contain line ends, as in titles, and no numbers.
 
-    A quote that is never closed, or stands in a row of numbers, ends with its line.
+    A quote that is never closed, or is in a row of numbers, ends with its line.
     """
     open_ = lines[begin].count('"') % 2
     count = 1

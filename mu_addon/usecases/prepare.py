@@ -38,7 +38,7 @@ LAYOUT = FolderLayout("prepare.toml", "# What is prepared to be shown in a windo
 
 @attrs.frozen(eq=False)
 class Job:
-    """Key in `MAKERS` of what to make, and its inputs: texts, switches; a solid's unit and envelope."""
+    """Key in `MAKERS`, and its inputs: texts, switches; a solid's unit and envelope."""
 
     what: str
     of: Mapping[str, Any]

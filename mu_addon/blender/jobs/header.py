@@ -29,7 +29,7 @@ def listed() -> list[str]:
 
 
 class MU_OT_job_cancel(bpy.types.Operator):
-    """Stop this job, or take it out of the queue; what it has finished is kept"""
+    """Stop this job, or take it out of the queue; finished stages are kept"""
 
     bl_idname = "mu.job_cancel"
     bl_label = "Cancel Job"

@@ -1,4 +1,4 @@
-"""The extension's preferences: jobs when Blender is closed, and what uninstalling deletes."""
+"""The extension's preferences: jobs when Blender is closed, and results that uninstalling deletes."""
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 

@@ -15,7 +15,7 @@ INSTALLED = PACKAGE.startswith("bl_ext.")
 
 
 def user_folder(*parts: str) -> Path:
-    """A folder of the user's for this extension, made where missing; an upgrade leaves it as it is.
+    """The user's folder for this extension, created if missing; an upgrade keeps it.
 
     Run from source there is no extension, and the folder lies in the user's Blender configuration.
     """

@@ -1,7 +1,7 @@
 """Updates after a change: signals to which drawing modules connect, and a pause for setting many values.
 
-Blender fixes a property's update function with its class. A signal lets that function reach what draws the
-property without importing it: the module that draws connects when it is registered.
+Blender fixes a property's update function with its class. A signal lets that function reach the drawing
+module without importing it: that module connects when it is registered.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from mathutils import Vector
 LOWER, SENSOR_MM = 0.6, 72.0
 """Usual ratio of a 3D view's height to its width, and the width in mm of its camera's sensor."""
 ROOM = 1.2
-"""Factor on what is framed, for headers that cover a view, and for a unit that bends."""
+"""Factor on the framed size, for headers that cover a view, and for a unit that bends."""
 
 
 def areas() -> Iterator[Any]:

@@ -118,7 +118,7 @@ class BlockedForce:
         return (read + get(_zero(experiment), 0.0))[None]
 
     def _balanced(self, response: UnitResponse, p: Array, static: Mapping[str, float], give: float) -> Array:
-        """Force (n,) in N of the held tip, below 0 where it would be pulled; give: mm/N of the stand."""
+        """Force (n,) in N of the held tip, negative for tension; give: compliance of the stand in mm/N."""
         force = response.at(p, static)[0]
         if not give:
             return force

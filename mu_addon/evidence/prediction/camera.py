@@ -24,7 +24,9 @@ AWAY = 3.0
 # What is nearer is larger, by this share at half a unit's length from the middle: of a camera that far away
 # which is turned by 20 degrees, the sine over six half lengths.
 KEYSTONE = 0.06
-_KEYSTONE = "a camera three unit lengths away, turned by 20 degrees; above 0 what lies that way is farther"
+_KEYSTONE = (
+    "a camera three unit lengths away, turned by 20 degrees; above 0 parts in that direction are farther"
+)
 
 
 def camera_effects(channels: Sequence[str], kind: str, experiments: Sequence[Experiment]) -> list[Effect]:

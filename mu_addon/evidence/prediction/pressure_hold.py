@@ -453,7 +453,7 @@ def _pressure(amount: Array, rest: Array, soft: Array) -> Array:
 def _lost(
     t: Array, per_gas: Array, rest: Array, soft: Array, start: float, flow: Callable[[float], float]
 ) -> Array:
-    """Share of the gas (2 n + 1,) left at times of which every second is a step.
+    """Share of the gas (2 n + 1,) left at the steps and midway between them.
 
     per_gas, rest, soft (2 n + 1,): amounts in kPa of all gas, as in `_pressure`. flow: rate in 1/s, of the
     gas of the chamber at one atmosphere, at a pressure in atmospheres.

@@ -120,7 +120,7 @@ def _by_masing(strain: bytes, per_strain: float, hardening: float) -> Array:
 
 
 def yielded(strain: Array, law: Callable[[Array], Array], values: Mapping[str, float]) -> Array:
-    """Stress (n,) by a law of strain, of which a share yields as one element if `bouc_wen` has a value.
+    """Stress (n,) by a law of strain; if `bouc_wen` has a value, a share of it yields as one element.
 
     strain (n,): of a new specimen in the order it was strained. With the law's stress s and its first slope
     k, (1 - a) s + a k m z, where a is the share, m the yield strain, and dz/de is (1 - |z|^n)/m while |z|

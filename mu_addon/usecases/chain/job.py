@@ -178,7 +178,7 @@ class Job:
 
 
 def read_chain(path: Path, changes: Mapping[str, Any] | None = None) -> Job:
-    """The chain of a TOML file, whose other files lie beside it; changes: keys in place of the file's.
+    """The chain of a TOML file, with file names relative to its folder; changes: keys in place of the file's.
 
     Raises InputError that names file and key.
     """

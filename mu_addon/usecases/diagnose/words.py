@@ -247,7 +247,7 @@ def _struts(verdict: Verdict) -> str:
 
 
 def _acting(acting: Mapping[float, Sequence[float]]) -> str:
-    """Diameters in mm that struts act with, by the drawn ones; empty where all were drawn alike."""
+    """Effective diameters of struts in mm, by the drawn ones; empty if all were drawn equal."""
     if len(acting) < 2:
         return ""
     thick, *others = sorted(acting, reverse=True)

@@ -325,7 +325,7 @@ def write_study(job: Job, folder: Path) -> None:
 
 
 def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
-    """The job of study.toml's tables and the files beside it; raises InputError that names an unknown key."""
+    """The job of study.toml's tables and the files in its folder; raises InputError with an unknown key."""
     where = str(folder / NAME)
     job: dict[str, Any] = {"unit": read_unit(folder / FILES["unit"]), "protocol": grasp()}
     if "body" in tables["design"]:

@@ -1,9 +1,9 @@
 """The runs of one unit: every study of it, each in a separate folder.
 
 A unit has a home folder. Its runs are in `runs/` there, each named by the hash of its inputs: the same inputs
-find the same folder, and other inputs never change it. A study in the home folder itself, and what its next
-study has set aside in `stale/`, are of an older version, and are listed with the others. A run's name and
-star are in its folder's `label.toml`.
+find the same folder, and other inputs never change it. A study in the home folder itself, and its predecessor
+in `stale/`, are of an older version and are listed with the others. A run's name and star are in its folder's
+`label.toml`.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ _UNREADABLE = (OSError, ValueError, KeyError, TypeError, AttributeError, MuError
 class Run:
     """One run: its inputs, its results so far, and its label by the user.
 
-    design: hash of what was simulated, see `design_key`; summary: its summary.json, empty before it has one;
-    changed_s: when it last wrote that, in seconds since 1970.
+    design: hash of the simulated design, see `design_key`; summary: its summary.json, empty before it has
+    one; changed_s: when it last wrote that, in seconds since 1970.
     """
 
     folder: Path

@@ -67,7 +67,7 @@ def unite(trees) -> None:
 
 @contextmanager
 def _inputs_kept(tree, after) -> Iterator[None]:
-    """Keep the inputs, by name, of modifiers that use a tree while it is built anew or gives way."""
+    """Keep the inputs, by name, of modifiers that use a tree while it is rebuilt or replaced."""
     users = [m for o in bpy.data.objects for m in o.modifiers if m.type == "NODES" and m.node_group == tree]
     kept = [modifier_inputs(modifier) for modifier in users]
     yield
