@@ -49,11 +49,12 @@ minimize = ["mass_g"]
 
 [simulate]
 times = 3
-mesh = { order = 1, refine = 0.3 }
+mesh = { refine = 0.2 }
+self_contact = false
 
 [vary]
 "chambers.wall_mm" = { low = 0.9, high = 1.2 }
-"material.lattice_modulus_kPa" = { low = 15.0, high = 60.0, log = true }
+"material.membrane_modulus_kPa" = { low = 1500.0, high = 4000.0, log = true }
 """
 DESIGN = """
 format = 1
@@ -76,9 +77,9 @@ low = 0.8
 high = 1.4
 
 [[freedom]]
-parameter = "material.lattice_modulus_kPa"
-low = 10
-high = 30
+parameter = "material.membrane_modulus_kPa"
+low = 1500
+high = 4000
 """
 # The printed body of three chambers at one pressure: the least that has every stage.
 PLACE = ["--unit", "unit.toml", "--protocol", "protocol.csv", "--refine", "0.4"]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mu_addon.errors import InputError
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.optimization.design_file import parse_design
 from mu_addon.optimization.evaluation import evaluate
 from mu_addon.optimization.search import Observed, SearchSettings, search_units
@@ -27,16 +27,16 @@ preset = "mu-1.0x"
 [[target]]
 kind = "angle"
 pressure_kPa = 20
-value = 13.37
+value = 11.45
 tolerance = 0.3
 [[target]]
 kind = "angle"
 pressure_kPa = -8
-value = -6.53
+value = -16.56
 tolerance = 0.2
 [[target]]
 kind = "air_volume"
-value = 16.15
+value = 16.49
 tolerance = 0.15
 [[freedom]]
 parameter = "chambers.wall_mm"
@@ -51,9 +51,9 @@ parameter = "chambers.bladder_share"
 low = 0.45
 high = 0.7
 [[freedom]]
-parameter = "material.lattice_modulus_kPa"
-low = 8
-high = 40
+parameter = "material.membrane_modulus_kPa"
+low = 1500
+high = 4000
 """
 GRADIENT = 0.5
 
@@ -63,7 +63,7 @@ class Counted:
 
     def __init__(self, refine: float, with_gradient: bool) -> None:
         self.design = parse_design(ASKED, "benchmark")
-        self.mechanics = Mechanics(MeshSettings(refine=refine))
+        self.mechanics = Mechanics(MeshSettings(refine=refine, fidelity=RESOLVED))
         self.with_gradient = with_gradient
         self.cost = 0.0
         self.count = 0

@@ -44,10 +44,11 @@ points = {points}
 memory_MB = 2000
 [simulate]
 times = 3
-mesh = {{ order = 1, refine = 0.4 }}
+mesh = {{ refine = 0.3 }}
+self_contact = false
 [vary]
 "chambers.wall_mm" = {{ low = 0.8, high = 1.2 }}
-"material.lattice_modulus_kPa" = {{ low = 15.0, high = 60.0 }}
+"material.membrane_modulus_kPa" = {{ low = 1500.0, high = 4000.0 }}
 """
 
 

@@ -10,11 +10,13 @@ import numpy as np
 from ..errors import InputError
 from ..meshing.mesh import TET_EDGES, Mesh
 from ..meshing.quality import shapes
-from .elements import shape_functions, triangle_shapes
+from .elements import reference_gradients, shape_functions, triangle_shapes
 
 Array = np.ndarray[Any, Any]
 
 
+MIRROR = np.array([-1.0, 1.0, 1.0])
+"""Factors on a vector mirrored in the plane x = 0."""
 SETTLED = 1e-9
 """A smaller Newton step in reference coordinates is not followed by another."""
 
@@ -32,6 +34,44 @@ class Probe:
     def displacement(self, u: Array) -> Array:
         """Displacements (p, 3) in mm at the points, of nodal displacements (n, 3)."""
         return np.einsum("pn,pni->pi", self.weights, u[self.nodes])
+
+
+def numbers_of(mesh: Mesh, points: Array) -> Array:
+    """Numbers (p,) of a resolved mesh's nodes at points (p, 3) in mm; raises InputError where none is."""
+    from scipy.spatial import cKDTree
+
+    away, found = cKDTree(mesh.nodes).query(points)
+    if away.max() > 1e-6 * np.ptp(mesh.nodes[:, 2]):
+        x, y, z = points[away.argmax()].round(3).tolist()
+        raise InputError(
+            f"({x:g}, {y:g}, {z:g}) mm is not a node of the lattice's mesh",
+            "path, [waveguide] row",
+            "choose nodes within the envelope, and a lattice with a node at the cells' centres",
+        )
+    return np.asarray(found)
+
+
+def mean_gradients(mesh: Mesh, u: Array, nodes: Array) -> Array:
+    """Mean deformation gradient (k, 3, 3) of the elements around each of some different nodes (k,).
+
+    u: displacements (n, 3) in mm. In the mirror plane of a half mesh the image's elements count, too.
+    """
+    place = np.full(len(mesh.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    rows = np.flatnonzero((place[mesh.tets] >= 0).any(axis=1))
+    reference = reference_gradients(mesh.nodes, mesh.tets[rows])
+    volume = reference.volumes * mesh.filled[rows] if mesh.resolved else reference.volumes
+    weighted = np.einsum("eai,eqaj,eq->eij", u[mesh.tets[rows]], reference.gradients, volume)
+    row, corner = np.nonzero(place[mesh.tets[rows]] >= 0)
+    at = place[mesh.tets[rows]][row, corner]
+    found, total = np.zeros((len(nodes), 3, 3)), np.zeros(len(nodes))
+    np.add.at(found, at, weighted[row])
+    np.add.at(total, at, volume.sum(axis=1)[row])
+    found /= np.maximum(total, 1e-300)[:, None, None]
+    if "x" in mesh.symmetry:
+        on = mesh.nodes[nodes, 0] == 0.0
+        found[on] = (found[on] + MIRROR[:, None] * found[on] * MIRROR) / 2.0
+    return np.asarray(found + np.eye(3))
 
 
 def probe(mesh: Mesh, points: Array, tolerance: float = 1e-6) -> Probe:

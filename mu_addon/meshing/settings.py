@@ -33,13 +33,27 @@ SELF_CONTACT = described(
     "keep walls and struts apart, at several times the cost; without it they may cross, and the run gives "
     "the pressure",
 )
-OF_CONTINUUM = ("material.lattice_modulus_kPa", "material.lattice_poisson")
-"""Parameters of a unit that its printed struts do not have: theirs are the resin's."""
+OF_CONTINUUM = {
+    "material.lattice_modulus_kPa": "material.membrane_modulus_kPa",
+    "material.lattice_poisson": "material.membrane_poisson",
+    "material.sensor_modulus_kPa": "material.membrane_modulus_kPa",
+}
+"""Parameters that struts and sensor have not as printed, and those of the resin, which they have."""
 
 
 def fidelity_of(solid_struts: bool) -> str:
     """Fidelity of a printed body: its whole struts as beams, or all of them as solids."""
     return SOLID if solid_struts else RESOLVED
+
+
+def require_printed(name: object, where: str) -> None:
+    """Raise InputError for a parameter that a printed body does not have."""
+    if isinstance(name, str) and name in OF_CONTINUUM:
+        raise InputError(
+            f"{name} moves nothing: struts and sensor are printed of the unit's resin",
+            where,
+            f"vary {OF_CONTINUUM[name]}, the resin's, instead",
+        )
 
 
 def _one_of(*allowed: Any) -> Any:

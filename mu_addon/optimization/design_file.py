@@ -18,16 +18,16 @@ from ..design.quantity import Description
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError, did_you_mean
 from ..materials.library import Material, load_material, material_text, read_material
-from ..meshing.settings import FIDELITY, HOMOGENISED, OF_CONTINUUM, RESOLVED, MeshSettings
+from ..meshing.settings import RESOLVED, MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
-from .freedoms import PATH, UNSEEN, Freedom, changed_unit, fixed_values, read_freedoms
+from .freedoms import PATH, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
 from .settings import FINER
-from .targets import OF_SENSOR, Supplies, Target, read_targets
+from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
 from .unit_quantities import Mass
 
@@ -35,7 +35,7 @@ FORMAT = 1
 UNIT, RESIN, BODY = "unit.toml", "resin.toml", "body.obj"
 HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit that it starts from."
 _KEYS = (
-    "format", "preset", "unit", "fidelity", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
+    "format", "preset", "unit", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
     "orientation_deg", "robust", "self_contact", "body",
 )  # fmt: skip
@@ -51,8 +51,7 @@ class Design:
     material: the resin's, for density and elongation at break. orientation_deg: of the unit under its weight,
     0 hanging, tip down, turned about x; None: without weight. robust: targets must be met within the
     uncertainty. materials: choices of the freedom `resin`, by name; body: a closed surface in place of the
-    lattice's box, in the unit's frame; self_contact: of walls and struts of a resolved unit. why_homogenised:
-    the quantities that need a homogenised lattice, if no fidelity is given, else "".
+    lattice's box, in the unit's frame; self_contact: of walls and struts.
     """
 
     unit: Unit
@@ -72,7 +71,6 @@ class Design:
     materials: Mapping[str, Material] = attrs.field(factory=dict)
     body: Body | None = None
     self_contact: bool = settings_of.SELF_CONTACT.default
-    why_homogenised: str = ""
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -122,14 +120,12 @@ class Design:
     def unit_of(self, design: tuple[Any, ...]) -> Unit:
         """The unit with values of the freedoms; raises InputError where it breaks a rule, or leaves its body.
 
-        With another resin the moduli of wall and lattice change in proportion; a free modulus has priority.
+        With another resin it has that one's modulus; a free modulus has priority.
         """
         own = [(f, v) for f, v in zip(self.freedoms, design, strict=True) if f.is_of_unit]
-        found = changed_unit(
-            _of_resin(self.unit, self.chosen(self.choice(design)).material, self.material),
-            [f for f, _ in own],
-            [v for _, v in own],
-        )
+        material = self.chosen(self.choice(design)).material
+        unit = self.unit if material is self.material else material.in_unit(self.unit)
+        found = changed_unit(unit, [f for f, _ in own], [v for _, v in own])
         if self.body is not None:
             envelope(self.body, found.dimensions)
         return found
@@ -148,21 +144,6 @@ class Design:
             for t in self.targets
         )
         return attrs.evolve(self, targets=targets, material=material)
-
-
-def _of_resin(unit: Unit, chosen: Material, first: Material) -> Unit:
-    """The unit with another resin; its lattice and its sensor change in proportion to the wall."""
-    if chosen is first:
-        return unit
-    found = chosen.in_unit(unit)
-    m = found.material
-    share = m.membrane_modulus_kPa / unit.material.membrane_modulus_kPa
-    changed = attrs.evolve(
-        m,
-        lattice_modulus_kPa=share * m.lattice_modulus_kPa,
-        sensor_modulus_kPa=share * m.sensor_modulus_kPa,
-    )
-    return attrs.evolve(found, material=changed)
 
 
 def _as_chosen(quantity: Any, path: str, material: Material) -> Any:
@@ -227,6 +208,12 @@ def located_keys(text: str) -> Iterator[None]:
 def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body | None) -> Design:
     document = parse_toml(text, origin)
     for key in document:
+        if key == "fidelity":
+            raise InputError(
+                "the key fidelity is gone: every search simulates the printed body",
+                f"{origin}, {_line(text, key)}, {key}",
+                "leave it out",
+            )
         if key not in _KEYS:
             raise InputError(
                 f"unknown key {key!r}{did_you_mean(key, _KEYS)}",
@@ -279,19 +266,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
                 raise InputError(
                     f"{path!r} is not a path of the unit", f"{place}, values", f"of: {', '.join(paths)}"
                 )
-    why = "" if "fidelity" in document else _beyond_the_printed_body(freedoms, targets, fixed)
-    settings = MeshSettings(
-        refine=number(settings_of.REFINE),
-        fidelity=_word(document, "fidelity", HOMOGENISED if why else RESOLVED, origin, FIDELITY.choices),
-    )
-    self_contact = _flag(document, settings_of.SELF_CONTACT, text, origin)
-    if not settings.resolved:
-        if self_contact:
-            raise InputError(
-                "a homogenised lattice has no struts that could touch" + (f": {why}" if why else ""),
-                f"{origin}, {_line(text, 'self_contact')}, self_contact", "leave one of them out",
-            )  # fmt: skip
-        _require_homogenised(freedoms, targets, tables["freedom"], where["freedom"], why)
+    settings = MeshSettings(refine=number(settings_of.REFINE), fidelity=RESOLVED)
     search = SearchSettings(
         evaluations=int(number(settings_of.EVALUATIONS)),
         batch=int(number(settings_of.BATCH)),
@@ -302,8 +277,8 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
         number(settings_of.CHECK_REFINE, min(FINER * settings.refine, settings_of.REFINE.high)), search,
         printer, resin,
         number(settings_of.PRINT_TOLERANCE), number(settings_of.MODULUS_TOLERANCE), document,
-        material, turned, _flag(document, settings_of.ROBUST, text, origin), materials, body, self_contact,
-        why,
+        material, turned, _flag(document, settings_of.ROBUST, text, origin), materials, body,
+        _flag(document, settings_of.SELF_CONTACT, text, origin),
     )  # fmt: skip
 
 
@@ -327,45 +302,6 @@ def _places_of(
         if "fixed" not in table
     ]
     return rows[: len(freedoms)]
-
-
-def _beyond_the_printed_body(freedoms: list[Freedom], targets: list[Target], fixed: Mapping[str, Any]) -> str:
-    """Quantities that need a homogenised lattice, as text, or ""."""
-    for target in targets:
-        if target.kind in OF_SENSOR:
-            return f"{target.kind} needs a sensor, which a printed body would have in its mesh"
-    for name in (*(f.name for f in freedoms), *fixed):
-        if name in OF_CONTINUUM:
-            return f"{name} belongs to a homogenised lattice: printed struts have the resin's"
-    return ""
-
-
-def _require_homogenised(
-    freedoms: list[Freedom],
-    targets: list[Target],
-    tables: list[dict[str, Any]],
-    where: list[str],
-    why: str,
-) -> None:
-    """Raise InputError for requests that need struts, which a homogenised lattice has not.
-
-    why: that it is homogenised though no fidelity is given, or "".
-    """
-    remedy = "leave one of them out" if why else 'leave out fidelity = "homogenised"'
-    because = f" ({why})" if why else ""
-    places = {table.get("parameter"): place for table, place in zip(tables, where, strict=True)}
-    for freedom in freedoms:
-        if freedom.name in UNSEEN:
-            raise InputError(
-                f"{freedom.name} has no effect on a homogenised lattice: its modulus is a parameter{because}",
-                places.get(freedom.name, freedom.name),
-                remedy,
-            )
-    for target in targets:
-        if getattr(target.quantity, "region", "") == "struts":
-            raise InputError(
-                f"a homogenised lattice has no struts to stretch{because}", f"{target.line}, region", remedy
-            )
 
 
 def _unit(document: Mapping[str, Any], origin: str, folder: Path) -> Unit:
@@ -400,13 +336,10 @@ def _line(text: str, key: str) -> str:
     return "line ?"
 
 
-def _word(
-    document: Mapping[str, Any], key: str, default: str, origin: str, allowed: tuple[str, ...] = ()
-) -> str:
+def _word(document: Mapping[str, Any], key: str, default: str, origin: str) -> str:
     found = document.get(key, default)
-    if not isinstance(found, str) or (allowed and found not in allowed):
-        words = f"one of: {', '.join(allowed)}" if allowed else "write it in quotes"
-        raise InputError(f"{key} = {found!r} is not offered", f"{origin}, {key}", words)
+    if not isinstance(found, str):
+        raise InputError(f"{key} = {found!r} is not offered", f"{origin}, {key}", "write it in quotes")
     return found
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.anchors import window
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError, MeshingError
 from ..fem.factor import IndefiniteError
@@ -99,9 +98,7 @@ def evaluate(
     values = np.full(len(targets), np.nan)
     gradient = np.full((len(targets), len(continuous)), np.nan)
     conditions = {c for q in quantities for c in q.conditions}
-    paths = {c.materials for c in conditions} - {WITHOUT}
-    body = UnitBody(unit, mechanics, {name: window(unit, name) for name in sorted(paths)})
-    simulated = 1 + len(paths)
+    body, simulated = UnitBody(unit, mechanics), len({WITHOUT, *(c.path for c in conditions)})
     rows = [i for i, t in enumerate(targets) if t.quantity is not None]
     try:
         states, _ = solve(body.structure, conditions)

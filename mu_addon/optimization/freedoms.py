@@ -14,12 +14,11 @@ from ..design.grading import CellFactor
 from ..design.parameters import SECTIONS, Unit
 from ..design.quantity import Description, describe
 from ..errors import InputError, did_you_mean
+from ..meshing.settings import OF_CONTINUUM, require_printed
 
 SCALE = "scale"
 PATH, RESIN = "path", "resin"
 """Freedoms besides a unit's parameters: the path of the sensor, and the resin of the unit."""
-# Struts of a homogenised lattice have no stiffness of their own: its modulus is a parameter.
-UNSEEN = ("lattice.junction_diameter_mm", "lattice.midspan_diameter_mm", "lattice.kind")
 
 
 @attrs.frozen
@@ -135,9 +134,10 @@ class Freedom:
 
 
 def parameters() -> dict[str, Description]:
-    """Every parameter of a unit by its dotted name; `scale` has no section."""
-    head = {d.name: d for d in describe(Unit)}
-    return head | {f"{s.section}.{d.name}": d for s in SECTIONS for d in describe(s)}  # type: ignore[attr-defined]
+    """Every parameter of a printed unit by its dotted name; `scale` has no section."""
+    found = {d.name: d for d in describe(Unit)}
+    found |= {f"{s.section}.{d.name}": d for s in SECTIONS for d in describe(s)}  # type: ignore[attr-defined]
+    return {name: d for name, d in found.items() if name not in OF_CONTINUUM}
 
 
 def parameter_of(unit: Unit, name: str) -> Any:
@@ -216,6 +216,7 @@ def fixed_values(tables: Sequence[Mapping[str, Any]], where: Sequence[str]) -> d
 def _parameter(table: Mapping[str, Any], where: str) -> tuple[str, Description]:
     known = parameters()
     name = table.get("parameter")
+    require_printed(name, f"{where}, parameter")
     if not isinstance(name, str) or name not in known:
         hint = did_you_mean(name, list(known)) if isinstance(name, str) else ""
         raise InputError(

@@ -16,15 +16,17 @@ do not have it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import attrs
 import numpy as np
 
 from ..design.quantity import in_MPa
+from ..errors import MeshingError
 from ..fem.model import Model
 from .residual_change import ResidualChange
-from .structure import Condition, Quantity, States, Structure
+from .structure import WITHOUT, Condition, Quantity, States, Structure
 
 Array = np.ndarray[Any, Any]
 
@@ -69,7 +71,8 @@ def gradients(
 
     pairs: for each freedom a function that makes the two bodies; called in order, one held at a time but for
     quantities without a slope. solved: `adjoint` of the same quantities, found here where it is not given.
-    Raises IndefiniteError at an unstable state, and the errors of making a body.
+    nan where a freedom changes which struts a sensor meets. Raises IndefiniteError at an unstable state, and
+    the errors of making a body.
     """
     solved = solved or adjoint(structure, states, quantities)
     changes = _changes(structure, states, solved)
@@ -81,15 +84,20 @@ def gradients(
     for f, make in enumerate(pairs):
         plus, minus, step = make()
         for numbers, change in changes.values():
-            found[numbers, f] -= change.between(plus, minus) / step
+            try:
+                found[numbers, f] -= change(plus, minus) / step
+            except MeshingError:
+                found[numbers, f] = np.nan
         for condition in own:
             forces[condition].append(_residual_change(plus, minus, condition, states) / step)
         for number, q in enumerate(quantities):
+            if np.isnan(found[number, f]):
+                continue
             if hasattr(q, "change"):
                 found[number, f] += q.change(structure, states, plus, minus) / step
             elif q not in direct:
                 ahead, behind = (
-                    q.value(side, {c: side.following(states[c]) for c in q.conditions})
+                    q.value(side, {c: side.of(c.path).following(states[c]) for c in q.conditions})
                     for side in (plus, minus)
                 )
                 found[number, f] += (ahead - behind) / step
@@ -108,14 +116,25 @@ def gradients(
 
 def _changes(
     structure: Structure, states: States, solved: Adjoint
-) -> dict[Condition, tuple[list[int], ResidualChange]]:
-    """Quantities that each condition of an adjoint serves, and the change of lambda . r."""
-    found = {}
+) -> dict[Condition, tuple[list[int], Callable[[Structure, Structure], Array]]]:
+    """Quantities that each condition of an adjoint serves, and the change of lambda . r between two bodies.
+
+    Of a body with a sensor by both residuals: its ties may go to other nodes in a neighbour.
+    """
+    found: dict[Condition, tuple[list[int], Callable[[Structure, Structure], Array]]] = {}
     for condition, (numbers, lam) in solved.of.items():
+        if condition.path != WITHOUT:
+            found[condition] = list(numbers), partial(_along, lam, condition, states)
+            continue
         u = states[condition]
         along = _everywhere(structure, u, lam)
-        found[condition] = list(numbers), ResidualChange(structure, condition, u, along)
+        found[condition] = list(numbers), ResidualChange(structure, condition, u, along).between
     return found
+
+
+def _along(lam: Array, condition: Condition, states: States, plus: Structure, minus: Structure) -> Array:
+    """Difference (k,) of lambda . r, lambda (free, k), between two bodies at the same displacements."""
+    return np.asarray(lam.T @ _residual_change(plus, minus, condition, states))
 
 
 def _everywhere(structure: Structure, u: Array, free: Array) -> list[Array]:
@@ -131,16 +150,16 @@ def _residual_change(plus: Structure, minus: Structure, condition: Condition, st
     pressure, u = in_MPa(condition.pressure_kPa), states[condition]
     sides = []
     for s in (plus, minus):
-        model = s.under(condition)
-        data = model.parameters(s.materials[condition.materials])
-        sides.append(model.residual(s.following(u), pressure, data).ravel()[model.free])
+        body, model = s.of(condition.path), s.under(condition)
+        data = model.parameters(body.materials)
+        sides.append(model.residual(body.following(u), pressure, data).ravel()[model.free])
     return np.asarray(sides[0] - sides[1])
 
 
 def _tangent_factor(structure: Structure, states: States, condition: Condition) -> tuple[Any, Model]:
     """The factor of the tangent at a condition's state, and the condition's model."""
     model = structure.under(condition)
-    data = model.parameters(structure.materials[condition.materials])
+    data = model.parameters(structure.of(condition.path).materials)
     values = model.tangent(states[condition], in_MPa(condition.pressure_kPa), data)
     return model.factor.factor(values), model
 

@@ -191,7 +191,7 @@ class AirVolume:
         """Derivative (n, 3) in ml/mm by the nodes' places: minus the nodal forces of unit pressure."""
         model = structure.model
         u = states[self.conditions[0]] if self.conditions else np.zeros_like(model.mesh.nodes)
-        data = model.parameters(structure.materials[WITHOUT])
+        data = model.parameters(structure.materials)
         forces = model.residual(u, 0.0, data) - model.residual(u, 1.0, data)
         return np.asarray(_whole(model) * forces / 1000.0)
 
@@ -389,7 +389,7 @@ class RestStiffness:
         """Displacement (free,) under the weights as forces in N, found once for one body."""
 
         def solved() -> Array:
-            rest, data = np.zeros_like(model.mesh.nodes), model.parameters(structure.materials[WITHOUT])
+            rest, data = np.zeros_like(model.mesh.nodes), model.parameters(structure.materials)
             factor = model.factor.factor(model.tangent(rest, 0.0, data))
             return np.asarray(factor.solve(weights.ravel()[model.free]))
 

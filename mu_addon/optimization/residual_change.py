@@ -45,7 +45,7 @@ class ResidualChange:
     def between(self, plus: Structure, minus: Structure) -> Array:
         """First-order difference of each v . r (k,) in mJ between one neighbour and another."""
         first, second = plus.model.mesh, minus.model.mesh
-        found = self._by_materials(*(s.materials[self._condition.materials] for s in (plus, minus)))
+        found = self._by_materials(plus.materials, minus.materials)
         if first is not second:
             found += [one.between(first, second) for one in self.sensitivities]
             found += [np.vdot(one, first.nodes - second.nodes) for one in self._contact_by_places]
@@ -55,7 +55,7 @@ class ResidualChange:
 
     @property
     def _own(self) -> Materials:
-        return self._structure.materials[self._condition.materials]
+        return self._structure.materials
 
     def _by_materials(self, plus: Materials, minus: Materials) -> Array:
         weights = _weights_change(plus, minus, len(self._model.mesh.tets))

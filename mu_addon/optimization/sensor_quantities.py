@@ -11,8 +11,9 @@ from ..design.anchors import anchor_points, window
 from ..design.dimensions import Dimensions
 from ..design.parameters import Unit
 from ..design.waveguide import waveguide
+from ..errors import InputError, MeshingError
 from ..fem.bending_angle import TipSection
-from ..fem.kinematics import probe
+from ..fem.kinematics import numbers_of
 from ..placement.deviation import centreline
 from ..sensing.embedded_waveguide import Joints, embed_waveguide
 from ..sensing.guide import Optics
@@ -23,6 +24,8 @@ from .structure import WITHOUT, Condition, States, Structure
 Array = np.ndarray[Any, Any]
 
 STATIONS = 51
+STEP_MM = 1e-5
+"""Half step of an anchor for the slope of the deviation."""
 
 
 @attrs.frozen
@@ -43,18 +46,42 @@ class Disturbance:
 
     def value(self, structure: Structure, states: States) -> float:
         """Value in mm."""
-        points = anchor_points(structure.about)
-        monitor = probe(structure.model.mesh, points)
-        lines = {
-            m: centreline(
-                np.array(
-                    [points + monitor.displacement(states[Condition(m, p)]) for p in self.pressures_kPa]
-                ),
-                STATIONS,
-            )
-            for m in (WITHOUT, self.path)
-        }
-        return float(np.linalg.norm(lines[self.path] - lines[WITHOUT], axis=-1).mean())
+        anchors, numbers = _anchors(structure)
+        return float(np.mean([_apart(*self._moved(anchors, numbers, states, p)) for p in self.pressures_kPa]))
+
+    def slope(self, structure: Structure, states: States) -> dict[Condition, Array]:
+        """Derivative by the displacements (n, 3) of each body, unitless, by differences at the anchors."""
+        anchors, numbers = _anchors(structure)
+        found = {}
+        for p in self.pressures_kPa:
+            lines = self._moved(anchors, numbers, states, p)
+            for k, path in enumerate((WITHOUT, self.path)):
+                own = found[Condition(path, p)] = np.zeros_like(states[Condition(path, p)])
+                for node, axis in np.ndindex(anchors.shape):
+                    step = np.zeros_like(anchors)
+                    step[node, axis] = STEP_MM
+                    ahead, behind = (
+                        _apart(*(line + sign * step * (i == k) for i, line in enumerate(lines)))
+                        for sign in (1.0, -1.0)
+                    )
+                    own[numbers[node], axis] = (ahead - behind) / (2.0 * STEP_MM * len(self.pressures_kPa))
+        return found
+
+    def _moved(self, anchors: Array, numbers: Array, states: States, pressure_kPa: float) -> list[Array]:
+        """The anchors (p, 3) in mm without and with the sensor."""
+        return [anchors + states[Condition(m, pressure_kPa)][numbers] for m in (WITHOUT, self.path)]
+
+
+def _anchors(structure: Structure) -> tuple[Array, Array]:
+    """Anchors (p, 3) in mm of a unit, and their nodes (p,): of every mesh of it, with a sensor or without."""
+    anchors = anchor_points(structure.about)
+    return anchors, structure.once("anchors", lambda: numbers_of(structure.model.mesh, anchors))
+
+
+def _apart(one: Array, other: Array) -> float:
+    """Mean distance in mm of two backbones through anchors (p, 3) in mm."""
+    lines = centreline(np.array([one, other]), STATIONS)
+    return float(np.linalg.norm(lines[1] - lines[0], axis=-1).mean())
 
 
 @attrs.frozen
@@ -76,13 +103,17 @@ class SensorSlope:
         return tuple(Condition(WITHOUT, p) for p in self.pressures_kPa)
 
     def value(self, structure: Structure, states: States) -> float:
-        """Value in 1/deg. Raises InputError where the path has no room for a waveguide."""
+        """Value in 1/deg. Raises MeshingError where the path has no room for a waveguide."""
         unit: Unit = structure.about
         mesh = structure.model.mesh
         chosen = window(unit, self.path)
         anchors = anchor_points(unit)
         numbers = list(chosen.indices)
-        bar = embed_waveguide(waveguide(unit, chosen), anchors[numbers], unit.printed)
+        try:
+            bar = embed_waveguide(waveguide(unit, chosen), anchors[numbers], unit.printed)
+        except InputError as error:
+            # Another design may have room for it.
+            raise MeshingError(error.what, error.where, error.remedy) from error
         joints = Joints.of(mesh, anchors, unit.dimensions.cell)
         tip = TipSection.of(mesh)
         displacements = [np.zeros_like(mesh.nodes), *(states[c] for c in self.conditions)]

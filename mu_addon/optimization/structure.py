@@ -23,38 +23,56 @@ Array = np.ndarray[Any, Any]
 WALL_STEPS = 4
 """Number of steps in which a tip is moved to the wall that holds it."""
 WITHOUT = ""
-"""Name of the body's materials without a sensor, Model A."""
+"""Path of a body without a sensor, Model A."""
 
 
 class Condition(NamedTuple):
-    """One state that a quantity needs: a name of the structure's materials, and a pressure in kPa.
+    """One state that a quantity needs: the path of the sensor in the body, and a pressure in kPa.
 
     wall_mm: distance at which a wall holds the tip, from where it is drawn (`HeldTip`); None: it is free.
     """
 
-    materials: str
+    path: str
     pressure_kPa: float
     wall_mm: float | None = None
 
 
 States = Mapping[Condition, Array]
 """Displacements (n, 3) in mm by condition."""
+Follow = Callable[[Equilibrium, Sequence[State]], list[State]]
+"""States of a body with a sensor, from those of the body without it on one side of rest: the last is at the
+pressure of their last."""
 
 
 @attrs.frozen(eq=False)
 class Structure:
     """A discretised body for one choice of freedoms.
 
-    materials: by name, `WITHOUT` for the body alone, and the name of a sensor's path for the body with it;
     about: its origin (a Unit), for quantities of the design; shared: figures of its elements that do not
-    depend on the nodes' positions, valid for bodies of the same elements too.
+    depend on the nodes' positions, valid for bodies of the same elements too. with_sensor: makes the body
+    with the sensor along a path, whose states `follow` finds. Its mesh begins with this one's nodes.
     """
 
     model: Model
-    materials: Mapping[str, Materials]
+    materials: Materials
     about: Any = None
     newton: NewtonSettings = attrs.field(factory=NewtonSettings)
     shared: dict[str, Any] = attrs.field(factory=dict)
+    with_sensor: Callable[[str], Structure] | None = None
+    follow: Follow | None = None
+    _with: dict[str, Structure] = attrs.field(factory=dict, init=False, repr=False)
+
+    def of(self, path: str) -> Structure:
+        """The body with the sensor along a path, made when first asked for; itself `WITHOUT` one.
+
+        Raises MeshingError.
+        """
+        if path == WITHOUT:
+            return self
+        if path not in self._with:
+            assert self.with_sensor is not None
+            self._with[path] = self.with_sensor(path)
+        return self._with[path]
 
     def once(self, name: str, make: Callable[[], Any]) -> Any:
         """Figure of the elements, computed when first asked for."""
@@ -83,9 +101,12 @@ class Structure:
         return [column.reshape(u.shape) for column in self.model.passed_back(u, columns).T]
 
     def under(self, condition: Condition) -> Model:
-        """Model of a condition: the body's own, or one with the wall that holds its tip."""
+        """Model of a condition: the body's own with or without a sensor, or with the wall that holds its tip.
+
+        Raises MeshingError.
+        """
         if condition.wall_mm is None:
-            return self.model
+            return self.of(condition.path).model
         # Made first, so that both share it.
         _ = self.model.factor
         found = copy.copy(self.model)
@@ -121,28 +142,30 @@ def solve(structure: Structure, conditions: Iterable[Condition]) -> tuple[dict[C
     Raises ConvergenceError where a pressure cannot be reached, and InputError for materials with history.
     """
     wanted = set(conditions)
-    found: dict[Condition, Array] = {}
-    factorisations = 0
-    for name, wall_mm in sorted({(c.materials, c.wall_mm) for c in wanted}, key=repr):
-        model = structure.under(Condition(name, 0.0, wall_mm))
-        equilibrium = Equilibrium(model, structure.materials[name], structure.newton)
+    found: dict[Condition, State] = {}
+    # A sensor's states start from those without it, which come first.
+    for path, wall_mm in sorted({(c.path, c.wall_mm) for c in wanted}, key=repr):
+        body, model = structure.of(path), structure.under(Condition(path, 0.0, wall_mm))
+        equilibrium = Equilibrium(model, body.materials, body.newton)
         if equilibrium.parameters.has_history or model.has_friction:
             raise InputError(
                 "the state of a body with friction or memory depends on its history",
                 "[wall], freedoms",
                 "optimise with an elastic law of the wall",
             )
+        pressures = sorted(c.pressure_kPa for c in wanted if (c.path, c.wall_mm) == (path, wall_mm))
         start = _start(equilibrium, wall_mm)
-        pressures = sorted(c.pressure_kPa for c in wanted if (c.materials, c.wall_mm) == (name, wall_mm))
-        sides = [[p for p in pressures if p < 0][::-1], [p for p in pressures if p > 0]]
-        found |= {Condition(name, p, wall_mm): start.u for p in pressures if p == 0}
-        for side in sides:
+        found |= {Condition(path, p, wall_mm): start for p in pressures if p == 0}
+        for side in ([p for p in pressures if p < 0][::-1], [p for p in pressures if p > 0]):
             history: list[State] = [start]
-            for pressure in side:
-                history.append(equilibrium.reach(in_MPa(pressure), history))
-                found[Condition(name, pressure, wall_mm)] = history[-1].u
-                factorisations += history[-1].factorisations
-    return found, factorisations
+            for number, pressure in enumerate(side, 1):
+                if body.follow is None:
+                    history.append(equilibrium.reach(in_MPa(pressure), history))
+                else:
+                    way = [found[Condition(WITHOUT, p)] for p in side[:number]]
+                    history.append(body.follow(equilibrium, way)[-1])
+                found[Condition(path, pressure, wall_mm)] = history[-1]
+    return {c: state.u for c, state in found.items()}, sum(s.factorisations for s in found.values())
 
 
 def _start(equilibrium: Equilibrium, wall_mm: float | None) -> State:

@@ -45,8 +45,6 @@ KINDS: dict[str, tuple[tuple[str, ...], str]] = {
     "walls_apart": (("pressure_kPa",), ""),
     "printable": ((), ""),
 }
-OF_SENSOR = ("deviation", "sensor_slope")
-"""Kinds that need a sensor in the body."""
 _FORM = ("kind", "name", "value", "tolerance", "low", "high", "objective", "points")
 NARROW = 0.02
 """One unit of misfit of a bound without a tolerance, as a share of the bound."""
@@ -278,7 +276,7 @@ def _quantity(
         return RestStiffness(name, direction)
     if kind == "workspace":
         return Workspace(name, _pressures(table, where))
-    if kind in OF_SENSOR:
+    if kind in ("deviation", "sensor_slope"):
         pressures, path = _pressures(table, where), table.get("path")
         if path is None and supplies.path_is_free:
             path = ""

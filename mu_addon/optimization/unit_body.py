@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -11,24 +11,24 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ..design.anchors import Window, anchor_points
+from ..design.anchors import anchor_points, window
 from ..design.body import Body, envelope
 from ..design.parameters import Unit
-from ..errors import InputError
+from ..errors import InputError, MeshingError
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.moved_nodes import relocated
 from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
 from ..fem.unit_materials import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
-from ..meshing.morph import Morph
-from ..meshing.settings import MeshSettings
-from ..placement.candidates import Candidate, roi, with_sensor
+from ..meshing.settings import RESOLVED, MeshSettings
+from ..resolved.candidates import states_along
 from ..resolved.morph import PrintedMorph
-from ..resolved.printed_mesh import mesh_of
+from ..resolved.printed_mesh import mesh_printed
+from ..resolved.waveguide import bar_of, moved_with_waveguide, with_waveguide
 from .freedoms import Freedom, changed_unit
 from .gradient import Pair
-from .structure import WITHOUT, Structure
+from .structure import Structure
 
 Array = np.ndarray[Any, Any]
 
@@ -51,21 +51,18 @@ def _materials(unit: Unit, mesh: Mesh) -> Materials:
 
 @attrs.frozen(eq=False)
 class Mechanics:
-    """Settings of a unit's simulation: mesh, and the changes of an extended model.
+    """Settings of a printed unit's simulation: mesh, and the changes of an extended model.
 
     as_printed: a drawn unit with the parts of the model that a unit has parameters for; materials, model: of
-    such a unit and its mesh; load: dead forces (n, 3) in N, or None; newton: settings, None for the
-    fidelity's usual ones. body: a closed surface in place of the lattice's box; self_contact: of walls and
-    struts of a resolved unit.
+    such a unit and its mesh; load: dead forces (n, 3) in N, or None. body: a closed surface in place of
+    the lattice's box; self_contact: of walls and struts.
     """
 
-    settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
+    settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5, fidelity=RESOLVED))
     as_printed: Callable[[Unit], Unit] = _same
     materials: Callable[[Unit, Mesh], Materials] = _materials
     model: Callable[[Unit, Mesh], Model] = _model
     load: Callable[[Unit, Mesh], Array | None] = lambda unit, mesh: None
-    newton: NewtonSettings | None = None
-    mesher: str = "auto"
     cache: Path | None = None
     body: Body | None = None
     self_contact: bool = False
@@ -73,14 +70,10 @@ class Mechanics:
 
 @attrs.frozen
 class UnitBody:
-    """One unit as a body, with its sensors' paths; `structure` is meshed on first use.
-
-    unit: as drawn; windows: paths by name whose sensors are simulated beside the unit without.
-    """
+    """One unit, as drawn, as a body; `structure` is meshed on first use, and its sensors are (`of`)."""
 
     unit: Unit
     mechanics: Mechanics
-    windows: Mapping[str, Window] = attrs.field(factory=dict)
     _shared: dict[str, Any] = attrs.field(factory=dict, init=False, eq=False, repr=False)
 
     @cached_property
@@ -92,7 +85,7 @@ class UnitBody:
     def mesh(self) -> Mesh:
         """The unit's mesh. Raises InputError and MeshingError."""
         m = self.mechanics
-        return mesh_of(self.printed, m.settings, mesher=m.mesher, cache=m.cache, body=self.envelope)
+        return mesh_printed(self.printed, m.settings, cache=m.cache, body=self.envelope)
 
     @property
     def envelope(self) -> Body | None:
@@ -107,15 +100,16 @@ class UnitBody:
         model.load = self.mechanics.load(self.printed, self.mesh)
         if self.mechanics.self_contact:
             model.self_contact = self_contact_of(self.printed, self.mesh)
-        return self._structure(self.unit, self.printed, model)
+        return self._structure(self.unit, self.printed, model, self.mesh)
 
     @cached_property
-    def morph(self) -> Morph | PrintedMorph:
+    def morph(self) -> PrintedMorph:
         """Morph of its mesh to units near to it. Raises MeshingError."""
-        m = self.mechanics
-        if self.mesh.resolved:
-            return PrintedMorph(self.mesh, self.printed, m.settings, self.envelope)
-        return Morph(self.mesh, self.printed, m.settings)
+        return PrintedMorph(self.mesh, self.printed, self.mechanics.settings, self.envelope)
+
+    @property
+    def _newton(self) -> NewtonSettings:
+        return RESOLVED_CONTACT_NEWTON if self.mechanics.self_contact else RESOLVED_NEWTON
 
     def moved(self, unit: Unit) -> Structure:
         """Another unit on this one's mesh, morphed; it shares this one's buffers (`relocated`).
@@ -128,7 +122,7 @@ class UnitBody:
         contact = None if own is None else relocated_contact(own, printed, mesh)
         model = relocated(self.structure.model, mesh, contact)
         model.load = self.mechanics.load(printed, mesh)
-        return self._structure(unit, printed, model)
+        return self._structure(unit, printed, model, mesh)
 
     def pair(self, freedom: Freedom) -> Pair:
         """The two neighbours by one continuous freedom, and the difference between them in its unit.
@@ -153,21 +147,43 @@ class UnitBody:
         """`pair` of every freedom, each made on demand."""
         return [lambda freedom=freedom: self.pair(freedom) for freedom in freedoms]  # type: ignore[misc]
 
-    def _structure(self, unit: Unit, printed: Unit, model: Model) -> Structure:
-        mesh = model.mesh
-        own = self.mechanics.materials(printed, mesh)
-        materials = {WITHOUT: own}
-        for name, window in self.windows.items():
-            if mesh.resolved:
-                raise InputError(
-                    "a resolved unit's sensor is meshed with it, which the optimisation does not do",
-                    f"path {name}",
-                    'optimise with fidelity = "homogenised" and check the result with `place`',
-                )
-            points = anchor_points(printed)[list(window.indices)]
-            found = roi(mesh, Candidate(name, window.start, points), printed.waveguide.inclusion_radius_mm)
-            share = found.share
-            materials[name] = with_sensor(own, share, printed.material.sensor_modulus_MPa)
-        usual = RESOLVED_CONTACT_NEWTON if self.mechanics.self_contact else RESOLVED_NEWTON
-        newton = self.mechanics.newton or (usual if mesh.resolved else NewtonSettings())
-        return Structure(model, materials, printed, newton, self._shared)
+    def _structure(self, unit: Unit, printed: Unit, model: Model, mesh: Mesh) -> Structure:
+        return Structure(
+            model,
+            self.mechanics.materials(printed, mesh),
+            printed,
+            self._newton,
+            self._shared,
+            with_sensor=lambda path: self._with_sensor(unit, printed, mesh, path),
+        )
+
+    def _with_sensor(self, unit: Unit, printed: Unit, mesh: Mesh, path: str) -> Structure:
+        """The body with the waveguide along a path, in a unit's mesh. Raises MeshingError."""
+        m, chosen = self.mechanics, window(unit, path)
+        points = anchor_points(printed)[list(chosen.indices)]
+        body = None if m.body is None else envelope(m.body, printed.dimensions)
+        try:
+            bar = bar_of(printed, points, body)
+            if mesh is self.mesh:
+                found = with_waveguide(mesh, bar, printed, body)
+                model = m.model(printed, found)
+                if m.self_contact:
+                    model.self_contact = self_contact_of(printed, found)
+            else:
+                first = self.structure.of(path).model
+                found = moved_with_waveguide(self.mesh, first.mesh, mesh, bar, printed, body)
+                own = first.self_contact
+                contact = None if own is None else relocated_contact(own, printed, found)
+                model = relocated(first, found, contact)
+        except InputError as error:
+            # Another design may have room for it.
+            raise MeshingError(error.what, error.where, error.remedy) from error
+        model.load = m.load(printed, found)
+        cell = printed.printed.cell
+        return Structure(
+            model,
+            m.materials(printed, found),
+            printed,
+            self._newton,
+            follow=lambda equilibrium, way: states_along(equilibrium, mesh, points, cell, way),
+        )

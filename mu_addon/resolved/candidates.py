@@ -15,13 +15,14 @@ from ..design.parameters import Unit
 from ..errors import ConvergenceError
 from ..fem.embedding import embed
 from ..fem.equilibrium import Equilibrium
+from ..fem.kinematics import numbers_of
 from ..fem.materials import Materials
 from ..fem.model import Model
 from ..fem.newton_settings import NewtonSettings
 from ..fem.state import State, as_far_as_found
 from ..fem.time_stepping import simulate_in_time
 from ..meshing.mesh import Mesh, part
-from .start import eased, numbers_of, started
+from .start import eased, started
 from .waveguide import bar_of, with_waveguide
 
 Array = np.ndarray[Any, Any]
@@ -61,21 +62,8 @@ class PrintedWaveguides:
         has a state for each of `way` from there on. The mesh of a candidate begins with the nodes of the
         unit's. Raises ConvergenceError, and InputError for a candidate that cannot be printed.
         """
-        path = self.paths[number]
-        equilibrium = self._equilibrium(number)
-        for begin in range(len(way) - 1, -1, -1):
-            found = self._near(equilibrium, path, way[begin])
-            if found is not None:
-                on = [state.pressure_MPa for state in way[begin + 1 :]]
-                with contextlib.suppress(ConvergenceError):
-                    return [found, *equilibrium.path(on, found)]
-        return equilibrium.path([state.pressure_MPa for state in way], equilibrium.at_zero_pressure())
-
-    def _near(self, equilibrium: Equilibrium, path: Array, state: State) -> State | None:
-        """A candidate's state near one of Model A, or None if none is found."""
-        bent = started(self.mesh, equilibrium.model.mesh, path, state.u)
-        start = eased(equilibrium, bent, state.u, EASED_CELLS * self.unit.printed.cell)
-        return _near(equilibrium, start, state.pressure_MPa)
+        cell = self.unit.printed.cell
+        return states_along(self._equilibrium(number), self.mesh, self.paths[number], cell, way)
 
     def alone(self, number: int, pressures_MPa: Array) -> Array:
         """Anchors (s, p, 3) in mm of one candidate along its whole path through pressures (s,), from rest.
@@ -132,6 +120,25 @@ class PrintedWaveguides:
         found = self._last[number]
         found.model.forget_contact()
         return found
+
+
+def states_along(
+    equilibrium: Equilibrium, mesh: Mesh, path: Array, cell: float, way: Sequence[State]
+) -> list[State]:
+    """States of a unit with a waveguide, see `PrintedWaveguides.states`.
+
+    equilibrium: of its own mesh; mesh: the unit's, path: lattice nodes (h, 3), cell: both in mm.
+    """
+    for begin in range(len(way) - 1, -1, -1):
+        u = way[begin].u
+        bent = started(mesh, equilibrium.model.mesh, path, u)
+        start = eased(equilibrium, bent, u, EASED_CELLS * cell)
+        found = _near(equilibrium, start, way[begin].pressure_MPa)
+        if found is not None:
+            on = [state.pressure_MPa for state in way[begin + 1 :]]
+            with contextlib.suppress(ConvergenceError):
+                return [found, *equilibrium.path(on, found)]
+    return equilibrium.path([state.pressure_MPa for state in way], equilibrium.at_zero_pressure())
 
 
 def _near(equilibrium: Equilibrium, start: Array, pressure: float) -> State | None:

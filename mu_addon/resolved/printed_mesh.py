@@ -109,7 +109,7 @@ def mesh_printed(
         raise InputError(
             "the printed body is meshed by quadratic elements",
             "order",
-            'choose order 2, or fidelity "homogenised"',
+            "choose order 2",
         )
     d = unit.printed
     own = covering(d, body)

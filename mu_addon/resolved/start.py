@@ -4,55 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
 from ..fem.carried_nodes import following
-from ..fem.elements import reference_gradients
 from ..fem.equilibrium import Equilibrium
+from ..fem.kinematics import mean_gradients, numbers_of
 from ..meshing.mesh import Array, Mesh
 
 # Weight of the surroundings' rotation beside the legs of a path.
 _TWIST = 0.05
-_MIRROR = np.array([-1.0, 1.0, 1.0])
 # A displacement in mm whose forces are linear in it, and how many times as stiff what is held is made.
 _SMALL, _HELD = 1e-6, 1e6
-
-
-def numbers_of(mesh: Mesh, points: Array) -> Array:
-    """Numbers (p,) of a resolved mesh's nodes at points (p, 3) in mm; raises InputError where none is."""
-    from scipy.spatial import cKDTree
-
-    away, found = cKDTree(mesh.nodes).query(points)
-    if away.max() > 1e-6 * np.ptp(mesh.nodes[:, 2]):
-        x, y, z = points[away.argmax()].round(3).tolist()
-        raise InputError(
-            f"({x:g}, {y:g}, {z:g}) mm is not a node of the lattice's mesh",
-            "path, [waveguide] row",
-            "choose nodes within the envelope, and a lattice with a node at the cells' centres",
-        )
-    return np.asarray(found)
-
-
-def mean_gradients(mesh: Mesh, u: Array, nodes: Array) -> Array:
-    """Mean deformation gradient (k, 3, 3) of the elements around each of some nodes (k,).
-
-    u: displacements (n, 3) in mm. In the mirror plane of a half mesh the image's elements count, too.
-    """
-    place = np.full(len(mesh.nodes), -1)
-    place[nodes] = np.arange(len(nodes))
-    rows = np.flatnonzero((place[mesh.tets] >= 0).any(axis=1))
-    reference = reference_gradients(mesh.nodes, mesh.tets[rows])
-    volume = reference.volumes * mesh.filled[rows] if mesh.resolved else reference.volumes
-    weighted = np.einsum("eai,eqaj,eq->eij", u[mesh.tets[rows]], reference.gradients, volume)
-    row, corner = np.nonzero(place[mesh.tets[rows]] >= 0)
-    at = place[mesh.tets[rows]][row, corner]
-    found, total = np.zeros((len(nodes), 3, 3)), np.zeros(len(nodes))
-    np.add.at(found, at, weighted[row])
-    np.add.at(total, at, volume.sum(axis=1)[row])
-    found /= np.maximum(total, 1e-300)[:, None, None]
-    if "x" in mesh.symmetry:
-        on = mesh.nodes[nodes, 0] == 0.0
-        found[on] = (found[on] + _MIRROR[:, None] * found[on] * _MIRROR) / 2.0
-    return np.asarray(found + np.eye(3))
 
 
 def started(unit: Mesh, mesh: Mesh, path: Array, u: Array) -> Array:

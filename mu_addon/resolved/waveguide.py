@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..fem.embedding import embed
 from ..meshing.mesh import LATTICE, Array, Mesh, part
 from ..meshing.quality import check_positive
+from ..meshing.wall_grid import unmovable
 from .bar import bar_mesh, is_own_mirror_image, outside_bar, outside_seat, seat_mesh
 from .beams import REACH, without_beams
 from .graph_beams import graph_layers_of
@@ -43,8 +44,8 @@ def bar_of(unit: Unit, path: Window | ArrayLike, body: Body | None = None) -> Ba
         raise InputError(
             f"struts of {d.junction_diameter:.3g} mm are thickened where they meet a waveguide of "
             f"{d.waveguide_section:.3g} mm, which the resolved model follows in body-centred lattices alone",
-            "[lattice] kind, junction_diameter_mm, fidelity",
-            'make junctions as wide as the waveguide, or choose fidelity "homogenised"',
+            "[lattice] kind, junction_diameter_mm",
+            "make junctions as wide as the waveguide",
         )
     return bar
 
@@ -131,6 +132,25 @@ def with_waveguide(mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None) -
     )
     check_positive(whole)
     return whole
+
+
+def moved_with_waveguide(
+    drawn: Mesh, first: Mesh, mesh: Mesh, bar: Bar, unit: Unit, body: Body | None = None
+) -> Mesh:
+    """The mesh of a similar unit with its waveguide, of the same elements as that of a first one.
+
+    drawn: the first unit's, first: that with its waveguide; mesh: the first unit's moved to the other
+    (`PrintedMorph`), bar: the other's. Of each element the share that the waveguide leaves stays as it is:
+    anew it is counted point by point, in steps. Raises as `with_waveguide`, and MeshingError where elements,
+    ties or beams would be others.
+    """
+    found = with_waveguide(mesh, bar, unit, body)
+    same = ("tets", "region", "base", "tied", "beams", "carried")
+    if not all(np.array_equal(getattr(found, name), getattr(first, name)) for name in same):
+        raise unmovable("its waveguide meets other struts")
+    own, left = len(drawn.filled), np.zeros_like(drawn.filled)
+    np.divide(first.filled[:own], drawn.filled, out=left, where=drawn.filled > 0)
+    return attrs.evolve(found, filled=np.vstack([left * mesh.filled, first.filled[own:]]))
 
 
 def _thickened(mesh: Mesh, bar: Bar, d: Dimensions, body: Body | None) -> tuple[Mesh, Ties]:

@@ -7,7 +7,7 @@ directions. Its own stiffness, which slightly restrains the lattice, is neglecte
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.waveguide import Bar
-from ..fem.embedding import Embedding, embed
+from ..fem.embedding import embed
+from ..fem.kinematics import MIRROR, mean_gradients, numbers_of
 from ..meshing.mesh import Mesh
 from .guide import Centreline
 
@@ -161,24 +162,32 @@ def _along(points: Array, corners: Array, centre: Array) -> float:
 
 @attrs.frozen(eq=False)
 class Joints:
-    """Lattice nodes (n, 3) in mm in a homogenised mesh: each moves and rotates as the body around it does.
+    """Lattice nodes (n, 3) in mm in a mesh: each moves and rotates as the body around it does.
 
-    reach: half the width in mm over which the body around a node is averaged.
+    Of a printed body that is the joint itself, the elements around its node; of a homogenised lattice the
+    continuum within a quarter of a cell, to even out elements.
     """
 
     nodes: Array
-    reach: float
-    _around: Embedding
+    _gradients: Callable[[Array], tuple[Array, Array]]
 
     @classmethod
     def of(cls, mesh: Mesh, nodes: Array, cell: float) -> Joints:
-        """Joints at nodes (n, 3) in mm of an undeformed mesh.
+        """Joints at nodes (n, 3) in mm of an undeformed mesh, half or whole; cell: the unit cell in mm.
 
-        cell: the unit cell in mm; the body around a node is half a cell wide, to even out elements.
+        Raises InputError where a printed body has no joint.
         """
+        if mesh.resolved:
+            return cls(nodes, _of_joints(mesh, nodes))
         reach = cell / 4
         offsets = np.concatenate([np.zeros((1, 3)), reach * np.eye(3), -reach * np.eye(3)])
-        return cls(nodes, reach, embed(mesh, (nodes[:, None] + offsets).reshape(-1, 3)))
+        around = embed(mesh, (nodes[:, None] + offsets).reshape(-1, 3))
+
+        def gradients(u: Array) -> tuple[Array, Array]:
+            at = around.displacement(u).reshape(len(nodes), 7, 3)
+            return at[:, 0], np.eye(3) + np.swapaxes(at[:, 1:4] - at[:, 4:7], 1, 2) / (2 * reach)
+
+        return cls(nodes, gradients)
 
     def moved(self, u: Array) -> tuple[Array, Array]:
         """Positions (n, 3) in mm and rotations (n, 3, 3) after displacements (nodes of the mesh, 3) in mm.
@@ -186,7 +195,24 @@ class Joints:
         The rotation is that of the mean deformation around the node (polar decomposition). A symmetric strain
         rotates no node whose struts have cubic symmetry.
         """
-        at = self._around.displacement(u).reshape(len(self.nodes), 7, 3)
-        F = np.eye(3) + np.swapaxes(at[:, 1:4] - at[:, 4:7], 1, 2) / (2 * self.reach)
+        at, F = self._gradients(u)
         left, _, right = np.linalg.svd(F)
-        return self.nodes + at[:, 0], left @ right
+        return self.nodes + at, left @ right
+
+
+def _of_joints(mesh: Mesh, nodes: Array) -> Callable[[Array], tuple[Array, Array]]:
+    """Function of displacements: those (n, 3) of a printed body's joints, and the gradients (n, 3, 3) there.
+
+    Joints across the mirror plane of a half mesh move as their images do.
+    """
+    across = (nodes[:, 0] < 0) & ("x" in mesh.symmetry)
+    side = np.where(across[:, None], MIRROR, 1.0)
+    numbers = numbers_of(mesh, side * nodes)
+    # A joint and its image are one.
+    distinct, place = np.unique(numbers, return_inverse=True)
+
+    def gradients(u: Array) -> tuple[Array, Array]:
+        F = mean_gradients(mesh, u, distinct)[place]
+        return side * u[numbers], side[:, :, None] * F * side[:, None, :]
+
+    return gradients

@@ -15,9 +15,10 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing import settings
-from mu_addon.meshing.settings import HOMOGENISED, MeshSettings
+from mu_addon.meshing.settings import FIDELITY, HOMOGENISED, SELF_CONTACT, MeshSettings
 from mu_addon.usecases.graph import orders
 from mu_addon.usecases.grip import job as grip_job
+from mu_addon.usecases.parameter_study import plan
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,6 +50,8 @@ def homogenised(**more):
     with pytest.MonkeyPatch.context() as patch:
         for module in (settings, orders, grip_job):
             patch.setattr(module, "fidelity_of", lambda solid_struts: HOMOGENISED)
+        patch.setattr(plan, "FIDELITY", FIDELITY._replace(default=HOMOGENISED))
+        patch.setattr(plan, "SELF_CONTACT", SELF_CONTACT._replace(default=False))
         if more:
             patch.setattr(settings, "MeshSettings", lambda **given: MeshSettings(**(given | more)))
         yield

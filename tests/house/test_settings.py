@@ -45,7 +45,7 @@ OTHERWISE = {
     "evidence/unit_fem.py": {"self_contact"},
     "homogenize/cell_mesh.py": {"order"},  # of a cell's mesh
     "measured/experiment.py": {"specimen", "orientation_deg"},
-    "optimization/unit_body.py": {"mesher", "self_contact"},
+    "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
     "usecases/chain/job.py": {"orientation_deg"},  # of a chain's base
     "usecases/graph/bench_nodes.py": {"specimen"},

@@ -9,7 +9,7 @@ from mu_addon.fem.moved_nodes import relocated
 from mu_addon.optimization.gradient import gradients
 from mu_addon.optimization.quantities import RestStiffness
 from mu_addon.optimization.search import Observed
-from mu_addon.optimization.structure import WITHOUT, Structure, solve
+from mu_addon.optimization.structure import Structure, solve
 from tests.fem.bodies import box, uniform
 
 LENGTH, MODULUS = 40.0, 2.0
@@ -44,7 +44,7 @@ class Cantilever:
         mesh = self._mesh(a, b)
         return Structure(
             relocated(self.model, mesh),
-            {WITHOUT: uniform(mesh, MODULUS, 0.0)},
+            uniform(mesh, MODULUS, 0.0),
             (a, b),
             shared=self.shared,
         )
@@ -95,7 +95,7 @@ class GradedBlock(Cantilever):
     def at(self, *factors):
         moduli = MODULUS * np.array(factors)[self.layer]
         materials = Materials.neo_hooke(moduli, np.zeros(len(moduli)))
-        return Structure(self.body, {WITHOUT: materials}, factors, shared=self.shared)
+        return Structure(self.body, materials, factors, shared=self.shared)
 
 
 @attrs.frozen
@@ -138,7 +138,7 @@ class Fold(Cantilever):
 
     def at(self, t):
         mesh = self._mesh(t)
-        materials = {WITHOUT: uniform(mesh, MODULUS, POISSON)}
+        materials = uniform(mesh, MODULUS, POISSON)
         return Structure(relocated(self.model, mesh), materials, (t,), shared=self.shared)
 
 

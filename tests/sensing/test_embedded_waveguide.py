@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
 
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.waveguide import waveguide
+from mu_addon.errors import InputError
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits, lattice_graph
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.sensing.embedded_waveguide import Joints, WaveguideShape, embed_waveguide
 from mu_addon.sensing.guide import Centreline
 from mu_addon.sensing.light_law import straight_guide
@@ -153,3 +157,15 @@ def _openings(length: float, wells: list[float], pull: float, turn: float) -> np
     u[free] = spsolve(A[free][:, free].tocsc(), -A[free][:, fixed] @ u[fixed])
     top = u[2 * (np.arange(columns + 1) * (rows + 1) + rows)]
     return np.array([top[last] - top[first] for first, last in edges])
+
+
+def test_a_printed_joint_turns_with_its_body() -> None:
+    unit = load_preset("mu-1.0x").evolve(count=3)
+    mesh = mesh_printed(unit, MeshSettings(refine=0.2, fidelity="resolved"))
+    nodes = np.array([[0.0, 25.0, 18.75], [12.5, 25.0, 18.75], [-12.5, 25.0, 18.75]])
+    turn = Rotation.from_euler("x", 20.0, degrees=True).as_matrix()
+    at, turned = Joints.of(mesh, nodes, 12.5).moved(mesh.nodes @ turn.T - mesh.nodes)
+    np.testing.assert_allclose(at, nodes @ turn.T, atol=1e-9)
+    np.testing.assert_allclose(turned, np.broadcast_to(turn, (3, 3, 3)), atol=1e-9)
+    with pytest.raises(InputError, match="not a node"):
+        Joints.of(mesh, nodes + 1.0, 12.5)

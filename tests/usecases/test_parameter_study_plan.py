@@ -23,12 +23,12 @@ stages = "place"
 points = 8
 [simulate]
 times = 7
-mesh = { order = 1, refine = 0.4 }
+mesh = { refine = 0.4 }
 [place]
 mesh_check = false
 [vary]
 "chambers.wall_mm" = { low = 0.8, high = 1.2 }
-material.sensor_modulus_kPa = { low = 100.0, high = 10000.0, log = true }
+material.membrane_modulus_kPa = { low = 100.0, high = 10000.0, log = true }
 "simulate.mesh.refine" = { values = [0.4, 0.5] }
 "place.stations" = { low = 11, high = 13 }
 "protocol.factor" = { values = [0.5, 1.0] }
@@ -77,7 +77,7 @@ def test_every_input_has_its_name():
         "scale",
         "chambers.wall_mm",
         "lattice.midspan_diameter_mm",
-        "material.sensor_modulus_kPa",
+        "material.membrane_modulus_kPa",
         "simulate.times",
         "simulate.mesh.refine",
         "simulate.protocol",
@@ -99,16 +99,16 @@ def test_values_reach_the_study(tmp_path):
         v, job = point.values, point.job
         assert job.unit.chambers.wall_mm == v["chambers.wall_mm"]
         assert 0.8 <= job.unit.chambers.wall_mm <= 1.2
-        assert job.unit.material.sensor_modulus_kPa == v["material.sensor_modulus_kPa"]
+        assert job.unit.material.membrane_modulus_kPa == v["material.membrane_modulus_kPa"]
         assert job.mesh.refine == v["simulate.mesh.refine"]
-        assert (job.mesh.order, job.times, job.mesh_check, job.workers) == (1, 7, False, 1)
+        assert (job.mesh.fidelity, job.times, job.mesh_check, job.workers) == ("resolved", 7, False, 1)
         assert job.stations == v["place.stations"] in (11, 12, 13)
         assert job.protocol.pressure_kPa.max() == 40.0 * v["protocol.factor"]
     assert len({job.text() for job in (p.job for p in points)}) > 1
 
 
 def test_a_range_in_its_logarithm_is_even_there():
-    v = Variable("material.sensor_modulus_kPa", 100.0, 10000.0, log=True)
+    v = Variable("material.membrane_modulus_kPa", 100.0, 10000.0, log=True)
     assert v.at(0.5) == pytest.approx(1000.0)
     assert v.levels == pytest.approx([100.0, 1000.0, 10000.0])
 
@@ -248,11 +248,23 @@ def test_what_is_no_table_is_told_so(table):
 
 
 @pytest.mark.parametrize(
-    ("name", "fidelity", "apart"),
-    [("chambers.wall_mm", "resolved", True), ("material.lattice_modulus_kPa", "homogenised", None)],
+    ("vary", "mesh", "what"),
+    [
+        (
+            '"material.lattice_modulus_kPa" = { low = 15.0, high = 60.0 }',
+            "",
+            "lattice_modulus_kPa moves nothing",
+        ),
+        ('"chambers.wall_mm" = { low = 0.8, high = 1.0 }', 'fidelity = "homogenised"', "the printed body"),
+        ('"simulate.mesh.fidelity" = { values = ["solid", "homogenised"] }', "", "the printed body"),
+    ],
 )
-def test_a_sweep_is_of_the_printed_body_where_that_has_what_is_varied(name, fidelity, apart):
-    low, high = (0.8, 1.0) if name.endswith("mm") else (15.0, 60.0)
-    text = f'format = 1\npreset = "mu-1.0x"\n[vary]\n"{name}" = {{ low = {low}, high = {high} }}\n'
-    simulate = parse_plan(text, Path("/")).inputs.tables["simulate"]
-    assert (simulate["mesh"]["fidelity"], simulate.get("self_contact")) == (fidelity, apart)
+def test_a_sweep_is_of_the_printed_body(vary, mesh, what):
+    head = f'format = 1\npreset = "mu-1.0x"\n[simulate]\nmesh = {{ {mesh} }}\n[vary]\n'
+    with pytest.raises(InputError, match=what) as error:
+        parse_plan(head + vary, Path("/"))
+    assert "sweep.toml" in error.value.where
+    assert error.value.remedy
+    found = parse_plan(head.replace(mesh, "") + '"chambers.wall_mm" = { low = 0.8, high = 1.0 }', Path("/"))
+    simulate = found.inputs.tables["simulate"]
+    assert (simulate["mesh"]["fidelity"], simulate["self_contact"]) == ("resolved", True)

@@ -49,7 +49,7 @@ FIRST = (
     "chambers.wall_mm",
     "chambers.neck_diameter_mm",
     "chambers.bladder_share",
-    "material.lattice_modulus_kPa",
+    "material.membrane_modulus_kPa",
     "scale",
 )
 """Order in which the list proposes parameters: those with most effect on a unit's angle come first."""

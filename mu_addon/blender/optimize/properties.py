@@ -33,7 +33,7 @@ FREE = {
 }
 """Parameters that the panel offers to be free, by dotted name."""
 NAMED = {
-    "lattice.kind": ("Lattice: Kind", "Kind of lattice cell; for struts as printed"),
+    "lattice.kind": ("Lattice: Kind", "Kind of lattice cell"),
     PATH: ("Sensor: Path", "Path of the sensor, used for a target with an empty path"),
     RESIN: ("Resin", "Resin of the library: its moduli, density and elongation at break"),
 }

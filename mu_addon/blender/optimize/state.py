@@ -12,7 +12,6 @@ from ...design.parameters import SECTIONS, Unit, read_unit
 from ...design.quantity import describe
 from ...design.repairs import tied
 from ...errors import InputError, MuError
-from ...meshing.settings import RESOLVED, MeshSettings
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
 from ...usecases.optimize.expected import search_plan
@@ -86,10 +85,9 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
     taken = {} if found is None else found.seconds
     if found is not None and found.simulated and "search" in taken:
         taken = {**taken, "search": taken["search"] * units / found.simulated}
-    settings = MeshSettings(refine=s.refine, fidelity=RESOLVED)
     return [
         (name, taken.get(name, seconds))
-        for name, seconds in search_plan(units, settings, s.check_refine, s.self_contact)
+        for name, seconds in search_plan(units, s.refine, s.check_refine, s.self_contact)
     ]
 
 

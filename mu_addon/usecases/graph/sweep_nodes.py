@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...errors import InputError
 from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting, setting
+from ...meshing.settings import OF_CONTINUUM
 from ..parameter_study import settings as study
 from .parts import described
 from .shared_settings import (
@@ -25,7 +26,8 @@ _ORDERS = "sweep_orders"
 
 def _varied() -> dict[str, bool]:
     """Every parameter that can be varied, and True if it takes whole numbers only."""
-    numbers = {name: d.type is int for name, d in described().items() if d.type in (int, float)}
+    printed = {name: d for name, d in described().items() if name not in OF_CONTINUUM}
+    numbers = {name: d.type is int for name, d in printed.items() if d.type in (int, float)}
     return numbers | {FACTOR: False, REFINE: False}
 
 

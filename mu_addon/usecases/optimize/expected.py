@@ -5,20 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ...meshing.settings import MeshSettings
     from ...run.progress_estimate import Plan
 
 MOST_CHECKED = 6
 """Most units of a front that are simulated again on a finer mesh: its ends and some evenly between."""
-_A_STATE_S, _BY_REFINEMENT = {False: 6.5, True: 76.0}, {False: 2.3, True: 1.8}
-"""Seconds of a state with slopes at a refinement of 1, and the refinement's exponent; True: printed body."""
+_A_STATE_S, _BY_REFINEMENT = 76.0, 1.8
+"""Seconds of a state with its slopes at a refinement of 1, and the exponent of the refinement."""
 _CHECKED, _APART = 1.2, 3.0
 """Factors on that of a unit that is checked, and of walls and struts that are kept apart."""
 
 
 def search_plan(
     units: int,
-    settings: MeshSettings,
+    refine: float,
     check_refine: float,
     self_contact: bool,
     objectives: int = 2,
@@ -26,17 +25,16 @@ def search_plan(
 ) -> Plan:
     """Stages of a search among so many units, with the expected seconds of each on two cores.
 
-    settings: of the search's mesh; check_refine: refinement of the check of its proposals, a single one with
-    fewer than two objectives; states: of a unit, under the targets' pressures.
+    refine: of the search's mesh; check_refine: of the check of its proposals, a single one with fewer than
+    two objectives; states: of a unit, under the targets' pressures.
     """
     checked = min(MOST_CHECKED, units) if objectives > 1 else 1
 
     def seconds(refine: float) -> float:
-        a_state = _A_STATE_S[settings.resolved] * refine ** _BY_REFINEMENT[settings.resolved]
-        return max(states, 1) * a_state * (_APART if self_contact else 1.0)
+        return max(states, 1) * _A_STATE_S * refine**_BY_REFINEMENT * (_APART if self_contact else 1.0)
 
     return [
-        ("search", seconds(settings.refine) * units),
+        ("search", seconds(refine) * units),
         ("check of what is proposed", _CHECKED * seconds(check_refine) * checked),
         ("report", 3.0),
     ]

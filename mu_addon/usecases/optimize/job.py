@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import attrs
 
@@ -12,7 +11,6 @@ from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit_materials import materials_of
-from ...meshing.settings import MeshSettings
 from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
 from ...optimization.settings import WORKERS
 from ...optimization.unit_body import Mechanics
@@ -91,7 +89,7 @@ def mechanics_of(
     if model is None:
         effects, left_out = _with_weight(NamedEffects(), design), []
         if not effects:
-            return Mechanics(settings, **_kept_apart(design, settings)), []
+            return Mechanics(settings, body=design.body, self_contact=design.self_contact), []
     else:
         first = extend(design.unit, model)
         effects, left_out = _with_weight(first.effects, design), list(first.left_out)
@@ -110,14 +108,9 @@ def mechanics_of(
         materials=lambda unit, mesh: effects.materials(materials_of(unit, mesh), mesh),
         model=lambda unit, mesh: effects.model(unit, mesh, threads=1),
         load=effects.load,
-        newton=None if settings.resolved else effects.newton,
-        **_kept_apart(design, settings),
+        body=design.body,
+        self_contact=design.self_contact,
     ), left_out
-
-
-def _kept_apart(design: Design, settings: MeshSettings) -> dict[str, Any]:
-    """Body and self-contact of the design, as arguments of `Mechanics`."""
-    return {"body": design.body, "self_contact": design.self_contact and settings.resolved}
 
 
 def _with_weight(effects: NamedEffects, design: Design) -> NamedEffects:

@@ -37,11 +37,10 @@ def report(found: Optimised, stopped: str = "") -> str:
         ]
     )
     d = found.design
-    limits = [f"Simulated with a homogenised lattice: {d.why_homogenised}."] if d.why_homogenised else []
     return page(
         f"Optimisation of {d.unit.name}",
-        f"{len(d.targets)} targets, {len(d.freedoms)} freedoms, {d.settings.fidelity}",
-        note([*limits, *(f"Not in the simulation: {words}." for words in found.left_out)], stopped),
+        f"{len(d.targets)} targets, {len(d.freedoms)} freedoms",
+        note([f"Not in the simulation: {words}." for words in found.left_out], stopped),
         lead,
         [
             ("front", "Front", _front(found)),
@@ -128,8 +127,8 @@ def _targets(found: Optimised) -> str:
             html += note(p.checked.print_findings)
     words = (
         "Standard errors: the mesh's is the difference to a mesh of refinement "
-        f"{d.check_refine:g}; a print's surfaces are off by {d.print_tolerance_mm:g} mm, all moduli by "
-        f"{d.modulus_tolerance:.0%}. Robust: met for all values within two standard errors of the three "
+        f"{d.check_refine:g}; a print's surfaces are off by {d.print_tolerance_mm:g} mm, the resin's modulus "
+        f"by {d.modulus_tolerance:.0%}. Robust: met for all values within two standard errors of the three "
         "together."
     )
     return f"<p>{escape(words)}</p>{html}" if html else ""
@@ -176,7 +175,6 @@ def _inputs(found: Optimised) -> str:
         for f in d.freedoms
     ]
     facts = {
-        "fidelity": d.settings.fidelity,
         "body": "the lattice's box" if d.body is None else d.body.name,
         "refinement of the search's mesh": d.settings.refine,
         "refinement of the check's mesh": d.check_refine,

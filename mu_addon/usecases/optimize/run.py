@@ -26,7 +26,7 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from . import charts
 from .expected import MOST_CHECKED, search_plan
-from .job import DESIGN, FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
+from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
 from .report import write_report
 from .words import changes, outcome, reasons, verdict
 from .worker import asked_of, several
@@ -91,8 +91,6 @@ def optimise(job: Job, folder: Path, context: RunContext) -> Optimised:
     mechanics, left_out = mechanics_of(design, job.model)
     for words in left_out:
         progress.warning(f"the model's {words}", MODEL)
-    if design.why_homogenised:
-        progress.warning(f"simulated with a homogenised lattice: {design.why_homogenised}", DESIGN)
     run = _Run(job, folder, context, mechanics.settings.refine)
     texts = job.texts()
     origin = "\n".join(texts.get(name, "") for name in (MODEL,)) + run.asked
@@ -409,7 +407,7 @@ def plan_of(job: Job) -> Plan:
     states = sum(condition.pressure_kPa != 0.0 for condition in conditions)
     return search_plan(
         design.search.evaluations,
-        design.settings,
+        design.settings.refine,
         design.check_refine,
         design.self_contact,
         objectives,

@@ -15,7 +15,7 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import describe
 from ...errors import InputError, did_you_mean
 from ...fem.protocol import Protocol, read_protocol
-from ...meshing.settings import MeshSettings
+from ...meshing.settings import OF_CONTINUUM, MeshSettings, require_printed
 from ...placement.graph import Limits
 from ..simulate_and_place.job import SETTINGS
 
@@ -78,6 +78,7 @@ class Variable:
 def variable(name: str, given: Any, where: str) -> Variable:
     """A variable from its table in sweep.toml; raises InputError."""
     where = f"{where}, [vary] {name}"
+    require_printed(name, where)
     if name not in variable_names():
         raise InputError(
             f"unknown input {name!r}{did_you_mean(name, variable_names())}",
@@ -120,6 +121,7 @@ def variable(name: str, given: Any, where: str) -> Variable:
 def variable_names() -> list[str]:
     """Names of all inputs that can be varied, as in unit.toml and study.toml."""
     unit = [f"{s.section}.{d.name}" for s in SECTIONS for d in describe(s)]  # type: ignore[attr-defined]
+    unit = [name for name in unit if name not in OF_CONTINUUM]
     study = [f"{stage}.{key}" for stage, keys in SETTINGS.items() for key in keys]
     mesh = [f"simulate.mesh.{f.name}" for f in attrs.fields(MeshSettings)]
     search = [f"place.search.{f.name}" for f in attrs.fields(Limits)]
