@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -73,20 +74,13 @@ def of_sections(mesh: Mesh, u: Array, F: Array, elements: Array, poisson: Array)
     not swept along a strut have nodes beyond a beam's ends; at points within the beam F is that of its
     sections. poisson (e,): nu.
     """
-    inside = np.repeat(~mesh.solid[elements][:, None], F.shape[1], axis=1)
-    if mesh.in_beams.size:
-        inside |= mesh.in_beams[elements] > _MOST
-    rows, points = np.nonzero(inside)
+    beams = _beams_at(mesh)[elements]
+    rows, points = np.nonzero(beams >= 0)
     if not len(rows):
         return F
-    found = F.copy()
+    found, beam = F.copy(), beams[rows, points]
     if mesh.in_beams.size:
-        shape = shape_functions(tet_quadrature(mesh.order)[0], mesh.order)[points]
-        places = np.einsum("kn,kni->ki", shape, mesh.nodes[mesh.tets[elements[rows]]])
-        beam = _beam_at(mesh, places)
-        found[rows, points] = _between_sections(mesh, u, beam, places)
-    else:
-        beam = mesh.beam_of[elements[rows]]
+        found[rows, points] = _between_sections(mesh, u, beam, _places(mesh, elements[rows], points))
     ends = mesh.nodes[mesh.beams[beam][:, [0, 2]]]
     axis = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
     along = axis[:, :, None] * axis[:, None, :]
@@ -96,7 +90,29 @@ def of_sections(mesh: Mesh, u: Array, F: Array, elements: Array, poisson: Array)
     return found
 
 
-def _beam_at(mesh: Mesh, places: Array) -> Array:
+_sought: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
+
+
+def _beams_at(mesh: Mesh) -> Array:
+    """Beam (m, q) that each quadrature point of a mesh lies in, else -1; sought once for a mesh."""
+    found = _sought.get(mesh)
+    if found is None:
+        of_element = mesh.beam_of if len(mesh.beam_of) else np.full(len(mesh.tets), -1)
+        found = np.repeat(of_element[:, None], len(tet_quadrature(mesh.order)[0]), axis=1)
+        if mesh.in_beams.size:
+            rows, points = np.nonzero((found >= 0) | (mesh.in_beams > _MOST))
+            found[rows, points] = _nearest_beam(mesh, _places(mesh, rows, points))
+        _sought[mesh] = found
+    return found
+
+
+def _places(mesh: Mesh, elements: Array, points: Array) -> Array:
+    """Places (k, 3) in mm of quadrature points (k,) of elements (k,), in the undeformed body."""
+    shape = shape_functions(tet_quadrature(mesh.order)[0], mesh.order)[points]
+    return np.asarray(np.einsum("kn,kni->ki", shape, mesh.nodes[mesh.tets[elements]]))
+
+
+def _nearest_beam(mesh: Mesh, places: Array) -> Array:
     """Beam (k,) nearest to places (k, 3) in mm."""
     from scipy.spatial import cKDTree
 

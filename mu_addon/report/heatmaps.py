@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .plots import CHOSEN, QUIET, WIDTH, canvas
 from .results import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
+    from matplotlib.image import AxesImage
 
 MAP = "viridis"  # perceptually uniform, and monotone in grey
 FIELD_MAP = "YlOrRd"  # small values are light: a shaded surface in a dark colour shows no shape
@@ -14,23 +21,11 @@ FIELD_MAP = "YlOrRd"  # small values are light: a shaded surface in a dark colou
 def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     """SVG of one path's deviation delta (k, j) in mm at k times and j stations, coloured from 0 to `top` mm.
 
-    Arc length is to the right, time upward, both in percent; colour is by square root, as in `color_bar`.
-    chosen: draw its frame in colour.
+    Arc length is to the right, time upward, both in percent. chosen: draw its frame in colour.
     """
-    from matplotlib.colors import PowerNorm
-
     with canvas(1.75, 1.75) as (figure, svg):
         axes = figure.add_axes((0.20, 0.18, 0.74, 0.76))
-        axes.imshow(
-            delta,
-            origin="lower",
-            extent=(0, 100, 0, 100),
-            aspect="auto",
-            cmap=MAP,
-            norm=PowerNorm(0.5, 0.0, top),
-            interpolation="nearest",
-        )
-        axes.grid(False)
+        draw_deviation(axes, delta, top, (0, 100))
         axes.set(xticks=(0, 50, 100), yticks=(0, 50, 100))
         axes.tick_params(labelsize=7, length=2)
         for spine in axes.spines.values():
@@ -39,17 +34,36 @@ def heatmap(delta: Floats, top: float, chosen: bool = False) -> str:
     return svg()
 
 
-def color_bar(top: float) -> str:
-    """SVG of the colour scale from 0 to `top` mm that the heatmaps share.
+def draw_deviation(axes: Axes, delta: Floats, top: float, time: tuple[float, float]) -> AxesImage:
+    """Draw a deviation delta (k, j) in mm over 0 to 100 % of length and, upward, a range of time.
 
-    Colour is by square root, so that small deviations remain visible.
+    Colour is by square root from 0 to `top` mm, so that small deviations remain visible.
     """
-    from matplotlib.cm import ScalarMappable
+    axes.grid(False)
+    return axes.imshow(
+        delta,
+        origin="lower",
+        extent=(0, 100, *time),
+        aspect="auto",
+        cmap=MAP,
+        norm=_deviation_norm(top),
+        interpolation="nearest",
+    )
+
+
+def _deviation_norm(top: float) -> Normalize:
     from matplotlib.colors import PowerNorm
+
+    return PowerNorm(0.5, 0.0, top)
+
+
+def color_bar(top: float) -> str:
+    """SVG of the colour scale from 0 to `top` mm that the heatmaps share."""
+    from matplotlib.cm import ScalarMappable
 
     with canvas(WIDTH, 0.62) as (figure, svg):
         axes = figure.add_axes((0.04, 0.68, 0.92, 0.26))
-        mappable = ScalarMappable(PowerNorm(0.5, 0.0, top), MAP)
+        mappable = ScalarMappable(_deviation_norm(top), MAP)
         series = np.outer(10.0 ** np.arange(-6, 6), [1.0, 2.0, 5.0]).ravel()
         ticks = [0.0, *series[(series > 0.01 * top) & (series <= top)]]
         bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", ticks=ticks, format="%g")

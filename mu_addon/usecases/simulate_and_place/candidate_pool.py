@@ -31,30 +31,30 @@ Array = np.ndarray[Any, Any]
 class CandidateProblem:
     """Candidates of a study to be solved; plain data, so that it can be sent to another process.
 
-    jobs: the candidates; anchors (p, 3) in mm are the monitored points. whole: the displacement of the whole
-    mesh is also kept. study: with the unit's effects and obstacles; without it only pressure acts.
+    anchors (p, 3) in mm: the monitored points. whole: the displacement of the whole mesh is also kept. job:
+    with the unit's effects and obstacles; without it only pressure acts.
     """
 
     mesh: Mesh
     materials: Materials
     anchors: Array
-    jobs: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...]
     radius_mm: float
     sensor_MPa: float
     whole: bool = False
-    study: Job | None = None
+    job: Job | None = None
 
     @property
     def parts(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the jobs that are solved together: each printed waveguide has a separate mesh."""
-        every = tuple(range(len(self.jobs)))
-        return tuple((job,) for job in every) if self.mesh.resolved else (every,)
+        """Numbers of the candidates that are solved together: each printed waveguide has a separate mesh."""
+        every = tuple(range(len(self.candidates)))
+        return tuple((candidate,) for candidate in every) if self.mesh.resolved else (every,)
 
 
 class Moved(NamedTuple):
-    """Results of a part's jobs at a state: anchors (jobs, p, 3) in mm, and differences of the whole mesh.
+    """A part's results at a state: anchors (c, p, 3) in mm of c candidates, differences of the whole mesh.
 
-    whole: displacements (w, n, 3) in mm against Model A's, single precision; w: as many as jobs, or 0.
+    whole: displacements (w, n, 3) in mm against Model A's, single precision; w: c or 0.
     """
 
     anchors: Array
@@ -65,12 +65,12 @@ class PrintedEvaluator:
     """Evaluator of printed waveguides, on a mesh of the printed unit; otherwise as `Evaluator`."""
 
     def __init__(self, setting: CandidateProblem, threads: int) -> None:
-        job = setting.study
+        job = setting.job
         assert job is not None
         self._candidates = PrintedWaveguides(
             job.unit,
             setting.mesh,
-            tuple(candidate.points for candidate in setting.jobs),
+            tuple(candidate.points for candidate in setting.candidates),
             setting.anchors,
             job.materials,
             lambda mesh: job.model(mesh, threads),
@@ -80,61 +80,61 @@ class PrintedEvaluator:
         self._setting = setting
 
     def __call__(self, way: Sequence[State], part: int) -> list[Moved]:
-        """Results of a part's one job at the last of some states of Model A, or at each of them.
+        """Results of a part's one candidate at the last of some states of Model A, or at each of them.
 
-        At each where the job had to be followed from rest, see `PrintedWaveguides.states`. Raises
+        At each where the candidate had to be followed from rest, see `PrintedWaveguides.states`. Raises
         ConvergenceError.
         """
-        (job,) = self._setting.parts[part]
+        (candidate,) = self._setting.parts[part]
         found = []
-        states = self._candidates.states(job, way)
+        states = self._candidates.states(candidate, way)
         for state, own in zip(way[-len(states) :], states, strict=True):
-            whole = [self._candidates.of_unit(job, own) - state.u] if self._setting.whole else []
+            whole = [self._candidates.of_unit(candidate, own) - state.u] if self._setting.whole else []
             shape = -1, *state.u.shape
             found.append(Moved(self._candidates.points([own]), np.array(whole, np.float32).reshape(shape)))
         return found
 
-    def alone(self, job: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a job moves from rest on, see `CandidatePool.alone`."""
-        return self._candidates.alone(job, pressures_MPa)
+    def alone(self, candidate: int, pressures_MPa: Array) -> Array:
+        """Anchors (s, p, 3) in mm that a candidate moves from rest on, see `CandidatePool.alone`."""
+        return self._candidates.alone(candidate, pressures_MPa)
 
-    def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that a job moves at k instants, see `CandidatePool.simulated_in_time`."""
-        return self._candidates.simulated_in_time(job, time_s, pressure_kPa)
+    def simulated_in_time(self, candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Anchors (k, p, 3) in mm that one moves at k instants, see `CandidatePool.simulated_in_time`."""
+        return self._candidates.simulated_in_time(candidate, time_s, pressure_kPa)
 
 
 def evaluator_of(setting: CandidateProblem, threads: int) -> Evaluator | PrintedEvaluator:
-    """Evaluator of a setting's jobs on its mesh."""
+    """Evaluator of a setting's candidates on its mesh."""
     return (PrintedEvaluator if setting.mesh.resolved else Evaluator)(setting, threads)
 
 
 class Evaluator:
-    """Solves all jobs of a setting at one state of Model A, having built its model once."""
+    """Solves all candidates of a setting at one state of Model A, having built its model once."""
 
     def __init__(self, setting: CandidateProblem, threads: int) -> None:
         s = setting
-        shares = [roi(s.mesh, one, s.radius_mm).share for one in s.jobs]
+        shares = [roi(s.mesh, one, s.radius_mm).share for one in s.candidates]
         monitored = s.anchors, probe(s.mesh, s.anchors)
-        model = Model(s.mesh, threads=threads) if s.study is None else s.study.model(s.mesh, threads)
-        newton = None if s.study is None else s.study.effects.newton
+        model = Model(s.mesh, threads=threads) if s.job is None else s.job.model(s.mesh, threads)
+        newton = None if s.job is None else s.job.effects.newton
         self._sweep = CandidateBatch(model, s.materials, monitored, shares, s.sensor_MPa, newton)
         self._whole = s.whole
 
     def __call__(self, way: Sequence[State], part: int = 0) -> list[Moved]:
-        """Results of all jobs, in one part, at the last of some states of Model A. ConvergenceError."""
+        """Results of all candidates, in one part, at the last of some states of Model A. ConvergenceError."""
         state = way[-1]
         states = self._sweep.states(state)
         apart = [(own.u - state.u).astype(np.float32) for own in states if self._whole]
         whole = np.array(apart, np.float32).reshape(-1, *state.u.shape)
         return [Moved(self._sweep.points(states), whole)]
 
-    def alone(self, job: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a job moves from rest on, see `CandidatePool.alone`."""
-        return self._sweep.alone(job, pressures_MPa)
+    def alone(self, candidate: int, pressures_MPa: Array) -> Array:
+        """Anchors (s, p, 3) in mm that a candidate moves from rest on, see `CandidatePool.alone`."""
+        return self._sweep.alone(candidate, pressures_MPa)
 
-    def simulated_in_time(self, job: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that a job moves at k instants, see `CandidatePool.simulated_in_time`."""
-        return self._sweep.simulated_in_time(job, time_s, pressure_kPa)
+    def simulated_in_time(self, candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
+        """Anchors (k, p, 3) in mm that one moves at k instants, see `CandidatePool.simulated_in_time`."""
+        return self._sweep.simulated_in_time(candidate, time_s, pressure_kPa)
 
 
 _evaluator: Evaluator | PrintedEvaluator | None = None
@@ -150,14 +150,14 @@ def _work(way: Sequence[State], part: int) -> list[Moved]:
     return _evaluator(way, part)
 
 
-def _work_alone(job: int, pressures_MPa: Array) -> Array:
+def _work_alone(candidate: int, pressures_MPa: Array) -> Array:
     assert _evaluator is not None
-    return _evaluator.alone(job, pressures_MPa)
+    return _evaluator.alone(candidate, pressures_MPa)
 
 
-def _work_in_time(job: int, time_s: Array, pressure_kPa: Array) -> Array:
+def _work_in_time(candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
     assert _evaluator is not None
-    return _evaluator.simulated_in_time(job, time_s, pressure_kPa)
+    return _evaluator.simulated_in_time(candidate, time_s, pressure_kPa)
 
 
 def _found_or_why(solve: Callable[[], list[Moved]]) -> list[Moved] | ConvergenceError:
@@ -168,7 +168,7 @@ def _found_or_why(solve: Callable[[], list[Moved]]) -> list[Moved] | Convergence
 
 
 class CandidatePool:
-    """Processes that solve a setting's jobs at states of Model A; started on demand, until closed."""
+    """Processes that solve a setting's candidates at states of Model A; started on demand, until closed."""
 
     def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
@@ -190,9 +190,9 @@ class CandidatePool:
                 done.cancel()
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
-        """Anchors (s, p, 3) in mm that jobs, by number, move along their paths through pressures (s,).
+        """Anchors (s, p, 3) in mm that candidates, by number, move along their paths through pressures (s,).
 
-        Of each job as far as it has an equilibrium; ConvergenceError for one without any.
+        Of each candidate as far as it has an equilibrium; ConvergenceError for one without any.
         """
         if self.workers == 1:
             self._alone = self._alone or evaluator_of(self.setting, threads=1)
@@ -201,28 +201,31 @@ class CandidatePool:
         return [self._pool.result(done) for done in waiting]
 
     def simulated_in_time(
-        self, jobs: Sequence[int], time_s: Array, pressure_kPa: Array
+        self, candidates: Sequence[int], time_s: Array, pressure_kPa: Array
     ) -> Iterator[tuple[int, Array]]:
-        """Number of each finished job, and the anchors (k, p, 3) in mm it moves at k instants.
+        """Number of each finished candidate, and the anchors (k, p, 3) in mm it moves at k instants.
 
         Fewer where it has no equilibrium at a later one.
         """
         if self.workers == 1:
-            for job in jobs:
+            for candidate in candidates:
                 self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield job, self._alone.simulated_in_time(job, time_s, pressure_kPa)
+                yield candidate, self._alone.simulated_in_time(candidate, time_s, pressure_kPa)
             return
-        waiting = {self._pool.submit(_work_in_time, job, time_s, pressure_kPa): job for job in jobs}
+        waiting = {
+            self._pool.submit(_work_in_time, candidate, time_s, pressure_kPa): candidate
+            for candidate in candidates
+        }
         for done in as_completed(waiting):
             yield waiting[done], self._pool.result(done)
 
     def solve(
         self, tasks: Sequence[tuple[Sequence[State], int]]
     ) -> Iterator[tuple[int, list[Moved] | ConvergenceError]]:
-        """Number of each finished task, and the results of its part's jobs, or the reason of its failure.
+        """Number of each finished task, and the results of its candidates, or the reason of its failure.
 
-        A task: Model A's states on one side of rest, in order of pressure, and a part. Its jobs are solved at
-        the last of these, and possibly at all before it. The same for any `workers`.
+        A task: Model A's states on one side of rest, in order of pressure, and a part. Its candidates are
+        solved at the last of these, and possibly at all before it. The same for any `workers`.
         """
         if self.workers == 1:
             for number, (way, part) in enumerate(tasks):

@@ -63,18 +63,18 @@ class CandidateSolver:
         job: Job,
         cache: Cache,
         mesh: Mesh,
-        jobs: Sequence[Candidate],
+        candidates: Sequence[Candidate],
         pressure_kPa: Array,
         whole: bool = False,
     ) -> None:
-        self._job, self._cache, self._mesh, self._jobs = job, cache, mesh, jobs
+        self._job, self._cache, self._mesh, self._candidates = job, cache, mesh, candidates
         unit = job.unit
         self._anchors = anchor_points(unit)
         radius = unit.dimensions.inclusion_radius
         sensor = unit.material.sensor_modulus_MPa
         materials = job.materials(mesh)
         self._sweeper = CandidatePool(
-            CandidateProblem(mesh, materials, self._anchors, tuple(jobs), radius, sensor, whole, job),
+            CandidateProblem(mesh, materials, self._anchors, tuple(candidates), radius, sensor, whole, job),
             job.workers,
         )
         self._key = key(
@@ -83,7 +83,7 @@ class CandidateSolver:
             pressure_kPa,
             job.newton,
             self._anchors,
-            *(candidate.points for candidate in jobs),
+            *(candidate.points for candidate in candidates),
             radius,
             sensor,
             *job.effects.parts,
@@ -131,7 +131,7 @@ class CandidateSolver:
                 self._keep(way, part, done.result())
 
     def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
-        """Keep the results of a part's jobs at the last of some states of Model A, and on the way there."""
+        """Keep a part's results at the last of some states of Model A, and on the way there."""
         whole = self._sweeper.setting.whole
         with self._keeping:
             for state, moved in zip(way[-len(found) :], found, strict=True):
@@ -147,14 +147,14 @@ class CandidateSolver:
         return range(len(self._sweeper.setting.parts))
 
     def _is_kept(self, state: State, part: int) -> bool:
-        """Return True if the cache holds all results of a part's jobs at a state."""
+        """Return True if the cache holds all results of a part's candidates at a state."""
         kinds = ("sweep", "whole") if self._sweeper.setting.whole else ("sweep",)
         return all(self._cache.has(kind, self._name(state, part)) for kind in kinds)
 
     def evaluations(
         self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
     ) -> list[Evaluation]:
-        """Evaluation of every job against Model A's trajectory, at the pressures that all of them reach.
+        """Evaluation of every candidate against Model A's trajectory, at pressures that all of them reach.
 
         verify: also follow one of them along its whole path from rest, and all of them if that ends
         elsewhere. Raises ConvergenceError where no pressure is left to compare.
@@ -170,13 +170,15 @@ class CandidateSolver:
             except _NotReachedError as missed:
                 self._leave_out(missed, distinct, compared)
         self.solved_kPa = sorted(in_kPa(float(distinct[n])) for n in known)
-        difference = between(distinct, known) if known else np.zeros((len(distinct), len(self._jobs), 1, 3))
+        difference = (
+            between(distinct, known) if known else np.zeros((len(distinct), len(self._candidates), 1, 3))
+        )
         difference[~compared] = np.nan
         baseline = trajectory.of_time(still)
         moved = baseline[:, None] + trajectory.of_time(difference)
         return [
             evaluation(candidate.name, moved[:, i], baseline, self._job.stations)
-            for i, candidate in enumerate(self._jobs)
+            for i, candidate in enumerate(self._candidates)
         ]
 
     def _leave_out(self, missed: _NotReachedError, distinct: Array, compared: Array) -> None:
@@ -197,7 +199,7 @@ class CandidateSolver:
         on_progress: Callable[[float], None],
         verify: bool,
     ) -> dict[int, Array]:
-        """Anchors (jobs, p, 3) in mm against Model A's at some of the pressures compared (s,), by number.
+        """Anchors (c, p, 3) in mm against Model A's at some of the pressures compared (s,), by number.
 
         Those that suffice for the rest. Raises _NotReachedError.
         """
@@ -236,7 +238,7 @@ class CandidateSolver:
         return [pair]
 
     def _follows_its_path(self, distinct: Array, known: dict[int, Array], still: Array) -> bool:
-        """Return True if the most deviating job ends at its maximum where its whole path from rest leads.
+        """Return True if the most deviating candidate ends at its maximum where its path from rest leads.
 
         An elastic body without limit points has one state a pressure, so that candidates may start from Model
         A's. If this one has another, all are solved along their paths.
@@ -248,56 +250,56 @@ class CandidateSolver:
             return self.independent_of_path
         numbers = [n for n in known if distinct[n]]
         size = np.array([np.linalg.norm(known[n], axis=2).max(axis=1) for n in numbers])
-        state, job = np.unravel_index(size.argmax(), size.shape)
+        state, candidate = np.unravel_index(size.argmax(), size.shape)
         number = numbers[int(state)]
         way = _outward(distinct, distinct[number])
-        (moved,) = self._sweeper.alone([(int(job), distinct[way])])
+        (moved,) = self._sweeper.alone([(int(candidate), distinct[way])])
         if len(moved) < len(way):
-            self._missed(distinct[way[len(moved)]], int(job))
-        self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][job]).max())
+            self._missed(distinct[way[len(moved)]], int(candidate))
+        self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][candidate]).max())
         if self._mesh.resolved:
             self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
         found = {"difference_mm": self.path_difference_mm, "allowed_mm": self._path_allowed_mm}
         self._cache.put("path", self._key, found)
         return self.independent_of_path
 
-    def _missed(self, pressure_MPa: float, job: int) -> NoReturn:
-        """Say that a job, followed from rest, does not reach a pressure."""
+    def _missed(self, pressure_MPa: float, candidate: int) -> NoReturn:
+        """Say that a candidate, followed from rest, does not reach a pressure."""
         why = f"no equilibrium at {in_kPa(pressure_MPa):.4g} kPa on its path from rest"
-        raise _NotReachedError(float(pressure_MPa), self._jobs[job].name, why)
+        raise _NotReachedError(float(pressure_MPa), self._candidates[candidate].name, why)
 
     def _along_paths(
         self, distinct: Array, still: Array, compared: Array, before: dict[int, Array]
     ) -> dict[int, Array]:
-        """Differences (jobs, p, 3) in mm at all compared pressures except 0, each job along its whole path.
+        """Differences (c, p, 3) in mm at all compared pressures except 0, each along its whole path.
 
         At 0, where weight alone acts and every path begins, they keep their earlier values.
         """
         reached = np.where(compared, distinct, 0.0)
         sides = [_outward(reached, p) for p in (reached.min(), reached.max())]
         sides = [side for side in sides if len(side)]
-        tasks = [(job, distinct[side]) for job in range(len(self._jobs)) for side in sides]
+        tasks = [(candidate, distinct[side]) for candidate in range(len(self._candidates)) for side in sides]
         moved = iter(self._sweeper.alone(tasks))
-        known = {int(n): np.zeros((len(self._jobs), *still.shape[1:])) for side in sides for n in side}
+        known = {int(n): np.zeros((len(self._candidates), *still.shape[1:])) for side in sides for n in side}
         known |= {n: values for n, values in before.items() if not distinct[n]}
-        for job in range(len(self._jobs)):
+        for candidate in range(len(self._candidates)):
             for side in sides:
                 found = next(moved)
                 if len(found) < len(side):
-                    self._missed(distinct[side[len(found)]], job)
+                    self._missed(distinct[side[len(found)]], candidate)
                 for n, points in zip(side.tolist(), found, strict=True):
-                    known[n][job] = points - still[n]
+                    known[n][candidate] = points - still[n]
         return known
 
     def _solved(
         self, trajectory: Trajectory, numbers: list[int], on_progress: Callable[[float], None]
     ) -> dict[int, Array]:
-        """Anchors (jobs, p, 3) in mm moved by every job at some states, by number; cached part by part.
+        """Anchors (c, p, 3) in mm moved by c candidates at some states, by number; cached part by part.
 
         on_progress: called with the finished share. Raises _NotReachedError.
         """
         setting = self._sweeper.setting
-        points = np.empty((len(numbers), len(self._jobs), *self._anchors.shape))
+        points = np.empty((len(numbers), len(self._candidates), *self._anchors.shape))
         missing = []
         # Part by part: a printed candidate's model serves all states that follow each other.
         for part in self._parts:
@@ -317,7 +319,7 @@ class CandidateSolver:
         for task, found in self._sweeper.solve(tasks):
             row, part = missing[task]
             if isinstance(found, ConvergenceError):
-                paths = {self._jobs[job].name for job in setting.parts[part]}
+                paths = {self._candidates[candidate].name for candidate in setting.parts[part]}
                 path = paths.pop() if len(paths) == 1 else "one of the paths"
                 raise _NotReachedError(trajectory.solved[numbers[row]].pressure_MPa, path, found.what)
             self._keep(ways[row], part, found)
@@ -341,9 +343,9 @@ class CandidateSolver:
         for part in self._parts:
             kept = [self._cache.get("whole", self._name(s, part)) for s in states]
             found = [arrays["difference_mm"] for arrays in kept if arrays is not None]
-            for row, job in enumerate(setting.parts[part] if found and len(found) == len(kept) else ()):
+            for row, candidate in enumerate(setting.parts[part] if found and len(found) == len(kept) else ()):
                 pressures = np.array([s.pressure_kPa for s in states])
-                yield self._jobs[job].name, pressures, np.array([d[row] for d in found])
+                yield self._candidates[candidate].name, pressures, np.array([d[row] for d in found])
 
     def close(self) -> None:
         """End the processes."""

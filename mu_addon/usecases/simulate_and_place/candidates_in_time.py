@@ -42,7 +42,7 @@ def evaluations(
     points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
     sensor = unit.material.sensor_modulus_MPa
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
-    setting = CandidateProblem(mesh, materials, points, tuple(candidates), radius, sensor, study=job)
+    setting = CandidateProblem(mesh, materials, points, tuple(candidates), radius, sensor, job=job)
     friction = [o.friction for o in job.obstacles]
     if job.self_friction:
         friction.append(job.self_friction)

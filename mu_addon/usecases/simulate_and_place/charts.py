@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...files import write_bytes
-from ...report.heatmaps import MAP
+from ...report.heatmaps import draw_deviation
 from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, label, signed, styled
 from ...report.results import Floats, Signals
 from .motion_files import FOLDER
@@ -96,19 +96,8 @@ def write_angle(folder: Path, pressure_kPa: Floats, angle_deg: Floats) -> None:
 
 def write_delta(folder: Path, path: str, delta_mm: Floats, time_s: Floats, top_mm: float) -> None:
     """Write a path's deviation (k, j), colours from 0 to `top_mm`, to `folder`/motion. Raises OutputError."""
-    from matplotlib.colors import PowerNorm
-
     with _square(folder / FOLDER / delta_name(path)) as (figure, axes):
-        image = axes.imshow(
-            delta_mm,
-            origin="lower",
-            extent=(0, 100, float(time_s[0]), float(time_s[-1])),
-            aspect="auto",
-            cmap=MAP,
-            norm=PowerNorm(0.5, 0.0, top_mm),
-            interpolation="nearest",
-        )
-        axes.grid(False)
+        image = draw_deviation(axes, delta_mm, top_mm, (float(time_s[0]), float(time_s[-1])))
         axes.set(xlabel="length [%]", ylabel="time [s]", title=f"{label(path)}: deviation [mm]")
         axes.set_xticks((0, 50, 100))
         bar = figure.colorbar(image, ax=axes, fraction=0.07, pad=0.04)
