@@ -15,9 +15,10 @@ _MODULES = (
     "track.properties",
     "printing.properties",
     "unit.preview_update",
+    "path.candidates",
     "results.motion",
     "results.runs",
-    "results.unsaved",
+    "scene.unsaved",
     "results.legend_object",
     "jobs.preferences",
     "jobs.start_child",
@@ -33,7 +34,7 @@ _MODULES = (
     "gripper.object",
     "gripper.timeline",
     "scene.gestures",
-    "results.thumbnails",
+    "shared.file_cache",
     # Operators.
     "unit.operators",
     "unit.presets",
@@ -62,7 +63,7 @@ _MODULES = (
     "scene.handles",
     "simulate.timings",
     # Drawing; panels appear in the sidebar in this order, that of the work.
-    "unit.panel",
+    "sidebar.unit_panel",
     "steps.panel",
     "path.panel",
     "simulate.panel",
@@ -82,7 +83,7 @@ _MODULES = (
     "path.legend",
     "sensor.plot",
     "jobs.header",
-    "shared.menus",
+    "sidebar.menus",
 )
 """Modules with something to register, in order of dependence."""
 

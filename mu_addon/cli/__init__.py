@@ -1,4 +1,4 @@
-"""The subcommands of the command line, a module each.
+"""The subcommands of the command line, a module each or for several that share their options.
 
 Each has `add(commands)`, which adds its parser and may import nothing heavy, and `run(options, context)`,
 which makes a use case's job of the options and starts it.
@@ -6,8 +6,9 @@ which makes a use case's job of the options and starts it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
-from types import ModuleType
+from typing import Any, NamedTuple
 
 # In the order in which --help lists them; a module's name is its command's, with _ for -, and a trailing _
 # for a keyword of Python.
@@ -39,6 +40,28 @@ NAMES = (
 )
 
 
-def all_commands() -> dict[str, ModuleType]:
-    """Every subcommand's module by the subcommand's name."""
-    return {name.rstrip("_").replace("_", "-"): import_module(f".{name}", __name__) for name in NAMES}
+_MODULES = {
+    **dict.fromkeys(("presets", "design", "simulate", "place"), "study"),
+    **dict.fromkeys(("ports", "record", "replay"), "stream"),
+    "specimens": "export",
+    "design_experiments": "diagnose",
+}
+"""Modules of commands that share one; each of its functions has its command's name, except a shared `run`."""
+
+
+class Command(NamedTuple):
+    """`add(commands)` adds a command's parser; `run(options, context)` starts its job."""
+
+    add: Callable[[Any], None]
+    run: Callable[[Any, Any], None]
+
+
+def _command(name: str) -> Command:
+    module = import_module(f".{_MODULES.get(name, name)}", __name__)
+    add, run = (getattr(module, f"{what}_{name}", None) or getattr(module, what) for what in ("add", "run"))
+    return Command(add, run)
+
+
+def all_commands() -> dict[str, Command]:
+    """Every subcommand by its name."""
+    return {name.rstrip("_").replace("_", "-"): _command(name) for name in NAMES}

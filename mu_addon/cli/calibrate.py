@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, require_out
+from .options import add_report, add_results, add_setting, require_out
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `calibrate`."""
+    from ..sensing.settings import ANGLES, CHANNEL, DARK
+
     command = commands.add_parser(
         "calibrate",
         help="Calibrate a sensor: fit the map from voltage to bending angle to recorded bending sweeps.",
@@ -28,18 +30,9 @@ def add(commands: Commands[Any]) -> None:
     )
     add_results(command)
     add_report(command)
-    command.add_argument(
-        "--channel", metavar="NAME", help="Column of the light signal (default: the only column)."
-    )
-    command.add_argument(
-        "--dark", metavar="NAME|V", help="Dark level: the name of a column, or a voltage in V (default: 0)."
-    )
-    command.add_argument(
-        "--angles",
-        metavar="CSV",
-        help="Reference angles, CSV with the columns time_s,angle_deg, for a recording without marks "
-        'such as "angle 30".',
-    )
+    add_setting(command, CHANNEL, "NAME")
+    add_setting(command, DARK, "NAME|V")
+    add_setting(command, ANGLES, "CSV")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:

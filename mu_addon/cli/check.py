@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `check`."""
-    from ..design.settings import PRINTER
+    from ..design.settings import PRINTER, UP
 
     command = commands.add_parser(
         "check",
@@ -48,7 +48,7 @@ def add(commands: Commands[Any]) -> None:
         "--up",
         nargs=3,
         type=float,
-        default=(0.0, 0.0, 1.0),
+        default=UP,
         metavar=("X", "Y", "Z"),
         help="Build direction, pointing away from the platform (default: 0 0 1, inlet toward the platform).",
     )

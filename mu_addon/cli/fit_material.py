@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def add(commands: Commands[Any]) -> None:
     """Add the parser of `fit-material`."""
     from ..materials.settings import WEIGHTS
+    from ..measured.kinds import MODES
 
     command = commands.add_parser(
         "fit-material",
@@ -37,8 +38,7 @@ def add(commands: Commands[Any]) -> None:
         nargs="+",
         default=(),
         metavar="MODE",
-        help="Test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear (default: "
-        "none).",
+        help=f"Test modes held out of the fit for validation: {', '.join(MODES)} (default: none).",
     )
     add_setting(command, WEIGHTS)
 

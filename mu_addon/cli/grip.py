@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_report, add_results, add_setting, add_solid, add_struts, help_of, require_out
+from .options import (
+    add_report,
+    add_results,
+    add_setting,
+    add_solid,
+    add_struts,
+    help_of,
+    presets,
+    require_out,
+)
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -33,7 +42,7 @@ def add(commands: Commands[Any]) -> None:
         epilog="example: run.py grip --preset gripper --out out/gripper",
     )
     which = command.add_mutually_exclusive_group(required=True)
-    which.add_argument("--preset", metavar="NAME", help="Gripper preset: gripper.")
+    which.add_argument("--preset", metavar="NAME", help=f"Gripper preset: {presets('gripper')}.")
     which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
     add_results(command)
     add_report(command)

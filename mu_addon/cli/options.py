@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -68,10 +69,19 @@ def add_report(command: argparse.ArgumentParser) -> None:
     )
 
 
+@cache
+def presets(kind: str = "") -> str:
+    """Names of the shipped units, or of presets of another kind, in words."""
+    from ..design.assets import asset_names
+
+    *first, last = asset_names("presets", kind)
+    return f"{', '.join(first)} or {last}" if first else last
+
+
 def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
     """--preset or --unit, and --out."""
     which = command.add_mutually_exclusive_group(required=required)
-    which.add_argument("--preset", metavar="NAME", help="Unit preset: mu-0.75x, mu-1.0x or mu-1.5x.")
+    which.add_argument("--preset", metavar="NAME", help=f"Unit preset: {presets()}.")
     which.add_argument("--unit", metavar="FILE", help="Unit parameters, a TOML file.")
     add_results(command)
 

@@ -1,4 +1,4 @@
-"""`stream`: the real sensor, recorded and shown live."""
+"""`ports`, `stream`, `record` and `replay`: the real sensor, and what was recorded of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,22 @@ if TYPE_CHECKING:
     from .options import Commands
 
 
-def add(commands: Commands[Any]) -> None:
+def add_ports(commands: Commands[Any]) -> None:
+    """Add the parser of `ports`."""
+    commands.add_parser(
+        "ports", help="List the serial ports, for `stream` and `record`.", epilog="example: run.py ports"
+    )
+
+
+def run_ports(options: argparse.Namespace, context: RunContext) -> None:
+    """Put a line for each port into the summary."""
+    from ..usecases.sensor.stream import port_lines
+
+    context.summary["ports"] = port_lines()
+    context.console_summary = lambda summary: summary["ports"] or ["no serial port was found"]
+
+
+def add_stream(commands: Commands[Any]) -> None:
     """Add the parser of `stream`."""
     command = commands.add_parser(
         "stream",
@@ -27,17 +42,23 @@ def add(commands: Commands[Any]) -> None:
     command.set_defaults(show=True)
 
 
+def add_record(commands: Commands[Any]) -> None:
+    """Add the parser of `record`."""
+    command = commands.add_parser(
+        "record",
+        help="Record the sensor over the serial port without displaying it.",
+        epilog="example: run.py record --port /dev/ttyACM0 --seconds 60 --out out/bench-1",
+    )
+    add_source(command)
+    command.set_defaults(show=False)
+
+
 def add_source(command: argparse.ArgumentParser) -> None:
     """Add the options for source, duration and folder of a recording."""
-    from ..sensing.settings import BAUD
+    from ..sensing.settings import BAUD, PORT
 
     add_results(command)
-    command.add_argument(
-        "--port",
-        metavar="NAME",
-        help="Serial port: a device name, or usb:VID:PID[:SERIAL], which identifies the board at any USB "
-        "socket (default: the only USB serial port).",
-    )
+    add_setting(command, PORT, "NAME")
     add_setting(command, BAUD, "B")
     command.add_argument(
         "--simulate",
@@ -99,3 +120,38 @@ def shown(options: argparse.Namespace) -> Sink | None:
     from ..usecases.sensor.stream import Display
 
     return json_lines(sys.stdout) if options.json else Display(sys.stdout)
+
+
+def add_replay(commands: Commands[Any]) -> None:
+    """Add the parser of `replay`."""
+    from ..sensing.settings import SPEED
+
+    command = commands.add_parser(
+        "replay",
+        help="Replay a recording as if it came from the sensor.",
+        epilog="example: run.py replay out/bench-1 --out out/again",
+    )
+    command.add_argument("recording", metavar="RECORDING", help="Folder written by `stream` or `record`.")
+    add_results(command)
+    add_setting(command, SPEED, "F")
+    add_calibration(command)
+    command.add_argument("--controlled", action="store_true", help="As for `stream`.")
+
+
+def run_replay(options: argparse.Namespace, context: RunContext) -> None:
+    """Play the recording to its end."""
+    from ..sensing.sources import Replay
+    from ..usecases.sensor.stream import stream
+
+    require_out(options)
+    stream(
+        Replay(Path(options.recording), options.speed),
+        Path(options.out),
+        seconds=None,
+        about={"source": f"replay of {Path(options.recording).name}"},
+        context=context,
+        controlled=options.controlled,
+        calibration=options.calibration,
+        keep_time=True,
+        show=shown(options),
+    )

@@ -1,10 +1,14 @@
-"""Settings shared by many jobs: facets of a solid, friction, printer, the default resin."""
+"""Settings shared by many jobs: facets, friction, printer, orientation, the usual resin and unit."""
 
 from __future__ import annotations
 
 from .quantity import described
 
 USUAL_RESIN = "elastic-50a-v1"
+PRESET = "mu-1.0x"
+"""Unit where none is given."""
+UP = (0.0, 0.0, 1.0)
+"""Usual build direction in the unit's frame: inlet toward the platform."""
 QUALITY = described(
     "quality", "interactive", "facet resolution of the printable surface", choices=("interactive", "export")
 )
@@ -19,4 +23,11 @@ FRICTION = described(
     "have 0.5 to 1 and above",
     low=0.0,
     high=5.0,
+)
+ORIENTATION = described(
+    "orientation_deg",
+    0.0,
+    "orientation of the unit, degrees about x; 0: hanging, tip down; 90: level",
+    low=-360.0,
+    high=360.0,
 )

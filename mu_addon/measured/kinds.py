@@ -18,6 +18,16 @@ ROLES = ("fit", "held_out")
 # Kinds that are of a unit, whose simulation predicts them.
 OF_A_UNIT = ("unit_pressure", "pressure_step", "unit_pose", "blocked_force")
 
+# Standard deviation of a reading, by quantity: an ordinary camera, gauge, load cell and voltmeter.
+NOISE = {
+    "angle": 0.3,
+    "marker": 0.1,
+    "stress": 0.1,
+    "pressure": 0.1,
+    "tip_deflection": 0.1,
+    "voltage": 0.002,
+}
+
 # Every quantity is read in one unit, which its column's name ends with; "" has none.
 UNITS = {
     "time": "s",

@@ -15,7 +15,7 @@ from ..design.body import Body, envelope, read_body
 from ..design.parameters import Unit, load_preset, read_unit, to_toml
 from ..design.printing.printer import DEFAULT, load_printer
 from ..design.quantity import Description
-from ..design.settings import USUAL_RESIN
+from ..design.settings import ORIENTATION, USUAL_RESIN
 from ..errors import InputError, did_you_mean
 from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import RESOLVED, MeshSettings
@@ -246,7 +246,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
         body = read_body(folder / _word(document, "body", "", origin))
     counts = [v for f in freedoms if f.name == "chambers.count" for v in f.values] or [base.chambers.count]
     paths = [w.name for w in windows(min(counts))]
-    turned = number(settings_of.ORIENTATION) if "orientation_deg" in document else None
+    turned = number(ORIENTATION) if "orientation_deg" in document else None
     targets = read_targets(
         tables["target"],
         where["target"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..design.quantity import described
 from ..meshing.settings import REFINE as REFINEMENT
+from ..meshing.settings import SELF_CONTACT as KEPT_APART
 
 FINER = 1.5
 """Refinement of a check's mesh over the search's, unless the file gives it."""
@@ -31,18 +32,11 @@ CHECK_REFINE = described(
     low=REFINE.low,
     high=REFINE.high,
 )
-ORIENTATION = described(
-    "orientation_deg",
-    0.0,
-    "orientation of the unit under its weight, degrees about x; 0: hanging, tip down; 90: level",
-    low=-360.0,
-    high=360.0,
-)
 ROBUST = described(
     "robust", False, "ask for units that meet the targets within the uncertainty of mesh, print and resin"
 )
-SELF_CONTACT = described(
-    "self_contact", False, "keep walls and struts from passing through each other, at several times the cost"
+SELF_CONTACT = KEPT_APART._replace(
+    default=False, text="keep walls and struts from passing through each other, at several times the cost"
 )
 PRINT_TOLERANCE = described(
     "print_tolerance_mm", 0.05, "scatter of a printed wall from unit to unit", unit="mm", low=0.0, high=0.3

@@ -8,7 +8,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated import called, event, key, module, move, parts, place, run
 
-unit_object, stack = module("blender.unit.object"), module("blender.steps.state")
+unit_object, stack = module("blender.unit.object"), module("blender.unit.stack")
 drawing = module("blender.unit.drawing")
 
 

@@ -27,7 +27,7 @@ def renew(registered):
 
 
 KEPT = (
-    ("mu_addon.blender.steps.state", "STACK"),
+    ("mu_addon.blender.unit.stack", "STACK"),
     ("mu_addon.blender.node_tree.state", "_kept"),
     ("mu_addon.usecases.graph.design_nodes", "STACK"),
 )

@@ -3,7 +3,7 @@
 import pytest
 
 from mu_addon.cli.main import parser
-from mu_addon.cli.study_job import job_of
+from mu_addon.cli.study import job_of
 from mu_addon.errors import InputError
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress

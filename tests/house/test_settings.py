@@ -36,7 +36,6 @@ STATED = [
 # The same word for something else, or a zero that is none's default.
 OTHERWISE = {
     "blender/optimize/properties.py": {"points"},  # of a curve that is wanted
-    "blender/printing/solid_operators.py": {"quality"},  # of a part to print
     "chain/chain.py": {"tip_mass_g"},  # no load
     "chain/joint_learning.py": {"bend_deg"},  # of a joint
     "evidence/prediction/specimen.py": {"strain"},
@@ -47,6 +46,7 @@ OTHERWISE = {
     "measured/experiment.py": {"specimen", "orientation_deg"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
+    "sensing/calibration.py": {"dark"},  # subtracted already
     "usecases/chain/job.py": {"orientation_deg"},  # of a chain's base
     "usecases/graph/bench_nodes.py": {"specimen"},
     "usecases/graph/chain_nodes.py": {"protocol", "orientation_deg"},

@@ -30,15 +30,18 @@ def tool(name):
         ("fem", "import bpy", "only mu_addon.blender knows Blender"),
         ("placement", "import headless", "only mu_addon.blender knows Blender"),
         ("novelty", "", "imports run downward"),
+        ("blender/shared", "from ..unit import object", "a room of the extension imports only rooms below"),
+        ("blender/novelty", "", "a room of the extension imports only rooms below"),
     ],
 )
 def test_the_import_contracts_can_fail(tmp_path, module, line, contract):
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    for name in ("", "design", "fem", "placement", "usecases", module):
+    rooms = "blender", "blender/shared", "blender/unit"
+    for name in ("", "design", "fem", "placement", "usecases", *rooms, module):
         folder = tmp_path / "mu_addon" / name
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "__init__.py").write_text("")
-    for name in ("errors.py", "files.py", "usecases/report.py"):
+    for name in ("errors.py", "files.py", "usecases/report.py", "blender/unit/object.py"):
         (tmp_path / "mu_addon" / name).write_text("")
     (tmp_path / "mu_addon" / module / "new.py").write_text(line + "\n")
     status, output = run(tool("lint-imports"), "--no-cache", cwd=tmp_path)

@@ -7,9 +7,10 @@ import bpy
 from ...design.body import require_sound
 from ...design.printing.repair import repaired
 from ...errors import InputError
-from ..shared.operators import UnitOperator
+from ..shared.wording import sentence
+from ..unit import envelope
 from ..unit import object as unit_object
-from ..unit.fields import sentence
+from ..unit.base_classes import UnitOperator
 from ..unit.properties import to_unit
 from . import state as bodies
 
@@ -34,7 +35,7 @@ def selected_mesh(context):
 
 def report_flaws(operator, root, found, sound):
     """Mark the locations of a body's flaws and report them; the text `sound` without any."""
-    unit_object.mark(root, [place for flaw in found for place in flaw.places])
+    bodies.mark(root, [place for flaw in found for place in flaw.places])
     if not found:
         operator.report({"INFO"}, sound)
     for flaw in found:
@@ -87,9 +88,9 @@ class MU_OT_body(UnitOperator, bpy.types.Operator):
         obj = selected_mesh(context)
         body = bodies.of_object(obj, root)
         require_sound(body, bodies.examined(body, to_unit(root.mu_unit).dimensions))
-        unit_object.put_envelope(root, body)
+        envelope.put(root, body)
         obj.hide_set(True)
-        unit_object.mark(root, [])
+        bodies.mark(root, [])
         unit_object.rebuild(root)
 
 
@@ -101,8 +102,8 @@ class MU_OT_body_remove(UnitOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
-        unit_object.remove_envelope(root)
-        unit_object.mark(root, [])
+        envelope.remove(root)
+        bodies.mark(root, [])
         unit_object.rebuild(root)
 
 

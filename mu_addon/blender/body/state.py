@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...design.body import Body, Flaw, body_of, envelope, flaws, misfits
+from ...design.body import Body, Flaw, body_of, flaws, misfits
 from ...design.dimensions import Dimensions
-from ...design.parameters import Unit
 from ...design.printing.repair import Repair
 from ...errors import InputError
+from ..preview.skeletons import Skeleton
+from ..shared import displays
+from ..unit import drawing
+from ..unit.envelope import arrays_in
+from ..unit.properties import to_unit
 
-_kept: dict[tuple[str, str], Body] = {}
+FLAWS = "flaws"
+"""Balls where a body's check found a flaw."""
 
 
 def of_object(obj: Any, root: Any) -> Body:
@@ -60,34 +64,12 @@ def examined(body: Body, d: Dimensions) -> list[Flaw]:
     return flaws(body) or misfits(body, d)
 
 
-def envelope_in(root: Any, unit: Unit) -> Body | None:
-    """The envelope that the user gave a unit, cut to its length, or None; raises InputError."""
-    mesh = root.mu_unit.envelope
-    if mesh is None:
-        return None
-    vertices, triangles = arrays_in(mesh)
-    digest = hashlib.sha256(vertices.tobytes() + triangles.tobytes()).hexdigest()
-    key = digest, repr((unit.scale, unit.chambers))
-    if key not in _kept:
-        if len(_kept) > 16:
-            _kept.clear()
-        _kept[key] = envelope(body_of(vertices, triangles, mesh.name), unit.dimensions)
-    return _kept[key]
-
-
-def fingerprint(root: Any) -> str:
-    """Text that differs whenever the user's envelope does."""
-    mesh = root.mu_unit.envelope
-    if mesh is None:
-        return ""
-    return hashlib.sha256(b"".join(array.tobytes() for array in arrays_in(mesh))).hexdigest()
-
-
-def arrays_in(mesh: Any) -> tuple[Any, Any]:
-    """Vertices (n, 3), float64, and triangles (m, 3) of a Blender mesh."""
-    mesh.calc_loop_triangles()
-    vertices = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get("co", vertices)
-    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3).astype(np.int64)
+def mark(root: Any, places: list[Any]) -> None:
+    """Put a red ball at every position (3,) in mm of the unit's frame, replacing earlier ones."""
+    old = drawing.beside(root, FLAWS)
+    if old is not None:
+        displays.remove(old)
+    if len(places):
+        radius = 0.08 * to_unit(root.mu_unit).dimensions.cell
+        balls = Skeleton(np.array(places), attributes={"radius": np.full(len(places), radius)})
+        drawing.put_beside(root, FLAWS, balls, "MU Flaws", "MU Balls").show_in_front = True

@@ -8,10 +8,10 @@ from bpy.props import StringProperty
 from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared import updates, viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..simulate import effects
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import from_unit, to_unit
 from . import state as evidence
 from . import timeline as evidence_motion

@@ -8,9 +8,9 @@ import bpy
 
 from ..import_data.importing import draw_import
 from ..jobs.panel import job_state, start_button
-from ..shared.panels import UnitPanel, alert, wrapped
-from ..shared.wording import in_panel
-from ..unit.fields import readable
+from ..shared.panels import alert, wrapped
+from ..shared.wording import in_panel, readable
+from ..unit.base_classes import UnitPanel
 from . import state as evidence
 from . import timeline as evidence_motion
 

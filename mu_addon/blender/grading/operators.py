@@ -6,8 +6,8 @@ import bpy
 
 from ...errors import InputError
 from ..shared import displays
-from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
 from . import state
 

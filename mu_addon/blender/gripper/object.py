@@ -16,10 +16,10 @@ from ...design.steps import StepInputs
 from ...errors import MuError
 from ..preview import materials, skeletons
 from ..shared import displays, updates
+from ..shared.blender_property import exact
 from ..shared.wording import error_text
 from ..unit import drawing
 from ..unit import object as unit_object
-from ..unit.fields import exact
 from .properties import PARAMETERS_CHANGED, from_gripper, to_gripper
 
 PART = displays.GRIPPER

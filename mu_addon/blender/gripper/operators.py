@@ -10,9 +10,8 @@ from ...design.anchors import farthest_window, windows
 from ...design.gripper import gripper_names, load_gripper
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..scene import landing
-from ..shared import viewports
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared import landing, viewports
+from ..shared.operators import RootOperator, reports_errors
 from ..simulate import study_folder as studies
 from ..unit.object import active_root
 from ..unit.properties import to_unit
@@ -65,7 +64,7 @@ class MU_OT_gripper_add(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class GripperOperator(UnitOperator):
+class GripperOperator(RootOperator):
     """An operator on the active gripper."""
 
     find_root = staticmethod(gripper_object.active)

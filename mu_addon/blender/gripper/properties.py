@@ -12,9 +12,10 @@ from ...design.settings import FRICTION
 from ...meshing.settings import SELF_CONTACT
 from ...usecases.grip.settings import DENSITY
 from ..shared import displays
+from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.fields import MILLIMETRES, blender_property, exact, generated_fields, millimetres
+from ..unit.fields import generated_fields
 from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()

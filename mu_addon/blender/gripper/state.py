@@ -18,10 +18,10 @@ from ...run.progress_estimate import Plan
 from ...usecases.grip.expected import GRASP_OF, expected_plan, stage_of
 from ...usecases.grip.settings import COARSE_REFINE, COARSE_STEP_S, REFINE, STEP_S
 from ..jobs.start_child import JobKind
+from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
 from ..simulate import timings
-from ..unit.fields import exact
 from . import object as gripper_object
 from .properties import to_gripper
 

@@ -10,10 +10,11 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ...errors import MuError
 from ...files import make_folder
 from ..shared import viewports
-from ..shared.operators import UnitOperator, open_file
+from ..shared.operators import open_file
 from ..shared.panels import wrapped
 from ..shared.registration import property_group_factory
 from ..simulate import study_folder as studies
+from ..unit.base_classes import UnitOperator
 
 
 def _offered(self, context, typed):

@@ -12,7 +12,8 @@ from bpy.props import EnumProperty
 from ...errors import InputError
 from ...run.child import ERRORS
 from ..shared import viewports
-from ..shared.operators import UnitOperator, open_file
+from ..shared.operators import open_file
+from ..unit.base_classes import UnitOperator
 from .start_child import OWN_FOLDER, JobKind
 
 FILES = {"report": "report.html", "log": "log.ndjson", "errors": f"{OWN_FOLDER}/{ERRORS}", "folder": ""}

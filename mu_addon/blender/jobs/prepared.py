@@ -6,8 +6,7 @@ immediately.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,29 +17,17 @@ from ...files import read_npz, write_npz
 from ...run.child import DONE
 from ...run.folder import write_run
 from ..shared import viewports
-from .start_child import JOB_ENDED, JobKind, forget
-
-_scripts = 0
+from ..shared.operators import NotReady, in_script
+from .start_child import JOB_ENDED, JobKind, child_of, forget
 
 
 def at_once() -> bool:
     """Return True without a user at a window: in background, and while a script calls an operator."""
-    return bool(bpy.app.background or _scripts)
-
-
-@contextmanager
-def called_by(script: bool) -> Iterator[None]:
-    """Have `at_once` return True within the body if a script called the operator."""
-    global _scripts
-    _scripts += script
-    try:
-        yield
-    finally:
-        _scripts -= script
+    return bool(bpy.app.background or in_script())
 
 
 @attrs.define(eq=False)
-class NotPrepared(Exception):
+class NotPrepared(NotReady):
     """Raised where a slow part is lacking; `begin` starts the process that computes it.
 
     job: of `usecases.prepare`, run in `folder`; keep: called with the arrays, or None and the error; points
@@ -54,9 +41,9 @@ class NotPrepared(Exception):
     points: Any = None
     repeats: bool = True
 
-    def begin(self, root: Any, again: Callable[[], None]) -> None:
+    def begin(self, again: Callable[[], None]) -> None:
         """Start the process and call `again` at its end; if it runs already, only add the call."""
-        kind = _kind(self, root)
+        kind, root = _kind(self), self.root
         if kind.is_running(root):
             _waiting[kind.key(root)][1].append(again)
             return
@@ -76,14 +63,13 @@ _waiting: dict[str, tuple[NotPrepared, list[Callable[[], None]]]] = {}
 """By key of a job: the thing that it makes, and the calls at its end."""
 
 
-def _kind(wanted: NotPrepared, root: Any) -> JobKind:
-    name = root.mu_unit.uuid
+def _kind(wanted: NotPrepared) -> JobKind:
+    name = wanted.root.mu_unit.uuid
     return JobKind(f"prepare-{wanted.folder.name}", lambda _: name, lambda _: wanted.folder, wanted.title)
 
 
 def _ended(key: str) -> None:
     from ...usecases.prepare import RESULT
-    from .start_child import child_of
 
     wanted, then = _waiting.pop(key, (None, []))
     child = child_of(key)

@@ -12,9 +12,11 @@ from ...graph.definition import FILE, FOLDER, Definition, Setting
 from ...graph.evaluation import BLOCKED, CACHED, COMPUTED, FAILED, MADE, MUTED, WAITING
 from ...run.progress import spell
 from ...usecases.graph.definitions import definitions
+from ..shared.blender_property import blender_property
 from ..shared.panels import wrapped
 from ..shared.updates import Signal
-from ..unit.fields import blender_property, field, label, sentence, tied_update, tooltip
+from ..shared.wording import label, sentence, tooltip
+from ..unit.fields import field, tied_update
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import sockets
 

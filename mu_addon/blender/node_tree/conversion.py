@@ -14,7 +14,7 @@ from ...graph.definition import Setting
 from ...graph.tree import Node, NodeTree, Source
 from ...usecases.graph.definitions import definitions
 from ..shared import updates
-from ..unit.fields import exact
+from ..shared.blender_property import exact
 from ..unit.properties import to_unit
 from .classes import GROUP, TREE, attribute, node_class
 

@@ -15,9 +15,10 @@ from ...design.parameters import SECTIONS
 from ...design.steps import STEPS
 from ...graph.definition import Setting
 from ..shared import updates
+from ..shared.blender_property import exact
+from ..shared.wording import label
 from ..unit import object as unit_object
-from ..unit.broken import description
-from ..unit.fields import exact, label
+from ..unit.fields import description
 from ..unit.properties import from_unit, section_of
 from .classes import TREE, attribute, node_class
 

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...errors import InputError
-from ..shared.operators import UnitOperator
+from ..unit.base_classes import UnitOperator
 from . import conversion
 from .classes import GROUP, TREE, attribute
 

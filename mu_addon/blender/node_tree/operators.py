@@ -15,8 +15,9 @@ from ...usecases.graph.definitions import definitions
 from ...usecases.graph.templates import template, template_names
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..shared.operators import UnitOperator, open_file, reports_errors
-from ..unit.fields import sentence
+from ..shared.operators import open_file, reports_errors
+from ..shared.wording import sentence
+from ..unit.base_classes import UnitOperator
 from . import conversion, following, state
 from .classes import TREE
 from .groups import TreeOperator, active_tree

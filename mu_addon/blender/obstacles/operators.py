@@ -12,8 +12,8 @@ from ...design.settings import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
 from ..preview import materials, skeletons
-from ..shared.operators import UnitOperator, ValidUnitOperator
-from ..unit.fields import blender_property, exact
+from ..shared.blender_property import blender_property, exact
+from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
 from . import state as obstacles
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...errors import InputError
-from ..shared.panels import UnitPanel, wrapped
-from ..unit.fields import sentence
+from ..shared.panels import wrapped
+from ..shared.wording import sentence
+from ..unit.base_classes import UnitPanel
 from . import state as obstacles
 
 

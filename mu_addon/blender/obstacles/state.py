@@ -19,8 +19,9 @@ from ...design.parameters import Unit
 from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ..body import state as bodies
+from ..shared.blender_property import blender_property, exact
 from ..shared.registration import property_group_factory
-from ..unit.fields import blender_property, exact
+from ..unit import envelope
 
 ODD_SIZE_MM = (0.1, 2000.0)
 """An obstacle outside this range is probably in another unit of length."""
@@ -69,7 +70,7 @@ def placed(root: Any, obj: Any) -> Placed:
 def examined(root: Any, obj: Any, unit: Unit) -> list[Flaw]:
     """Reasons why an object cannot be an obstacle in its place: its surface, its size, its position."""
     body = placed(root, obj).body
-    found = unsound(body) or overlaps(body, unit.dimensions, bodies.envelope_in(root, unit))
+    found = unsound(body) or overlaps(body, unit.dimensions, envelope.envelope_in(root, unit))
     _placed[root.mu_unit.uuid, obj.name_full] = _where(root, obj), Placed(body, found)
     return found
 

@@ -8,11 +8,10 @@ from bpy.props import EnumProperty, IntProperty
 
 from ..jobs import start_child
 from ..jobs.operators import job_operators
-from ..scene import landing
-from ..shared import updates, viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator
+from ..shared import landing, updates, viewports
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import from_unit
 from . import state as optimization
 

@@ -8,10 +8,10 @@ import bpy
 
 from ...optimization.freedoms import parameters
 from ..jobs.panel import job_state, start_button, timed
-from ..results import thumbnails
-from ..shared.panels import UnitPanel, alert, wrapped
-from ..shared.wording import in_panel
-from ..unit.fields import label
+from ..shared.file_cache import icon_of
+from ..shared.panels import alert, wrapped
+from ..shared.wording import in_panel, label
+from ..unit.base_classes import UnitPanel
 from . import state as optimization
 from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve, present, scale_of
 
@@ -168,7 +168,7 @@ def _results(layout, found) -> None:
     row = box.row(align=True)
     row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
     row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
-    icon = thumbnails.icon_of(found.folder / optimization.FRONT)
+    icon = icon_of(found.folder / optimization.FRONT)
     if icon is not None:
         layout.template_icon(icon, scale=FRONT_SIZE)
     for proposed in found.proposed:
@@ -189,7 +189,7 @@ def _proposed(layout, proposed) -> None:
     row.operator("mu.optimize_add", text="", icon="DUPLICATE").number = proposed.number
     if not body:
         return
-    icon = thumbnails.icon_of(proposed.file.with_suffix(".png"))
+    icon = icon_of(proposed.file.with_suffix(".png"))
     if icon is not None:
         body.template_icon(icon, scale=6.0)
     column = body.column(align=True)

@@ -16,12 +16,15 @@ from ...design import lattice_kinds
 from ...design.anchors import windows
 from ...design.assets import asset_names
 from ...design.quantity import Description
+from ...design.settings import ORIENTATION
 from ...errors import InputError
 from ...optimization.freedoms import PATH, RESIN, parameters
-from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ORIENTATION, ROBUST, SELF_CONTACT
+from ...optimization.settings import CHECK_REFINE, EVALUATIONS, ROBUST, SELF_CONTACT
 from ...optimization.settings import REFINE as SEARCH_REFINE
+from ..shared.blender_property import blender_property, exact
 from ..shared.registration import property_group_factory
-from ..unit.fields import blender_property, exact, label, sentence, true_scale
+from ..shared.wording import label, sentence
+from ..unit.fields import true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")

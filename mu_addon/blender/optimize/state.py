@@ -15,12 +15,12 @@ from ...errors import InputError, MuError
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
 from ...usecases.optimize.expected import search_plan
-from ..body import state as bodies
 from ..jobs.start_child import JobKind
+from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import effects
 from ..simulate import study_folder as studies
-from ..unit.fields import exact
+from ..unit import envelope
 from ..unit.properties import shape_hash, to_unit
 from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve
 
@@ -181,7 +181,7 @@ def job_of(root: Any) -> Job:
     from ...usecases.optimize.job import Job, job_from
 
     unit, s = to_unit(root.mu_unit), root.mu_optimize
-    body = bodies.envelope_in(root, unit)
+    body = envelope.envelope_in(root, unit)
     if s.source == "file":
         if not s.file:
             raise InputError("no file is chosen", "Optimize, File", "choose a design.toml")

@@ -13,10 +13,10 @@ from ..results import field_colours, legend
 from ..results import motion as motion_parts
 from ..shared.displays import PART
 from ..shared.viewports import Overlay
+from ..shared.wording import path_symbol
 from ..unit import object as unit_object
-from ..unit.drawing import CANDIDATE
-from ..unit.fields import path_symbol
 from . import ranking
+from .candidates import CANDIDATE
 
 BETTER = "Mean deviation [mm], smaller is better"
 """Note on a ranking's numbers, next to the lattice and in the panel."""

@@ -6,8 +6,9 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...design.anchors import windows
-from ..shared.panels import UnitPanel, parameters, wrapped
-from ..unit.fields import path_symbol
+from ..shared.panels import wrapped
+from ..shared.wording import path_symbol
+from ..unit.base_classes import UnitPanel, parameters
 from . import ranking
 from .legend import BETTER
 from .picking import selected_candidate

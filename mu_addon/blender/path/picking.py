@@ -15,11 +15,11 @@ from bpy.props import StringProperty
 from ...design.anchors import window
 from ..shared import updates
 from ..shared.displays import PART
-from ..shared.operators import UnitOperator
 from ..shared.registration import add_handlers, remove_handlers
 from ..unit import object as unit_object
-from ..unit.drawing import CANDIDATE
+from ..unit.base_classes import UnitOperator
 from ..unit.properties import to_unit
+from .candidates import CANDIDATE
 
 
 class MU_OT_path(UnitOperator, bpy.types.Operator):

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..results import field_colours
 from ..shared.compat import set_modifier_input
+from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
-from ..unit.fields import path_symbol
 
 
 @attrs.frozen

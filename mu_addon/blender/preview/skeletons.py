@@ -18,7 +18,7 @@ from ...design.lattice import Graph, Lattice
 from ...design.parameters import Unit
 from ...design.steps import Path, Section, Struts, TrimmedStruts, along
 from ...design.waveguide import Bar
-from ..unit.fields import path_symbol
+from ..shared.wording import path_symbol
 from .nodes import unit as unit_group
 
 Floats = NDArray[np.float64]

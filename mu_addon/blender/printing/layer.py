@@ -11,9 +11,9 @@ from mathutils import Vector
 from ...design.printing.slices import Layers
 from ...design.solid import chamber
 from ...errors import InputError, MuError
-from ..body import state as bodies
 from ..preview import materials, skeletons
 from ..shared import displays
+from ..unit import envelope
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
 
@@ -107,5 +107,5 @@ def _layers(root: Any, up: Any) -> Layers:
     if key not in _kept:
         _kept.clear()
         within = chamber(to_unit(root.mu_unit)) if is_current else None
-        _kept[key] = Layers(*bodies.arrays_in(mesh), tuple(up), within)
+        _kept[key] = Layers(*envelope.arrays_in(mesh), tuple(up), within)
     return _kept[key]

@@ -5,11 +5,12 @@
 import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
+from ...design.settings import UP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..shared import viewports
-from ..shared.operators import UnitOperator, ValidUnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
 from . import layer, marks
 from . import state as printing
@@ -196,7 +197,7 @@ class MU_OT_print_up(UnitOperator, bpy.types.Operator):
         name="Up",
         description="Away from the platform, in the unit's frame",
         subtype="XYZ",
-        default=(0.0, 0.0, 1.0),
+        default=UP,
         options={"SKIP_SAVE"},
     )
 

@@ -9,8 +9,9 @@ import bpy
 
 from ...run.child import FAILED
 from ..jobs.panel import job_state
-from ..shared.panels import UnitPanel, alert, folded_place, large_button, wrapped
+from ..shared.panels import alert, large_button, wrapped
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitPanel, folded_place
 from . import layer, marks
 from . import state as printing
 from .properties import OWN_PRINTER

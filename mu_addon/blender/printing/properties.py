@@ -13,7 +13,9 @@ from bpy.props import (
 )
 
 from ...design.assets import asset_names
-from ...design.printing.printer import DEFAULT
+from ...design.settings import PRINTER, UP
+from ...usecases.export.settings import QUALITY
+from ..shared.blender_property import blender_property
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import layer, marks
@@ -46,7 +48,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
                 "A TOML file of your own; start from printer.toml in the check's folder",
             ),
         ],
-        default=DEFAULT,
+        default=PRINTER.default,
     )
     printer_file: StringProperty(
         name="Limits",
@@ -64,7 +66,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
         name="Up",
         description="Build direction in the unit's frame, away from the platform. 0 0 1: inlet down",
         subtype="XYZ",
-        default=(0.0, 0.0, 1.0),
+        default=UP,
         update=lambda settings, context: layer.follow(settings.id_data),
     )
     formats: EnumProperty(
@@ -74,9 +76,9 @@ class MU_PG_print(bpy.types.PropertyGroup):
         options={"ENUM_FLAG"},
         default={"stl", "3mf"},
     )
-    quality: EnumProperty(
+    quality: blender_property(
+        QUALITY,
         name="Facets",
-        description="How finely round parts are divided into flat facets",
         items=[
             ("export", "Fine", "The quality to print"),
             ("interactive", "Coarse", "Quicker, smaller files"),

@@ -5,24 +5,25 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...design import settings
-from ...design.solid import QUALITY
+from ...design.settings import QUALITY
+from ...design.solid import QUALITY as FACETS
 from ...design.stl_and_nodes import write_nodes, write_stl
-from ..shared.operators import ValidUnitOperator
+from ...usecases.export.settings import QUALITY as EXPORTED
+from ..shared.blender_property import blender_property
 from ..unit import object as unit_object
-from ..unit.fields import sentence
+from ..unit.base_classes import ValidUnitOperator
 from ..unit.properties import to_unit
 from . import layer
 from . import state as printing
+from .state import solid_of
 
-_QUALITY = [
+_ITEMS = [
     (name, name.capitalize(), f"{f.around_axis} facets around the axis, {f.around_strut} around a strut")
-    for name, f in QUALITY.items()
+    for name, f in FACETS.items()
 ]
-_FACETS = sentence(settings.QUALITY.text)
 
 
 class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
@@ -32,13 +33,11 @@ class MU_OT_solid(ValidUnitOperator, bpy.types.Operator):
     bl_label = "Build Solid"
     bl_options = {"REGISTER", "UNDO"}
 
-    quality: EnumProperty(
-        name="Quality", description=_FACETS, items=_QUALITY, default=settings.QUALITY.default
-    )
+    quality: blender_property(QUALITY, items=_ITEMS)
 
     def act(self, context, root):
         core = to_unit(root.mu_unit)
-        solid = unit_object.solid_of(root, core, self.quality)
+        solid = solid_of(root, core, self.quality)
         unit_object.put_solid(root, solid, core)
         layer.follow(root)
         gates = solid.gates
@@ -54,7 +53,7 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
 
     filename_ext = ".stl"
     filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
-    quality: EnumProperty(name="Quality", description=_FACETS, items=_QUALITY, default="export")
+    quality: blender_property(EXPORTED, items=_ITEMS)
     nodes: BoolProperty(
         name="Lattice Nodes as Text",
         description="Also write the nodes' coordinates into the same folder",
@@ -75,7 +74,7 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
         target = Path(bpy.path.abspath(self.filepath))
         if self.nodes:
             write_nodes(core, target.with_suffix(".txt"))
-        write_stl(unit_object.solid_of(root, core, self.quality, str(target)), target)
+        write_stl(solid_of(root, core, self.quality, str(target)), target)
         self.report({"INFO"}, f"Written: {target}")
 
 

@@ -18,6 +18,7 @@ from mathutils import Vector
 from ...design.anchors import window
 from ...design.parameters import Unit, read_unit
 from ...design.printing.printer import Limit, Printer, load_printer, printer_text
+from ...design.solid import Solid
 from ...design.steps import require_whole
 from ...design.surface import stl_bytes
 from ...errors import InputError, MuError
@@ -25,13 +26,13 @@ from ...files import write_bytes, write_json
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
 from ...usecases.export.sheets import measured_limits
-from ..body import state as bodies
+from ..jobs import prepared
 from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
+from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
-from ..steps import state as stack
-from ..unit import object as unit_object
-from ..unit.fields import exact
+from ..unit import envelope, stack
+from ..unit.object import chosen_window
 from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
@@ -153,7 +154,7 @@ def trouble(root: Any, command: str) -> str:
 
 def own_body(root: Any) -> bool:
     """Return True if a user-defined body replaces the lattice's box."""
-    return bool(bodies.fingerprint(root))
+    return bool(envelope.fingerprint(root))
 
 
 def write_inputs(root: Any, command: str, folder: Path) -> None:
@@ -223,9 +224,33 @@ def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     return LAYOUT, Job(unit, None, _printer(root))
 
 
+def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "") -> Solid:
+    """The printable solid of a unit in the scene; raises InputError, GateError and, in a window, NotPrepared.
+
+    stl: file to write it to, as made elsewhere; such a solid, of many facets, is not kept.
+    """
+    given = stack.given(root, unit, quality)
+    require_whole(given)
+    if prepared.at_once() or (not stl and stack.STACK.has("solid", given)):
+        solid: Solid = stack.STACK.value("solid", given)
+        return solid
+    from ...usecases.prepare import Job, solid_of
+
+    window = chosen_window(root, unit)
+    of = {"path": window.name if window else "", "quality": quality, "stl": stl}
+    job = Job("solid", of, unit, given.body)
+
+    def keep(arrays: Any, trouble: str) -> None:
+        if arrays is not None and not stl:
+            stack.STACK.keep("solid", given, solid_of(arrays, job))
+
+    folder = studies.folder_of(root) / ("stl" if stl else "solid")
+    raise prepared.NotPrepared(root, f"STL in {stl}" if stl else "solid", folder, job, keep, repeats=not stl)
+
+
 def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
     """Write the solid of a unit in a user-defined body, and its origin."""
-    solid = unit_object.solid_of(root, unit)
+    solid = solid_of(root, unit)
     content = stl_bytes(solid.vertices, solid.triangles)
     write_bytes(folder / "own.stl", content)
     digest = hashlib.sha256(content).hexdigest()
@@ -234,7 +259,7 @@ def _own_stl(root: Any, unit: Unit, folder: Path) -> Path:
 
 
 def _shape(root: Any, unit: Unit) -> list[str]:
-    return [shape_hash(unit), path_of(root, unit), bodies.fingerprint(root)]
+    return [shape_hash(unit), path_of(root, unit), envelope.fingerprint(root)]
 
 
 def checked(root: Any) -> Checked | None:

@@ -19,9 +19,9 @@ from mathutils import Vector
 from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.displays import LEGEND
 from ..shared.viewports import Overlay
+from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.fields import path_symbol
 from . import field_colours, places
 from . import motion as motion_parts
 

@@ -29,6 +29,7 @@ from ...usecases.simulate_and_place.motion_files import (
 from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
+from ..printing.state import solid_of
 from ..shared import displays, updates
 from ..shared.displays import MOTION
 from ..shared.registration import add_handlers, remove_handlers
@@ -136,7 +137,7 @@ def follow(root: Any) -> None:
             show(root, name, what)
         except NotPrepared as wanted:
             uuid = root.mu_unit.uuid
-            wanted.begin(root, lambda uuid=uuid: _follow(uuid))
+            wanted.begin(lambda uuid=uuid: _follow(uuid))
         except MuError as error:
             hide(root, name, what)
             wrong = error.what
@@ -212,7 +213,7 @@ def _show_print(root: Any, motion: Motion, name: str) -> None:
         )
     if not unit_object.solid_is_current(root):
         core = to_unit(root.mu_unit)
-        unit_object.put_solid(root, unit_object.solid_of(root, core), core)
+        unit_object.put_solid(root, solid_of(root, core), core)
         root.mu_unit.show = "preview"
     solid = root.mu_unit.solid
     rest = vertices_of(solid)
@@ -364,7 +365,7 @@ def played(root: Any, part: Any, motion: Motion | None = None) -> Played | None:
         apart = run_motions.apart(root, motion, name, body, cut)
     except NotPrepared as wanted:
         uuid = root.mu_unit.uuid
-        wanted.begin(root, lambda: _refresh(uuid))
+        wanted.begin(lambda: _refresh(uuid))
         return kept
     return kept if apart is None else attrs.evolve(kept, fields={**kept.fields, DIFFERENCE: apart})
 

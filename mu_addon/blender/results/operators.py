@@ -7,9 +7,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
-from ..shared.operators import UnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator
 from . import legend_object
 from . import motion as motion_parts
 

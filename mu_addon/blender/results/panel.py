@@ -8,11 +8,13 @@ import bpy
 
 from ...usecases.simulate_and_place.charts import ANGLE, delta_name
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
-from ..shared.panels import UnitPanel, alert, wrapped
+from ..shared.file_cache import icon_of
+from ..shared.panels import alert, wrapped
+from ..shared.wording import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.fields import path_symbol, sentence
-from . import field_colours, field_operators, legend_object, run_motions, run_panel, thumbnails
+from ..unit.base_classes import UnitPanel
+from . import field_colours, field_operators, legend_object, run_motions, run_panel
 from . import motion as motion_parts
 from .operators import NO_MOTION
 
@@ -117,9 +119,8 @@ class MU_PT_warnings(UnitPanel, bpy.types.Panel):
     bl_order = 0
 
     @classmethod
-    def poll(cls, context):
-        root = unit_object.active_root(context)
-        found = None if root is None else studies.findings(root)
+    def shows(cls, root):
+        found = studies.findings(root)
         return found is not None and bool(found.summary.get("warnings"))
 
     def draw_header(self, context):
@@ -161,9 +162,8 @@ class _OfMotion(UnitPanel):
     bl_options: ClassVar[set[str]] = set()
 
     @classmethod
-    def poll(cls, context):
-        root = unit_object.active_root(context)
-        return root is not None and motion_parts.motion_of(root) is not None
+    def shows(cls, root):
+        return motion_parts.motion_of(root) is not None
 
 
 class MU_PT_motion(_OfMotion, bpy.types.Panel):
@@ -213,8 +213,8 @@ class MU_PT_field(_OfMotion, bpy.types.Panel):
     bl_order = 2
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and bool(motion_parts.parts(unit_object.active_root(context)))
+    def shows(cls, root):
+        return super().shows(root) and bool(motion_parts.parts(root))
 
     def show(self, layout, context, root):
         settings = root.mu_motion
@@ -259,7 +259,7 @@ class MU_PT_pictures(_OfMotion, bpy.types.Panel):
     def show(self, layout, context, root):
         folder = studies.results_folder(root) / FOLDER
         names = [ANGLE] + ([delta_name(root.mu_unit.path)] if root.mu_unit.path else [])
-        found = [(name, thumbnails.icon_of(folder / name)) for name in names]
+        found = [(name, icon_of(folder / name)) for name in names]
         for name, icon in found:
             if icon is not None:
                 layout.template_icon(icon, scale=PICTURE)

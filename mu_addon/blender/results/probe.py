@@ -13,10 +13,10 @@ from bpy_extras.view3d_utils import (
 )
 
 from ...usecases.simulate_and_place.motion_files import MODEL_A
-from ..shared.operators import UnitPoll
 from ..shared.viewports import Overlay
+from ..shared.wording import path_symbol
 from ..unit import object as unit_object
-from ..unit.fields import path_symbol
+from ..unit.base_classes import UnitPoll
 from . import field_colours, legend, places
 from . import motion as motion_parts
 from .operators import NO_MOTION

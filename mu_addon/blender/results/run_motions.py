@@ -78,7 +78,7 @@ def _wanted(root: Any, motion: Motion, name: str, other: Motion, cut: bool) -> p
 
     of = {"one": str(one), "other": str(two), "name": name, "cut": cut}
     folder = studies.folder_of(root) / "difference"
-    return prepared.NotPrepared("difference of runs", folder, Job("difference", of), keep)
+    return prepared.NotPrepared(root, "difference of runs", folder, Job("difference", of), keep)
 
 
 def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
@@ -89,7 +89,7 @@ def embedded(root: Any, motion: Motion, points: Any) -> Embedding:
         of = {"one": str(motion.folder.parent), "points": key(points)}
         folder = studies.folder_of(root) / "embedding"
         job = Job("embedding", of)
-        raise prepared.NotPrepared("motion of the print", folder, job, lambda *_: None, points)
+        raise prepared.NotPrepared(root, "motion of the print", folder, job, lambda *_: None, points)
     return motion.embedding(points)
 
 

@@ -8,9 +8,9 @@ from bpy.props import StringProperty
 from ...errors import InputError
 from ...usecases.simulate_and_place import unit_runs
 from ..shared import updates
-from ..shared.operators import UnitOperator
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
+from ..unit.base_classes import UnitOperator
 from ..unit.properties import from_unit
 from . import motion as motion_parts
 from . import runs

@@ -11,10 +11,11 @@ import bpy
 
 from ...run.progress import spell
 from ...usecases.simulate_and_place.comparison import compare
-from ..shared.panels import UnitPanel, wrapped
+from ..shared.panels import wrapped
+from ..shared.wording import path_symbol, sentence
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
-from ..unit.fields import path_symbol, sentence
+from ..unit.base_classes import UnitPanel
 from . import runs
 
 ROWS = 4
@@ -88,9 +89,8 @@ class MU_PT_comparison(UnitPanel, bpy.types.Panel):
     bl_options: ClassVar[set[str]] = set()
 
     @classmethod
-    def poll(cls, context):
-        root = unit_object.active_root(context)
-        return root is not None and studies.run_by_key(root, root.mu_unit.study.against) is not None
+    def shows(cls, root):
+        return studies.run_by_key(root, root.mu_unit.study.against) is not None
 
     def show(self, layout, context, root):
         shown, other = studies.shown_run(root), studies.run_by_key(root, root.mu_unit.study.against)

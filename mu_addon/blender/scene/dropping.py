@@ -15,10 +15,10 @@ from ...design.parameters import read_unit
 from ...errors import InputError
 from ...reading import file_text, parse_toml
 from ..preview import skeletons
-from ..shared import viewports
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared import landing, viewports
+from ..shared.operators import reports_errors
 from ..unit import object as unit_object
-from . import landing
+from ..unit.base_classes import UnitOperator
 
 SURFACES = ".stl;.obj;.ply"
 # Far longer than any file of a unit or a tree.

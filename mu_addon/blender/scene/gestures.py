@@ -16,11 +16,12 @@ from bpy.app.handlers import persistent
 
 from ...design.anchors import windows
 from ..gripper import object as gripper_object
+from ..path.candidates import CANDIDATE
 from ..preview import nodes
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
 from ..shared.registration import add_handlers, remove_handlers
-from ..unit import broken, drawing, preview_update
+from ..unit import broken, preview_update
 from ..unit import object as unit_object
 
 _holders: dict[str, int] = {}
@@ -179,7 +180,7 @@ def _damaged(root: Any) -> bool:
     if not props.candidates:
         return False
     there = [child.get(displays.PART) for child in root.children]
-    wanted = [drawing.CANDIDATE + window.name for window in windows(props.chambers.count)]
+    wanted = [CANDIDATE + window.name for window in windows(props.chambers.count)]
     return sorted(name for name in there if name in wanted) != sorted(wanted)
 
 
@@ -188,6 +189,10 @@ def _rebuild(root: Any) -> None:
         preview_update.schedule(root)
     else:
         gripper_object.rebuild(root)
+
+
+def _units_changed(_scene: Any) -> None:
+    look()
 
 
 @persistent
@@ -247,15 +252,16 @@ _HANDLERS = {
     "load_post": _after_load,
     "blend_import_post": _after_import,
 }
+_CONNECTIONS = ((scene_units.CHANGED, _units_changed),)
 
 
 def register() -> None:
     """Register handlers that check after every gesture."""
-    add_handlers(_HANDLERS)
+    add_handlers(_HANDLERS, _CONNECTIONS)
 
 
 def unregister() -> None:
     """Unregister them."""
-    remove_handlers(_HANDLERS)
+    remove_handlers(_HANDLERS, _CONNECTIONS)
     for kept in (_holders, _given, _hidden):
         kept.clear()

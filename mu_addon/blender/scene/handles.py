@@ -22,12 +22,12 @@ from ..live_bending import state as live
 from ..results import motion as motion_parts
 from ..results.operators import NO_MOTION
 from ..shared import viewports
+from ..shared.blender_property import step_of
 from ..shared.displays import editable
-from ..shared.operators import UnitPoll
-from ..shared.wording import in_panel
-from ..steps import state as stack
+from ..shared.wording import in_panel, label
 from ..unit import object as unit_object
-from ..unit.fields import field, label, step_of
+from ..unit.base_classes import UnitPoll
+from ..unit.fields import description, field
 from ..unit.properties import to_unit
 
 PRESSURE = "pressure"
@@ -80,7 +80,7 @@ ITEMS = [
 def parameter_of(root: Any, handle: Handle) -> tuple[Any, str]:
     """Group and name of the property that a handle drags."""
     group = getattr(root.mu_unit, handle.section)
-    return group, field(group, stack.description(handle.section, handle.name))
+    return group, field(group, description(handle.section, handle.name))
 
 
 def pressure_of(root: Any, scene: Any) -> float:
@@ -189,7 +189,7 @@ class MU_OT_drag(UnitPoll, bpy.types.Operator):
 
     def _described(self):
         handle = HANDLES[self.what]
-        return stack.description(handle.section, handle.name)
+        return description(handle.section, handle.name)
 
     def _field(self):
         return parameter_of(self._root, HANDLES[self.what])

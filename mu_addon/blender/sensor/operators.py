@@ -12,8 +12,9 @@ from ...sensing.session import SWEEP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
 from ..results.operators import MotionOperator
 from ..shared import viewports
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import reports_errors
 from ..simulate import study_folder as studies
+from ..unit.base_classes import UnitOperator
 from . import state as sensor
 from . import twin
 from .session import Guide

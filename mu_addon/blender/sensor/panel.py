@@ -10,9 +10,10 @@ import bpy
 from ...run.child import FAILED
 from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
-from ..shared.panels import UnitPanel, large_button, wrapped
+from ..shared.panels import large_button, wrapped
 from ..shared.wording import in_panel
 from ..simulate import study_folder as studies
+from ..unit.base_classes import UnitPanel
 from . import state as sensor
 from . import twin
 

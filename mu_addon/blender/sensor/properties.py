@@ -5,9 +5,9 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...sensing.settings import BAUD
+from ...sensing.settings import BAUD, PORT, SPEED
+from ..shared.blender_property import blender_property
 from ..shared.registration import property_group_factory
-from ..unit.fields import blender_property
 from ..unit.properties import BESIDE_BLEND_FILE
 from . import state as sensor
 
@@ -39,13 +39,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
             ("replay", "Recording", "A recording as if it came from the sensor"),
         ],
     )
-    port: StringProperty(
-        name="Port",
-        description="A port's device, or usb:VID:PID[:SERIAL], which finds it in any socket. Empty: the only "
-        "USB port",
-        search=_ports,
-        search_options={"SUGGESTION"},
-    )
+    port: blender_property(PORT, search=_ports, search_options={"SUGGESTION"})
     baud: blender_property(BAUD, name="Baud")
     replay: StringProperty(
         name="Recording",
@@ -53,9 +47,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         options=BESIDE_BLEND_FILE,
     )
-    speed: FloatProperty(
-        name="Speed", description="Factor on its original speed", default=1.0, min=0.01, max=100.0
-    )
+    speed: blender_property(SPEED._replace(low=0.01, high=100.0), precision=2)
     channel: StringProperty(
         name="Light",
         description="Channel of the light. Empty: the first whose name begins with light, or the first",

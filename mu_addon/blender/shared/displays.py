@@ -57,6 +57,11 @@ def root_above(obj: Any) -> Any | None:
     return obj
 
 
+def by_uuid(uuid: str) -> Any | None:
+    """Root of this file with that UUID, or None where it was deleted."""
+    return next((o for o in bpy.data.objects if uuid_of(o) == uuid and editable(o)), None)
+
+
 def editable(obj: Any) -> bool:
     """Return True if an object belongs to this file: neither linked from a library nor an override."""
     return obj.library is None and obj.override_library is None

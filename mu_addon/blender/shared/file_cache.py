@@ -1,10 +1,15 @@
-"""Results of reading files, cached until one of them changes: panels ask many times a second."""
+"""Results of reading files, cached until one of them changes: panels ask many times a second.
+
+Pictures among them are previews for panels.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
+
+import bpy.utils.previews
 
 from ...errors import MuError
 
@@ -47,3 +52,31 @@ def _state(path: Path) -> tuple[int, int] | None:
     except OSError:
         return None
     return stat.st_mtime_ns, stat.st_size
+
+
+_previews: Any = None
+_icons: FileCache[int] = FileCache()
+
+
+def icon_of(path: Path) -> int | None:
+    """Number of a picture's preview for `template_icon`; None where there is no such file."""
+    return _icons.read([path], lambda: _load(str(path)))
+
+
+def _load(name: str) -> int:
+    _previews.pop(name, None)
+    return int(_previews.load(name, name, "IMAGE", force_reload=True).icon_id)
+
+
+def register() -> None:
+    """Create the collection of previews."""
+    global _previews
+    _previews = bpy.utils.previews.new()
+
+
+def unregister() -> None:
+    """Remove it."""
+    global _previews
+    bpy.utils.previews.remove(_previews)
+    _previews = None
+    _icons.clear()

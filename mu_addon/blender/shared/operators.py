@@ -1,24 +1,53 @@
-"""Base classes of the operators: the unit they act on, the core's errors, and opening files."""
+"""Base classes of the operators: the object they act on, the core's errors, and opening files."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial, wraps
 from pathlib import Path
+from typing import Any
 
+import attrs
 import bpy
 
 from ...errors import MuError
-from ..jobs.prepared import NotPrepared, called_by
-from ..unit.object import active_root, by_uuid
-from .displays import editable
+from . import displays
 from .wording import in_panel
 
-NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
+_scripts = 0
+
+
+def in_script() -> bool:
+    """Return True while a script calls an operator."""
+    return _scripts > 0
+
+
+@contextmanager
+def _called_by(script: bool) -> Iterator[None]:
+    """Have `in_script` return True within the body if a script called the operator."""
+    global _scripts
+    _scripts += script
+    try:
+        yield
+    finally:
+        _scripts -= script
+
+
+@attrs.define(eq=False)
+class NotReady(Exception):
+    """Raised by an operator on `root` that must wait; `begin` starts what it waits for."""
+
+    root: Any
+
+    def begin(self, again: Callable[[], None]) -> None:
+        """Start it, and call `again` at its end."""
+        raise NotImplementedError
 
 
 def linked(root) -> str:
     """Return the reason why a unit cannot be changed here, its library, with the remedy; else ""."""
-    if editable(root):
+    if displays.editable(root):
         return ""
     source = root if root.library is not None else root.override_library.reference
     name = Path(source.library.filepath).name
@@ -31,12 +60,12 @@ def reports_errors(execute):
     @wraps(execute)
     def reported(self, context):
         try:
-            with called_by(script=not self.options.is_invoke):
+            with _called_by(script=not self.options.is_invoke):
                 return execute(self, context)
-        except NotPrepared as wanted:
-            root = active_root(context)
+        except NotReady as wanted:
+            owner = displays.uuid_of(wanted.root)
             try:
-                wanted.begin(root, partial(_again, root.mu_unit.uuid, self.bl_idname, self.as_keywords()))
+                wanted.begin(partial(_again, owner, self.bl_idname, self.as_keywords()))
             except MuError as error:
                 self.report({"ERROR"}, in_panel(str(error)))
             # Without an undo step: that comes with what is made.
@@ -49,8 +78,8 @@ def reports_errors(execute):
 
 
 def _again(uuid: str, name: str, values: dict) -> None:
-    """Call an operator once more on a unit, as one undo step; do nothing if the unit is gone."""
-    root, windows = by_uuid(uuid), bpy.context.window_manager.windows
+    """Call an operator once more on a root, as one undo step; do nothing if the root is gone."""
+    root, windows = displays.by_uuid(uuid), bpy.context.window_manager.windows
     if root is not None and windows:
         with bpy.context.temp_override(window=windows[0], object=root, active_object=root):
             getattr(bpy.ops.mu, name.rpartition(".")[2].removeprefix("MU_OT_"))(
@@ -58,11 +87,13 @@ def _again(uuid: str, name: str, values: dict) -> None:
             )
 
 
-class UnitPoll:
-    """The poll of an operator on the active unit: greyed out, with the reason, where it cannot run."""
+class RootPoll:
+    """The poll of an operator on an active root: greyed out, with the reason, where it cannot run."""
 
-    find_root = staticmethod(active_root)
-    no_root = NO_UNIT
+    find_root: Callable[[Any], Any]
+    """Return the root to work on in a context, or None."""
+    no_root: str
+    """Words where there is none."""
     linked_too = False
     """True if it also runs on what is linked from a library."""
 
@@ -81,8 +112,8 @@ class UnitPoll:
         return not why
 
 
-class UnitOperator(UnitPoll):
-    """An operator that acts at once on the active unit; errors of the core become messages."""
+class RootOperator(RootPoll):
+    """An operator that acts at once on the active root; errors of the core become messages."""
 
     def act(self, context, root):
         """Do the operator's work on `root`; returns None when it is done, {"CANCELLED"} for no undo step."""
@@ -91,15 +122,6 @@ class UnitOperator(UnitPoll):
     @reports_errors
     def execute(self, context):
         return self.act(context, self.find_root(context)) or {"FINISHED"}
-
-
-class ValidUnitOperator(UnitOperator):
-    """An operator on the active unit that needs parameters within the design rules."""
-
-    @classmethod
-    def trouble(cls, root):
-        broken = root.mu_unit.trouble
-        return f"A design rule is broken: {broken.splitlines()[0]}" if broken else ""
 
 
 def open_file(context, path: Path) -> None:

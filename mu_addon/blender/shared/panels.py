@@ -3,38 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Collection, Sequence
 
-from ...design.parameters import SECTIONS
-from ...design.quantity import Description, describe
-from ...design.wall_material import Wall, offered
-from ..unit.broken import broken, description
-from ..unit.fields import field, label, shown_value
-from ..unit.object import active_root
-
-# Panel place of each section's parameters. A new section of the core appears under Design.
-PLACES = {
-    "chambers": "design",
-    "lattice": "lattice",
-    "grading": "grading",
-    "waveguide": "path",
-    "material": "simulate",
-    "wall": "simulate",
-    "print": "print",
-}
-FIRST = {
-    "chambers": ("count", "cell_mm", "bladder_diameter_mm", "neck_diameter_mm", "wall_mm"),
-    "lattice": (
-        "kind",
-        "cells_x",
-        "cells_y_minus",
-        "cells_y_plus",
-        "junction_diameter_mm",
-        "midspan_diameter_mm",
-    ),
-    "waveguide": ("row", "well_pitch_mm"),
-}
-"""Parameters of a section that are always shown; others are folded. Other sections have none."""
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 
@@ -51,41 +20,20 @@ class RootPanel(TabPanel):
     """A panel of the active root object, see `find_root`; `show(layout, context, root)` fills it."""
 
     @classmethod
+    def shows(cls, root) -> bool:
+        """Return False while the panel has nothing to show of `root`."""
+        return True
+
+    @classmethod
     def poll(cls, context):
-        return cls.find_root(context) is not None
+        root = cls.find_root(context)
+        return root is not None and cls.shows(root)
 
     def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         self.show(layout, context, self.find_root(context))
-
-
-class UnitPanel(RootPanel):
-    """A panel of the active unit."""
-
-    bl_parent_id = "MU_PT_unit"
-    bl_options = {"DEFAULT_CLOSED"}
-    find_root = staticmethod(active_root)
-    place: tuple[str, ...] = ()
-    """Places of `PLACES` whose parameters the panel shows."""
-
-    def draw_header(self, context):
-        """Draw a mark if one of the panel's parameters breaks a rule, also while it is closed."""
-        root = active_root(context)
-        if self.place and root is not None and _blamed(root, _sections(self.place)):
-            self.layout.label(text="", icon="ERROR")
-
-
-def _sections(places: Collection[str]) -> list[str]:
-    """Sections whose parameters are shown at these places."""
-    return [s.section for s in SECTIONS if PLACES.get(s.section, "design") in places]
-
-
-def _blamed(root, sections: Collection[str]) -> bool:
-    """Return True if a parameter of these sections breaks a rule."""
-    found = broken(root)
-    return found is not None and found.blames(sections)
 
 
 def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
@@ -113,89 +61,9 @@ def large_button(layout, operator: str, icon: str, **settings) -> None:
     row.operator(operator, icon=icon, **settings)
 
 
-def parameter(column, root, section: str, d: Description) -> None:
-    """Draw the field of one parameter; if it breaks a rule red, with the nearest valid value as a button.
-
-    The button is next to the field, so that nothing below it moves.
-    """
-    group = getattr(root.mu_unit, section)
-    found = broken(root)
-    if found is None or (section, d.name) not in found.fits:
-        column.prop(group, field(group, d))
-        return
-    row = column.row(align=True)
-    row.alert = True
-    row.prop(group, field(group, d))
-    value = found.fits[section, d.name]
-    if value is not None:
-        right = row.row(align=True)
-        right.alert = False
-        # Half as wide as the field, so that the field's unit is not cut: "2.25 m" would be metres.
-        right.scale_x = 0.6
-        fix_button(right, root, section, d.name, value, found.text, short=True)
-
-
-def fix_button(layout, root, section: str, name: str, value, why: str, short: bool = False) -> None:
-    """Draw a button that sets a parameter to a valid value: "Neck Ø 24 mm", or "→ 24" beside its field."""
-    d = description(section, name)
-    shown = shown_value(getattr(root.mu_unit, section), d, value)
-    text = f"→ {shown.removesuffix(' mm')}" if short else f"{label(d)} {shown}"
-    button = layout.operator("mu.fit", text=text)
-    button.section, button.name, button.why = section, name, why
-
-
-def parameters(layout, root, place: str) -> None:
-    """Draw fields of every section that belongs to a place; seldom changed ones are folded below it."""
-    props = root.mu_unit
-    folded = []
-    for section in SECTIONS:
-        if PLACES.get(section.section, "design") == place:
-            group = getattr(props, section.section)
-            column = layout.column(align=True)
-            shown = offered(group.law, group.friction_share) if section is Wall else None
-            first = FIRST.get(section.section)
-            for d in describe(section):
-                if first is not None and d.name not in first:
-                    folded.append((section.section, d))
-                elif shown is None or d.name in shown:
-                    parameter(column, root, section.section, d)
-    if folded:
-        _folded(layout, root, place, folded)
-
-
-def _fold(layout, name: str, title: str, wrong: bool):
+def fold(layout, name: str, title: str, wrong: bool):
     """Draw a fold, with a red head if something in it is wrong; return its layout, None if closed."""
     header, body = layout.panel(name, default_closed=True)
     header.alert = wrong
     header.label(text=title, icon="ERROR" if wrong else "NONE")
     return body
-
-
-def folded_place(layout, root, place: str, title: str) -> None:
-    """Draw a fold with the fields of every section that belongs to a place."""
-    body = _fold(layout, f"MU_fold_{place}", title, _blamed(root, _sections([place])))
-    if body:
-        parameters(body, root, place)
-
-
-def folded_section(layout, root, section: str, title: str, hint: str):
-    """Draw a fold with a section that has a place of its own; its head is red while one of its fields is.
-
-    Returns the fold's layout, or None while it is closed.
-    """
-    body = _fold(layout, f"MU_{section}", title, _blamed(root, [section]))
-    if body:
-        wrapped(body, hint, "INFO")
-        parameters(body, root, section)
-    return body
-
-
-def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
-    """Draw a fold with fields; its head is red while one of them breaks a rule."""
-    found = broken(root)
-    wrong = found is not None and any((section, d.name) in found.fits for section, d in fields)
-    body = _fold(layout, f"MU_more_{place}", "More", wrong)
-    if body:
-        column = body.column(align=True)
-        for section, d in fields:
-            parameter(column, root, section, d)

@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from .updates import Signal
+
+CHANGED = Signal()
+"""Sent with a scene that was given another unit of length by `mu.millimetres` or `mu.add`."""
+
 
 def mm(scene: Any) -> float:
     """Length of a millimetre in Blender units of a scene.

@@ -28,10 +28,9 @@ class Signal:
         if function in self._connected:
             self._connected.remove(function)
 
-    def send(self, root: Any) -> None:
-        """Call every connected function."""
-        for function in self._connected:
-            function(root)
+    def send(self, root: Any) -> list[Any]:
+        """Call every connected function, in the order of connection; return their answers."""
+        return [function(root) for function in self._connected]
 
 
 @contextmanager

@@ -5,9 +5,66 @@ from __future__ import annotations
 import re
 
 from ...design.parameters import SECTIONS
-from ...design.quantity import describe
+from ...design.quantity import Description, describe
 from ...errors import MuError
-from ..unit.fields import label
+
+UNITS = ("mm", "kPa", "s")
+_NAMES = {
+    "count": "Chambers",
+    "bladder_diameter_mm": "Bladder Ø",
+    "neck_diameter_mm": "Neck Ø",
+    "inlet_diameter_mm": "Inlet Ø",
+    "junction_diameter_mm": "Junction Ø",
+    "midspan_diameter_mm": "Midspan Ø",
+    "row": "Anchor Row",
+    "cells_y_minus": "Cells -Y",
+    "cells_y_plus": "Cells +Y",
+    "allow_symmetric": "Allow Symmetry",
+    "minus_y": "-Y Side",
+    "plus_y": "+Y Side",
+    "beside_x": "X Sides",
+    "lattice_modulus_kPa": "Lattice E (kPa)",
+    "membrane_modulus_kPa": "Wall E (kPa)",
+    "membrane_poisson": "Wall Poisson",
+    "sensor_modulus_kPa": "Sensor E (kPa)",
+    "elongation_at_break": "Break Strain",
+    "offset_xy_mm": "Offset XY",
+}
+"""Parameters whose own names are too vague beside a field, or too long for it."""
+
+
+def label(d: Description) -> str:
+    """Name of a parameter for a panel: `tip_cap_mm` becomes "Tip Cap"."""
+    if d.name in _NAMES:
+        return _NAMES[d.name]
+    words = d.name.split("_")
+    unit = words.pop() if words[-1] in UNITS else ""
+    text = " ".join(word if word.isupper() else word.capitalize() for word in words)
+    return f"{text} ({unit})" if unit and unit != "mm" else text
+
+
+def tooltip(d: Description) -> str:
+    """Description, bounds and source of a parameter; Blender adds the last full stop."""
+    allowed = f". {d.allowed} {d.unit}".rstrip() if d.allowed else ""
+    fixed = ". The same at every scale" if d.fixed else ""
+    source = f".\nSource: {d.source}" if d.source else ""
+    return f"{sentence(d.text)}{allowed}{fixed}{source}"
+
+
+def readable(name: str) -> str:
+    """The name of an effect or quantity with spaces: "mullins_softening" becomes "mullins softening"."""
+    return name.replace("_", " ")
+
+
+def sentence(text: str) -> str:
+    """A text with its first letter as a capital, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def path_symbol(name: str) -> str:
+    """The name of a sensor path with its Greek letter: "alpha4" becomes "α4"."""
+    return name.replace("alpha", "α")
+
 
 _LABELS = {d.name: label(d) for section in SECTIONS for d in describe(section)}
 _OPTIONS = {"channel": "Light"}

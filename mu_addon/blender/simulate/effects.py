@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError
 from ...reading import parse_toml
-from ..unit.fields import exact, readable
+from ..shared.blender_property import exact
+from ..shared.wording import readable
 
 if TYPE_CHECKING:
     from ...usecases.simulate_and_place.named_effects import NamedEffects

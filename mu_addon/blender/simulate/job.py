@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...errors import InputError
-from ..body import state as bodies
 from ..jobs.start_child import JobKind
 from ..obstacles import state as obstacles
-from ..unit.fields import exact
+from ..shared.blender_property import exact
+from ..unit import envelope
 from ..unit.properties import to_unit
 from . import effects, timings
 from . import study_folder as studies
@@ -79,7 +79,7 @@ def job_of(root: Any) -> Job:
         extra["paths"] = settings.paths
     if settings.self_contact:
         extra["self_friction"] = round(settings.self_friction, 6)
-    body = bodies.envelope_in(root, unit)
+    body = envelope.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)
     return Job(

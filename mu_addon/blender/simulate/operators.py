@@ -8,7 +8,7 @@ from ...usecases.simulate_and_place import unit_runs
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
-from ..shared.operators import ValidUnitOperator
+from ..unit.base_classes import ValidUnitOperator
 from . import study_folder as studies
 from .job import SIMULATION, job_of
 

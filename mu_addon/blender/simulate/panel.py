@@ -6,7 +6,8 @@ import bpy
 
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button, timed
-from ..shared.panels import UnitPanel, folded_place, wrapped
+from ..shared.panels import wrapped
+from ..unit.base_classes import UnitPanel, folded_place
 from . import effects
 from .job import SIMULATION, announced
 

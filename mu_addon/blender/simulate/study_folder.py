@@ -15,10 +15,10 @@ from ...errors import MuError
 from ...meshing.settings import REFINE
 from ...usecases.simulate_and_place import unit_runs
 from ...usecases.simulate_and_place.unit_runs import Run
-from ..body import state as bodies
 from ..obstacles import state as obstacles
 from ..shared.compat import user_folder
 from ..shared.file_cache import FileCache
+from ..unit import envelope
 from ..unit.properties import to_unit
 from . import effects
 
@@ -123,7 +123,7 @@ def design_of(root: Any) -> str:
     """Hash of the design that the unit's simulation would have (`unit_runs.design_key`); "" if invalid."""
     try:
         unit = to_unit(root.mu_unit)
-        body = bodies.envelope_in(root, unit)
+        body = envelope.envelope_in(root, unit)
         own = "" if body is None else body.hash
         return unit_runs.design_key(unit, own, obstacles.inputs(root), effects.inputs(root))
     except MuError:

@@ -11,21 +11,13 @@ from ...design.quantity import describe
 from ...design.repairs import tied
 from ...design.steps import STEPS, Step, downstream
 from ..shared import updates
-from ..shared.operators import UnitOperator
+from ..shared.blender_property import blender_property, exact, millimetres, step_of
+from ..shared.wording import label, sentence, tooltip
 from ..unit import object as unit_object
-from ..unit.fields import (
-    TRUE,
-    blender_property,
-    exact,
-    label,
-    millimetres,
-    sentence,
-    step_of,
-    tooltip,
-    true_scale,
-)
+from ..unit import stack
+from ..unit.base_classes import UnitOperator
+from ..unit.fields import TRUE, description, true_scale
 from ..unit.properties import from_unit, to_unit
-from . import state as stack
 
 _OF_THEIR_OWN = ("path", "solid")
 """Steps with separate operators."""
@@ -73,7 +65,7 @@ class _OfStep(UnitOperator):
                 value = getattr(self, name)
                 if true:
                     # Values dragged past a bound are clamped.
-                    d = stack.description(section, name)
+                    d = description(section, name)
                     value = getattr(self, name + TRUE) / true_scale(props, d)
                     value = min(max(value, d.low), d.high)
                 value = exact(value) if isinstance(value, float) else value
@@ -111,7 +103,7 @@ class _OfStep(UnitOperator):
             value = getattr(getattr(props, section), name)
             setattr(self, name, value)
             if hasattr(self, name + TRUE):
-                scale = true_scale(props, stack.description(section, name))
+                scale = true_scale(props, description(section, name))
                 setattr(self, name + TRUE, exact(value) * scale)
 
 

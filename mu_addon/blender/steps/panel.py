@@ -5,10 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ...design.steps import STEPS
-from ..shared.panels import UnitPanel, parameter, wrapped
+from ..shared.panels import wrapped
+from ..shared.wording import sentence
+from ..unit import stack
+from ..unit.base_classes import UnitPanel, parameter
 from ..unit.drawing import DRAWN
-from ..unit.fields import sentence
-from . import state as stack
+from ..unit.fields import description
 
 
 class MU_UL_steps(bpy.types.UIList):
@@ -51,7 +53,7 @@ class MU_PT_stack(UnitPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.enabled = not entry.muted
         for section, name in stack.own_parameters(step):
-            parameter(column, root, section, stack.description(section, name))
+            parameter(column, root, section, description(section, name))
         row = layout.row(align=True)
         if step.name == "solid":
             row.operator("mu.solid")

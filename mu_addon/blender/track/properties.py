@@ -18,8 +18,8 @@ from ...errors import InputError
 from ...measured.kinds import ROLES
 from ...measured.video import View
 from ...usecases.track_video.run import Bench, MarkerSettings
+from ..shared.blender_property import exact
 from ..shared.registration import property_group_factory
-from ..unit.fields import exact
 from ..unit.properties import BESIDE_BLEND_FILE
 
 

@@ -12,8 +12,8 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...design.repairs import Repair, nearest_fit, repairs
 from ...errors import InputError, MuError
+from ..shared.blender_property import exact
 from ..shared.wording import in_panel
-from .fields import exact
 from .properties import section_of, to_unit
 
 Place = tuple[str, str]
@@ -105,11 +105,6 @@ def _look(props: Any, values: dict[str, dict[str, Any]]) -> Broken:
         fits |= {(r.section, r.name): r.value for r in mending if r.value is not None}
         return Broken(words(error), fits, mending)
     return Broken(props.trouble, {})
-
-
-def description(section: str, name: str) -> Description:
-    """Description of a parameter."""
-    return next(d for s, d in _KNOWN[name] if s == section)
 
 
 def forget() -> None:

@@ -13,20 +13,12 @@ import attrs
 import bpy
 import numpy as np
 
-from ...design.parameters import Unit
-from ..path import ranking
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
 from ..preview.skeletons import Skeleton
 from ..shared import displays
 from ..shared.compat import modifier_input, set_modifier_input
-from ..steps import state as stack
-
-CANDIDATE = "candidate:"
-FREE = "free"
-"""The whole lattice's best path, if a study has searched it."""
-FLAWS = "flaws"
-"""Balls where a body's check found a flaw."""
+from . import stack
 
 DRAWN: dict[str, tuple[str, Callable[[Any, Any, bool], Skeleton | None]]] = {
     "profile": ("profile", lambda value, given, cut: skeletons.outline(value)),
@@ -108,50 +100,16 @@ def own_mesh(root: Any, mesh: Any | None, others: list[Any]) -> Any:
     return mesh
 
 
-def put_candidates(root: Any, unit: Unit, shown: bool) -> None:
-    """Draw every candidate path on the lattice, in the colour of its J if it is known, or none."""
-    drawn: dict[str, Skeleton] = {}
-    if shown:
-        lanes = skeletons.candidates(unit, root.mu_unit.cut)
-        drawn = {CANDIDATE + name: path for name, path in lanes.items()}
-        found = ranking.free(root)
-        if found is not None:
-            name, _, points = found
-            drawn[FREE] = skeletons.free_path(points, name, unit.dimensions.cell)
-    for name, path in drawn.items():
-        colour = "MU Candidate"
-        if name in (FREE, CANDIDATE + root.mu_unit.path):
-            colour = "MU Waveguide"
-        _put(root, name, path, colour, "MU Labelled Tube")
-    tubes = {name.removeprefix(CANDIDATE): beside(root, name) for name in drawn if name != FREE}
-    if tubes:
-        ranking.colour_and_label(root, tubes)
-    for child in list(root.children):
-        name = child.get(displays.PART)
-        if name is not None and name != FLAWS and name not in drawn:
-            displays.remove(child)
-
-
-def put_flaws(root: Any, places: list[Any], radius: float) -> None:
-    """Put a red ball at every position (3,) in mm of the unit's frame, replacing earlier ones."""
-    old = beside(root, FLAWS)
-    if old is not None:
-        displays.remove(old)
-    if len(places):
-        balls = Skeleton(np.array(places), attributes={"radius": np.full(len(places), radius)})
-        _put(root, FLAWS, balls, "MU Flaws", "MU Balls").show_in_front = True
-
-
 def beside(root: Any, name: str) -> Any | None:
     """Display of that name: a candidate path, the free path, or flaws; None if it is not shown."""
     return next((child for child in root.children if child.get(displays.PART) == name), None)
 
 
-def _put(root: Any, name: str, skeleton: Skeleton, colour: str, group: str) -> Any:
-    title = name.removeprefix(CANDIDATE)
+def put_beside(root: Any, name: str, skeleton: Skeleton, colour: str, group: str, title: str = "") -> Any:
+    """Draw a skeleton beside the unit, in a colour and skinned by a node group; return its display."""
+    title = title or name.capitalize()
     obj = beside(root, name)
     if obj is None:
-        title = title if name.startswith(CANDIDATE) else f"{title.capitalize()}"
         obj = displays.add(root, displays.PART, name, bpy.data.meshes.new(title))
         displays.lock(obj)
     if obj.mode == "EDIT":

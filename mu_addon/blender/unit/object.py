@@ -15,26 +15,22 @@ import attrs
 import bpy
 
 from ...design.anchors import Window, windows
-from ...design.body import Body
 from ...design.parameters import Unit
-from ...design.solid import Solid
-from ...design.steps import require_whole
 from ...errors import InputError, MuError
-from ..body import state as bodies
-from ..jobs import prepared
-from ..path import ranking
 from ..preview import materials, nodes, skeletons
 from ..preview.nodes import unit as unit_group
 from ..shared import displays, scene_units, updates
 from ..shared.compat import set_modifier_input
-from ..simulate import study_folder as studies
-from ..steps import state as stack
-from . import broken, drawing
+from . import broken, drawing, envelope, stack
 from .properties import from_unit, shape_hash, to_unit
 
 SOLID, RESULT = "solid", "result"
 REBUILT = updates.Signal()
 """Sent with a unit whose preview was rebuilt: its parameters may have changed."""
+PREVIEW_DRAWN = updates.Signal()
+"""Sent with a unit while its preview is drawn: what is drawn beside it follows; may raise MuError."""
+DRAWN_BESIDE = updates.Signal()
+"""Asked with a unit: what is drawn beside it at present, a text or value that differs whenever that would."""
 
 
 def roots() -> list[Any]:
@@ -76,11 +72,6 @@ def _of_gripper(obj: Any | None) -> bool:
 def by_uuid(name: str) -> Any | None:
     """The unit of that UUID, or None where it was deleted."""
     return next((o for o in roots() if o.mu_unit.uuid == name), None)
-
-
-def candidate(root: Any, name: str) -> Any | None:
-    """The object that shows the candidate path of that name, or None."""
-    return drawing.beside(root, drawing.CANDIDATE + name)
 
 
 def create(context: Any, unit: Unit) -> Any:
@@ -167,9 +158,8 @@ def _fingerprint(root: Any) -> str:
     except InputError as error:
         return error.what
     steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
-    known = (ranking.known(root), ranking.free(root)) if props.candidates else ()
-    shown = shape_hash(unit), props.path, props.cut, props.candidates, steps, bodies.fingerprint(root), known
-    return "|".join(map(str, shown))
+    shown = shape_hash(unit), props.path, props.cut, props.candidates, steps, envelope.fingerprint(root)
+    return "|".join(map(str, (*shown, *DRAWN_BESIDE.send(root))))
 
 
 def _draw(root: Any, unit: Unit) -> None:
@@ -178,7 +168,7 @@ def _draw(root: Any, unit: Unit) -> None:
     drawn = drawing.shapes(given, [entry.name for entry in props.stack if entry.shown], props.cut)
     separate(root)
     drawing.write(root, props.preview, drawn)
-    drawing.put_candidates(root, unit, props.candidates)
+    PREVIEW_DRAWN.send(root)
     show(root)
 
 
@@ -240,7 +230,7 @@ def put_solid(root: Any, solid: Any, unit: Unit) -> Any:
     materials.assign(mesh, "MU Solid")
     mesh["mu_unit_hash"] = shape_hash(unit)
     mesh["mu_path"] = solid.window.name if solid.window else ""
-    mesh["mu_body"] = bodies.fingerprint(root)
+    mesh["mu_body"] = envelope.fingerprint(root)
     mesh["mu_quality"] = solid.quality
     mesh["mu_gates"] = json.dumps(attrs.asdict(solid.gates))
     # A shown one is removed by `show`, after which its users must not be read.
@@ -263,50 +253,5 @@ def solid_is_current(root: Any) -> bool:
     except InputError:
         return False
     window = chosen_window(root, unit)
-    now = shape_hash(unit), window.name if window else "", bodies.fingerprint(root)
+    now = shape_hash(unit), window.name if window else "", envelope.fingerprint(root)
     return now == (mesh["mu_unit_hash"], mesh["mu_path"], mesh.get("mu_body", ""))
-
-
-def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "") -> Solid:
-    """The printable solid of a unit in the scene; raises InputError, GateError and, in a window, NotPrepared.
-
-    stl: file to write it to, as made elsewhere; such a solid, of many facets, is not kept.
-    """
-    given = stack.given(root, unit, quality)
-    require_whole(given)
-    if prepared.at_once() or (not stl and stack.STACK.has("solid", given)):
-        solid: Solid = stack.STACK.value("solid", given)
-        return solid
-    from ...usecases.prepare import Job, solid_of
-
-    window = chosen_window(root, unit)
-    of = {"path": window.name if window else "", "quality": quality, "stl": stl}
-    job = Job("solid", of, unit, given.body)
-
-    def keep(arrays: Any, trouble: str) -> None:
-        if arrays is not None and not stl:
-            stack.STACK.keep("solid", given, solid_of(arrays, job))
-
-    folder = studies.folder_of(root) / ("stl" if stl else "solid")
-    raise prepared.NotPrepared(f"STL in {stl}" if stl else "solid", folder, job, keep, repeats=not stl)
-
-
-def put_envelope(root: Any, body: Body) -> Any:
-    """Store the user's body as the unit's envelope; it is not drawn, since the lattice shows it."""
-    mesh = bpy.data.meshes.new(body.name)
-    skeletons.write(mesh, skeletons.Skeleton(body.vertices, faces=(body.triangles,), smooth=False))
-    remove_envelope(root)
-    root.mu_unit.envelope = mesh
-    return mesh
-
-
-def remove_envelope(root: Any) -> None:
-    """Remove the user's envelope from the unit."""
-    old, root.mu_unit.envelope = root.mu_unit.envelope, None
-    if old is not None and not old.users:
-        bpy.data.meshes.remove(old)
-
-
-def mark(root: Any, places: list[Any]) -> None:
-    """Put a red ball at every position (3,) in mm of the unit's frame, replacing earlier ones."""
-    drawing.put_flaws(root, places, 0.08 * to_unit(root.mu_unit).dimensions.cell)

@@ -9,14 +9,17 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ...design.parameters import Unit
 from ...design.quantity import describe
 from ...design.repairs import tied
+from ...design.settings import PRESET
 from ...errors import InputError
-from ..scene import gestures, landing
-from ..shared import scene_units, updates, viewports
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared import landing, scene_units, updates, viewports
+from ..shared.blender_property import exact
+from ..shared.operators import reports_errors
+from ..shared.wording import label, tooltip
 from . import object as unit_object
 from . import presets
-from .broken import broken, description
-from .fields import exact, label, shown_value, tooltip
+from .base_classes import UnitOperator
+from .broken import broken
+from .fields import description, shown_value
 
 _SCALE = next(d for d in describe(Unit) if d.name == "scale")
 
@@ -31,7 +34,7 @@ def _use_millimetres(context) -> None:
     context.scene.cursor.location *= factor
     viewports.scale(factor)
     # Here, so that one undo takes all of it back.
-    gestures.look()
+    scene_units.CHANGED.send(context.scene)
 
 
 _items: list[tuple[str, str, str]] = []
@@ -76,7 +79,7 @@ class MU_OT_add(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         if not self.properties.is_property_set("preset"):
-            self.preset = "mu-1.0x"
+            self.preset = PRESET
         core = presets.load(self.preset)
         if not self.properties.is_property_set("scale") or self.scaled not in ("", self.preset):
             self.scale = core.scale

@@ -13,8 +13,9 @@ from ...design.parameters import Unit, load_preset, preset_names, read_unit, wri
 from ...errors import InputError, OutputError
 from ..shared import updates
 from ..shared.compat import user_folder
-from ..shared.operators import UnitOperator, reports_errors
+from ..shared.operators import reports_errors
 from . import object as unit_object
+from .base_classes import UnitOperator
 from .properties import from_unit, to_unit
 
 USER = "user:"

@@ -11,7 +11,6 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from ..jobs.start_child import JOB_ENDED
 from ..shared import updates, viewports
 from ..shared.registration import add_handlers, remove_handlers
 from . import object as unit_object
@@ -69,11 +68,6 @@ def catch_up() -> None:
             schedule(root)
 
 
-def _job_ended(_key) -> None:
-    # The study's results appear on the candidate paths.
-    catch_up()
-
-
 @persistent
 def _played(*_):
     """Rebuild after keyframes and drivers, which set parameters without a property's update."""
@@ -87,7 +81,7 @@ _HANDLERS = {
     **dict.fromkeys(("undo_post", "redo_post", "load_post"), _after_undo_or_load),
     "frame_change_post": _played,
 }
-_CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show), (JOB_ENDED, _job_ended))
+_CONNECTIONS = ((PARAMETERS_CHANGED, schedule), (VIEW_CHANGED, _show))
 
 
 def register():

@@ -23,10 +23,11 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
-from ...usecases.simulate_and_place.settings import ORIENTATION, PROTOCOL, SELF_FRICTION
+from ...usecases.simulate_and_place.settings import ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
+from ..shared.blender_property import blender_property, exact
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from .fields import blender_property, exact, generated_fields, tied
+from .fields import generated_fields, tied
 
 PARAMETERS_CHANGED, VIEW_CHANGED = Signal(), Signal()
 """Sent with the root whose parameters changed, and with the root whose displayed parts changed."""
@@ -68,9 +69,8 @@ class MU_PG_study(bpy.types.PropertyGroup):
         ],
         default="place",
     )
-    paths: EnumProperty(
-        name="Paths",
-        description="Which sensor paths are ranked",
+    paths: blender_property(
+        PATHS,
         items=[
             ("windows", "Along the Anchors", "Paths through neighbouring anchors, alpha1 and on"),
             (
@@ -84,14 +84,12 @@ class MU_PG_study(bpy.types.PropertyGroup):
     refine: blender_property(REFINE._replace(default=0.5), name="Refinement", precision=2, step=5)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")
     self_friction: blender_property(SELF_FRICTION, name="Friction", soft_max=1.0, step=5, precision=2)
-    device: EnumProperty(
-        name="Device",
-        description="Device that computes the finite elements",
+    device: blender_property(
+        DEVICE,
         items=[
             ("cpu", "CPU", "The processor, by factorisation"),
             ("cuda:0", "CUDA", "The first CUDA device, by conjugate gradients"),
         ],
-        default=DEVICE.default,
     )
     protocol: blender_property(PROTOCOL, options=BESIDE_BLEND_FILE, subtype="FILE_PATH")
     orientation_deg: blender_property(ORIENTATION, name="Gravity (deg)", precision=1, step=100)

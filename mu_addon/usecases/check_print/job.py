@@ -12,7 +12,7 @@ from ...design.anchors import Window, window
 from ...design.body import MOST_MM
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.printer import Printer, printer_text, read_printer
-from ...design.settings import QUALITY
+from ...design.settings import QUALITY, UP
 from ...design.surface import Triangles, Vertices
 from ...design.surface_reading import read_surface
 from ...errors import InputError
@@ -52,7 +52,7 @@ class Job:
     quality: str = QUALITY.field()
     stl: bytes | None = None
     stl_file: Path | None = None
-    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    direction: tuple[float, float, float] = UP
     layers: tuple[float, ...] = attrs.field(default=(), converter=tuple)
     repair: bool = False
 

@@ -21,6 +21,7 @@ from ...evidence.unit_fem import UnitSettings
 from ...files import write_csv, write_text
 from ...measured import Experiment, Measured, read_folder
 from ...measured.folder import described, experiments_digest, require_same_data
+from ...measured.kinds import NOISE
 from ...meshing.settings import SELF_CONTACT
 from ...report.html import facts_table, note, page, table
 from ...run.context import RunContext
@@ -29,7 +30,7 @@ from ...run.inputs import FORMAT, named_path, read_inputs
 from ...run.usecase import UseCase
 from ...run.versions import package_versions
 from ...toml_writer import toml_text
-from .job import UNIT, self_contact_in, self_contact_of, unit_behind
+from .job import UNIT, self_contact_in, self_contact_of, unit_behind, unit_settings_of
 from .simulators import simulations_plan, simulators_of
 from .words import bare, listed, readable
 
@@ -41,15 +42,6 @@ LAYOUT = FolderLayout(
     results=("limits.csv", "report.html"),
     optional=(UNIT,),
 )
-# Standard deviation of a reading, by quantity: an ordinary camera, gauge, load cell and voltmeter.
-NOISE = {
-    "angle": 0.3,
-    "marker": 0.1,
-    "stress": 0.1,
-    "pressure": 0.1,
-    "tip_deflection": 0.1,
-    "voltage": 0.002,
-}
 SENSITIVITIES_S = 1.5
 # Half of the variance wanders, as slowly as a tenth of the longest record.
 SLOW = 0.1
@@ -102,7 +94,7 @@ class Job:
     @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation: of every effect at its first sizes alone."""
-        return attrs.evolve(self.settings or UnitSettings.printed(self.self_contact), whole=None)
+        return attrs.evolve(unit_settings_of(self), whole=None)
 
     @property
     def subject(self) -> Unit | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from ...design.parameters import Unit, load_preset, read_unit, to_toml
+from ...design.settings import PRESET
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...measured import Experiment, Measured, read_folder
@@ -32,7 +33,6 @@ LAYOUT = FolderLayout(
     results=("verdict.json", "model.toml", "residuals.csv", "report.html"),
     optional=(UNIT, KNOWN),
 )
-PRESET = "mu-1.0x"
 
 
 @attrs.frozen(eq=False)
@@ -77,9 +77,7 @@ class Job:
     @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation."""
-        from ...evidence.unit_fem import UnitSettings
-
-        return self.settings or UnitSettings.printed(self.self_contact)
+        return unit_settings_of(self)
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; diagnose.toml is the first."""
@@ -113,6 +111,14 @@ def read_job(folder: Path) -> Job:
         **self_contact_in(values),
         known=load_model(known) if known.is_file() else None,
     )
+
+
+def unit_settings_of(job: Any) -> UnitSettings:
+    """Settings of the simulation of a job's unit: its own, or those of the printed body."""
+    from ...evidence.unit_fem import UnitSettings
+
+    own: UnitSettings | None = job.settings
+    return own or UnitSettings.printed(job.self_contact)
 
 
 def self_contact_of(job: Any) -> dict[str, Any]:

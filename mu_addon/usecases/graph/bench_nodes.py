@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import InputError
 from ...graph.definition import FILE, FOLDER, Call, Definition, Input, Output, Outputs, Setting, setting
-from ...sensing.settings import BAUD
+from ...sensing.settings import ANGLES, BAUD, CHANNEL, DARK, PORT
 
 if TYPE_CHECKING:
     from ...graph.evaluation import Finished, Order
@@ -104,7 +104,7 @@ def bench_nodes() -> tuple[Definition, ...]:
             "seconds of the sensor on its serial port",
             outputs=(Output("recording", "recording", "its samples"),),
             settings=(
-                setting("port", "", "serial port, or usb:VID:PID; empty: the only USB one"),
+                Setting(PORT),
                 Setting(BAUD),
                 setting(
                     "simulated", False, "a simulated sensor that bends back and forth, in place of a port"
@@ -140,9 +140,9 @@ def bench_nodes() -> tuple[Definition, ...]:
                 Output("error", "number", "error in sweeps left out of the fit, in deg"),
             ),
             (
-                setting("channel", "", "column of the light; empty: the only one"),
-                setting("dark", "", "column of the dark level, or volts; empty: 0"),
-                setting("angles", "", "CSV of time_s,angle_deg; empty: by marks such as angle 30", path=FILE),
+                Setting(CHANNEL),
+                Setting(DARK),
+                Setting(ANGLES, FILE),
             ),
             order=_calibrate,
             read=_calibrated,

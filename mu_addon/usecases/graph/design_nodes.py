@@ -10,7 +10,7 @@ import attrs
 from ...design.anchors import window
 from ...design.lattice import Graph
 from ...design.parameters import from_toml, load_preset, preset_names, read_unit
-from ...design.settings import QUALITY
+from ...design.settings import PRESET, QUALITY
 from ...design.steps import STEPS, Path, Stack, Step, Struts, TrimmedStruts
 from ...design.waveguide import Bar
 from ...errors import InputError
@@ -32,9 +32,10 @@ from .shared_settings import of_orders
 STACK = Stack()
 """Values of the steps of every tree in this process."""
 DESIGN, UNIT = "Design", "Unit"
+_PATH = setting("path", "", "path of the waveguide, alpha1 and on; empty: none")
 # Fields of `StepInputs`, set at the first step that depends on them.
 _CHOSEN = {
-    "path": setting("path", "", "path of the waveguide, alpha1 and on; empty: none"),
+    "path": _PATH,
     "quality": Setting(QUALITY),
     "body": setting(
         "body", "", "closed surface that the lattice fills in place of its box: STL, OBJ or PLY", path=FILE
@@ -245,9 +246,9 @@ def design_nodes() -> tuple[Definition, ...]:
             "a unit by its preset or its file of parameters",
             outputs=(Output("unit", "unit", "the unit"),),
             settings=(
-                setting("preset", "mu-1.0x", "shipped unit", choices=tuple(preset_names())),
+                setting("preset", PRESET, "shipped unit", choices=tuple(preset_names())),
                 setting("file", "", "TOML file of a unit, in place of the preset", path=FILE),
-                setting("path", "", "path of the waveguide, alpha1 and on; empty: none"),
+                _PATH,
                 setting("parameters", "", "TOML text of a unit, in place of preset and file", shown=False),
             ),
             make=_read_unit,

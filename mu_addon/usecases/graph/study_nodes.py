@@ -6,7 +6,7 @@ from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
 from ...design.rigid_body import RigidBody
-from ...design.settings import FRICTION, PRINTER, QUALITY
+from ...design.settings import FRICTION, PRINTER, QUALITY, UP
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ..export import settings as export
@@ -178,9 +178,10 @@ def study_nodes() -> tuple[Definition, ...]:
             (Output("check", "print check", "findings"),),
             (
                 Setting(PRINTER),
-                setting("up_x", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
-                setting("up_y", 0.0, "build direction, away from the platform", low=-1e3, high=1e3),
-                setting("up_z", 1.0, "build direction, away from the platform", low=-1e3, high=1e3),
+                *(
+                    setting(f"up_{axis}", part, "build direction, away from the platform", low=-1e3, high=1e3)
+                    for axis, part in zip("xyz", UP, strict=True)
+                ),
                 Setting(QUALITY),
             ),
             order=of_orders("check_order"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -16,7 +17,9 @@ from ...report.results import Picture
 from ...run.versions import package_versions
 from . import charts as pictures
 from .phases import MEANING
-from .stages import Gripping
+
+if TYPE_CHECKING:
+    from .run import Gripping
 
 FILES = {
     "grip.toml": "inputs of this run",

@@ -14,7 +14,7 @@ from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.usecase import UseCase
 from ...sensing.reconnecting import Control
 from ...sensing.session import run_session
-from ...sensing.settings import BAUD
+from ...sensing.settings import BAUD, PORT
 from ...toml_writer import toml_text
 from .stream import console_summary, ctrl_c_stops, require_samples, serial_source, simulated_source
 
@@ -35,7 +35,7 @@ class Job:
     port: as of `serial_source`, "" for the only USB one; simulated: an oscillating sensor instead.
     """
 
-    port: str = ""
+    port: str = PORT.field()
     baud: int = BAUD.field()
     simulated: bool = False
     seconds: float = 10.0

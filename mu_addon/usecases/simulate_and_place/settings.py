@@ -6,6 +6,7 @@ No solver or array library is loaded: the command line's --help reads this modul
 from __future__ import annotations
 
 from ...design.quantity import described
+from ...design.settings import ORIENTATION as HUNG
 
 STAGES = ("design", "simulate", "place")
 """Stages in order of need; a study has the first, the first two or all."""
@@ -39,11 +40,4 @@ SELF_FRICTION = described(
     low=0,
     high=5,
 )
-ORIENTATION = described(
-    "orientation_deg",
-    0.0,
-    "orientation of the unit, degrees about x; 0: hanging, tip down; it has an effect only with gravity in "
-    "the extended model",
-    low=-360,
-    high=360,
-)
+ORIENTATION = HUNG._replace(text=f"{HUNG.text}; it has an effect only with gravity in the extended model")

@@ -9,7 +9,7 @@ from mu_addon.blender.body import state as bodies
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
-from mu_addon.blender.unit import drawing
+from mu_addon.blender.unit import drawing, envelope
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import load_preset
@@ -57,7 +57,7 @@ def test_a_body_becomes_the_envelope_wherever_it_and_the_unit_stand():
     obj.matrix_world = root.matrix_world @ obj.matrix_world
     choose(obj, root)
     assert bpy.ops.mu.body_check() == {"FINISHED"}
-    assert drawing.beside(root, drawing.FLAWS) is None
+    assert drawing.beside(root, bodies.FLAWS) is None
     before = len(points_of(root, "lattice"))
     assert bpy.ops.mu.body() == {"FINISHED"}
     assert root.mu_unit.trouble == "", root.mu_unit.trouble
@@ -99,18 +99,18 @@ def test_flaws_are_marked_in_their_places():
     root = add()
     choose(barrel(hole=True), root)
     assert bpy.ops.mu.body_check() == {"FINISHED"}
-    marks = drawing.beside(root, drawing.FLAWS)
+    marks = drawing.beside(root, bodies.FLAWS)
     at = points(marks)
     assert len(at) == 32
     assert np.allclose(at[:, 2], 80.0)
     assert "32 edges are open" in refused(bpy.ops.mu.body)
     assert root.mu_unit.envelope is None
     root.mu_unit.chambers.wall_mm = 1.0
-    assert drawing.beside(root, drawing.FLAWS) == marks
+    assert drawing.beside(root, bodies.FLAWS) == marks
 
     choose(barrel(width=12.0), root)
     bpy.ops.mu.body_check()
-    at = points(drawing.beside(root, drawing.FLAWS))
+    at = points(drawing.beside(root, bodies.FLAWS))
     # Six bladders come out of it on either side.
     assert len(at) == 12, at
     assert (np.hypot(at[:, 0] / 12, (at[:, 1] - 6.25) / 25) > 0.99).all(), at
@@ -118,7 +118,7 @@ def test_flaws_are_marked_in_their_places():
     assert (at[:, 0] > 0).sum() == 6
     choose(barrel(), root)
     bpy.ops.mu.body_check()
-    assert drawing.beside(root, drawing.FLAWS) is None
+    assert drawing.beside(root, bodies.FLAWS) is None
 
     choose(barrel(width=0.01875, tall=0.025, low=0.0, high=0.08, beside=0.00625), root)
     assert "seems to be in metres" in refused(bpy.ops.mu.body)
@@ -138,7 +138,7 @@ def test_an_inside_out_or_mirrored_body_is_turned():
     choose(obj, root)
     assert bpy.ops.mu.body() == {"FINISHED"}
     assert root.mu_unit.trouble == ""
-    body = bodies.envelope_in(root, load_preset("mu-1.0x"))
+    body = envelope.envelope_in(root, load_preset("mu-1.0x"))
     assert volume(body.vertices, body.triangles) > 0
 
 
@@ -151,7 +151,7 @@ def test_a_simulation_is_given_the_body(monkeypatch):
     assert bpy.ops.mu.simulate() == {"FINISHED"}
     job = read_job(studies.results_folder(root))
     assert job.unit == to_unit(root.mu_unit)
-    assert job.body.hash == bodies.envelope_in(root, job.unit).hash
+    assert job.body.hash == envelope.envelope_in(root, job.unit).hash
 
 
 def test_a_copy_of_a_body_is_repaired_where_there_is_one_way_to():

@@ -3,10 +3,10 @@
 import bpy
 import trimesh
 
-from mu_addon.blender.body import state as bodies
 from mu_addon.blender.node_tree import state as trees
 from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.scene import dropping
+from mu_addon.blender.unit import envelope
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.assets import asset_root
@@ -46,7 +46,7 @@ def test_a_surface_is_an_obstacle_or_an_envelope_in_the_units_frame(tmp_path):
     around = trimesh.creation.cylinder(30.0, 160.0)
     around.export(tmp_path / "around.obj")
     assert bpy.ops.mu.drop_envelope(filepath=str(tmp_path / "around.obj")) == {"FINISHED"}
-    assert bodies.envelope_in(root, to_unit(root.mu_unit)) is not None
+    assert envelope.envelope_in(root, to_unit(root.mu_unit)) is not None
 
 
 def test_files_that_are_none_are_said(tmp_path):

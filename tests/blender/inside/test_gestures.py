@@ -7,12 +7,13 @@ import pytest
 from mu_addon.blender.gripper import object as gripper_object
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.obstacles import state as obstacles
+from mu_addon.blender.path import candidates
 from mu_addon.blender.scene import gestures
 from mu_addon.blender.shared import displays, scene_units
+from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit import panel as unit_panel
 from mu_addon.blender.unit.fields import field
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.parameters import Chambers, load_preset
@@ -79,7 +80,7 @@ def test_a_click_anywhere_on_a_unit_is_on_the_unit():
 def test_a_click_on_a_candidate_works_on_its_unit():
     root = add()
     root.mu_unit.candidates = True
-    tube = unit_object.candidate(root, "alpha3")
+    tube = candidates.candidate(root, "alpha3")
     select(tube)
     assert unit_object.active_root(bpy.context) == root
     assert "Use α3" in drawn([bpy.types.MU_PT_path])
@@ -262,10 +263,10 @@ def test_hidden_and_moved_to_a_collection_as_a_whole():
 def test_a_part_deleted_by_force_comes_back():
     root = add()
     root.mu_unit.candidates = True
-    select(unit_object.candidate(root, "alpha3"))
+    select(candidates.candidate(root, "alpha3"))
     bpy.ops.object.delete()
     bpy.context.view_layer.update()
-    assert unit_object.candidate(root, "alpha3") is not None
+    assert candidates.candidate(root, "alpha3") is not None
     root.data.clear_geometry()
     bpy.context.view_layer.update()
     assert bpy.ops.mu.rebuild() == {"FINISHED"}

@@ -4,9 +4,9 @@ import bpy
 import numpy as np
 from PIL import Image
 
+from mu_addon.blender.path import candidates, picking, ranking
 from mu_addon.blender.path import legend as path_legend
 from mu_addon.blender.path import panel as path_panel
-from mu_addon.blender.path import picking, ranking
 from mu_addon.blender.results import field_colours as fields
 from mu_addon.blender.results import legend, legend_object, run_motions
 from mu_addon.blender.results import motion as motion_parts
@@ -317,13 +317,13 @@ def test_what_is_missing_is_said(study):
 def test_candidates_say_their_rank(study):
     root = add(preset="mu-0.75x")
     root.mu_unit.candidates = True
-    assert modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
+    assert modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
     root.mu_unit.study.folder = str(study)
     live.catch_up()  # as when a simulation has ended
     known = ranking.ranked(root)
     assert sorted(rank for _, rank in known.values()) == list(range(1, 11))
     bpy.ops.mu.path(name="alpha4")
-    tubes = {name: unit_object.candidate(root, name) for name in known}
+    tubes = {name: candidates.candidate(root, name) for name in known}
     for name, tube in tubes.items():
         label = modifier_input(tube.modifiers[0], "Label")
         assert label.startswith("α"), label
@@ -354,12 +354,12 @@ def test_candidates_say_their_rank(study):
     assert {0.0, 1.0} < set(marks)
     root.mu_unit.chambers.wall_mm = 1.0  # stale: they say so, in grey
     assert ranking.ranked(root) == {}
-    label = modifier_input(unit_object.candidate(root, "alpha1").modifiers[0], "Label")
+    label = modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label")
     assert label == f"α1\n#{known['alpha1'][1]}?"
-    assert unit_object.candidate(root, "alpha1").data.materials[0].name == "MU Candidate"
+    assert candidates.candidate(root, "alpha1").data.materials[0].name == "MU Candidate"
     assert "stale" in path_legend.lines(ranking.known(root))[-1]
     # A click makes one the active object, which chooses it.
-    bpy.context.view_layer.objects.active = unit_object.candidate(root, "alpha7")
+    bpy.context.view_layer.objects.active = candidates.candidate(root, "alpha7")
     picking.choose_active()
     assert root.mu_unit.path == "alpha7"
 

@@ -16,7 +16,7 @@ from mu_addon.blender.node_tree import (
     sockets,
     state,
 )
-from mu_addon.blender.unit import panel as unit_panel
+from mu_addon.blender.sidebar import unit_panel
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.run.child import DONE

@@ -15,8 +15,8 @@ from mu_addon.blender.node_tree import state as trees
 from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
+from mu_addon.blender.sidebar.unit_panel import MU_PT_unit
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit.panel import MU_PT_unit
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.assets import asset_names
 from mu_addon.design.parameters import load_preset, preset_names

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
+from mu_addon.blender.body.state import FLAWS
 from mu_addon.blender.jobs import start_child
 from mu_addon.blender.obstacles import state as obstacles
 from mu_addon.blender.results import legend
@@ -125,7 +126,7 @@ def test_flaws_are_told_and_marked():
     assert bpy.ops.mu.obstacle() == {"FINISHED"}
     assert obstacles.placed(root, one).flaws[0].what.startswith("it overlaps the unit by up to 6.")
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
-    at = np.array([v.co for v in drawing.beside(root, drawing.FLAWS).data.vertices])
+    at = np.array([v.co for v in drawing.beside(root, FLAWS).data.vertices])
     assert len(at) == 1, at
     assert abs(at[0] - [0, 28.1, 60]).max() < 1.0, at
     assert "overlaps the unit" in refused(bpy.ops.mu.simulate)
@@ -133,7 +134,7 @@ def test_flaws_are_told_and_marked():
     bpy.context.view_layer.update()
     assert obstacles.placed(root, one).flaws is None, "looked at where it stands now"
     assert bpy.ops.mu.obstacle_check() == {"FINISHED"}
-    assert drawing.beside(root, drawing.FLAWS) is None
+    assert drawing.beside(root, FLAWS) is None
     assert len(asked().obstacles) == 1
 
 

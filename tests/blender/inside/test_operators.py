@@ -6,12 +6,12 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 
-from mu_addon.blender.shared import panels
-from mu_addon.blender.unit import figures
+from mu_addon.blender.path import candidates
+from mu_addon.blender.sidebar import figures, unit_panel
+from mu_addon.blender.unit import base_classes
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit import panel as unit_panel
-from mu_addon.blender.unit.broken import broken, description
-from mu_addon.blender.unit.fields import field, shown_value
+from mu_addon.blender.unit.broken import broken
+from mu_addon.blender.unit.fields import description, field, shown_value
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import Chambers, Waveguide, load_preset
@@ -216,8 +216,8 @@ def test_a_closed_fold_with_a_fault_is_red():
     layout.panel.side_effect = panel
     for pitch, red in ((4.0, False), (0.5, True)):
         root.mu_unit.waveguide.well_pitch_mm = pitch
-        panels.folded_place(layout, root, "path", "Waveguide")
-        panels.folded_place(layout, root, "simulate", "Material")
+        base_classes.folded_place(layout, root, "path", "Waveguide")
+        base_classes.folded_place(layout, root, "simulate", "Material")
         assert heads["MU_fold_path"].alert is red
         assert heads["MU_fold_simulate"].alert is False
 
@@ -252,7 +252,7 @@ def test_path_select_and_stale_names():
     assert "alpha11" in refused(bpy.ops.mu.path, name="alpha11")
     assert root.mu_unit.path == "alpha4"
     root.mu_unit.candidates = True
-    tube = unit_object.candidate(root, "alpha7")
+    tube = candidates.candidate(root, "alpha7")
     bpy.context.view_layer.objects.active = tube
     assert unit_object.active_root(bpy.context) == root
     assert bpy.ops.mu.path() == {"FINISHED"}

@@ -53,7 +53,7 @@ def test_register_and_unregister_twice_leave_nothing(monkeypatch):
 @pytest.mark.own_process
 def test_a_failure_while_registering_leaves_nothing(monkeypatch):
     import mu_addon
-    from mu_addon.blender.unit import panel as panels
+    from mu_addon.blender.sidebar import unit_panel as panels
 
     def fails():
         raise RuntimeError("no")
@@ -117,7 +117,7 @@ def test_a_new_section_of_the_core_appears_by_itself():
     root = bpy.data.objects.new("x", None)
     group = root.mu_unit.novelty
     group.depth_mm, group.way = 1.25, "right"
-    from mu_addon.blender.shared.panels import parameters as draw
+    from mu_addon.blender.unit.base_classes import parameters as draw
     from mu_addon.blender.unit.properties import section_of
 
     assert section_of(root.mu_unit, "novelty") == {"depth_mm": 1.25, "way": "right"}
@@ -144,7 +144,7 @@ def test_a_new_section_of_the_core_appears_by_itself():
 
 def test_values_survive_single_precision():
     from mu_addon.blender.shared import updates
-    from mu_addon.blender.unit.fields import exact
+    from mu_addon.blender.shared.blender_property import exact
     from mu_addon.blender.unit.properties import from_unit, to_unit
     from mu_addon.design.parameters import load_preset, preset_names
 

@@ -12,6 +12,7 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 
+from mu_addon.blender.path import candidates
 from mu_addon.blender.results import field_operators, legend, panel, places, probe, run_panel, runs
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.simulate import study_folder as studies
@@ -197,19 +198,19 @@ def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
     assert bpy.ops.mu.motion() == {"FINISHED"}
     assert unit_object.shows_result(root)
     assert not root.mu_unit.candidates
-    assert unit_object.candidate(root, "alpha1") is None
+    assert candidates.candidate(root, "alpha1") is None
     # Asked for beside a result they bring back the unit at rest, and Result takes them away again.
     root.mu_unit.candidates = True
     assert not unit_object.shows_result(root)
-    assert unit_object.candidate(root, "alpha1") is not None
+    assert candidates.candidate(root, "alpha1") is not None
     root.mu_unit.show = unit_object.RESULT
     assert unit_object.shows_result(root)
-    assert unit_object.candidate(root, "alpha1") is None
+    assert candidates.candidate(root, "alpha1") is None
     # A run that comes in meanwhile leaves them where they are.
     root.mu_unit.candidates = True
     root.mu_unit.chambers.wall_mm = 1.1
     assert root.mu_unit.show == "preview"
-    assert unit_object.candidate(root, "alpha1") is not None
+    assert candidates.candidate(root, "alpha1") is not None
     # Motions beside the design bend nothing in its place.
     root.mu_motion.on_unit = False
     assert root.mu_unit.candidates

@@ -15,13 +15,13 @@ from mu_addon.blender.obstacles import panel as obstacle_panel
 from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.results import panel as results_panel
-from mu_addon.blender.shared.panels import parameters
 from mu_addon.blender.shared.wording import in_panel
+from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import panel as simulate_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION, job_of
 from mu_addon.blender.unit import object as unit_object
-from mu_addon.blender.unit import panel as unit_panel
+from mu_addon.blender.unit.base_classes import parameters
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion

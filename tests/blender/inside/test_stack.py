@@ -10,10 +10,10 @@ import pytest
 
 from mu_addon.blender.preview import nodes
 from mu_addon.blender.steps import operators as steps_operators
-from mu_addon.blender.steps import state as stack
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit import stack
 from mu_addon.blender.unit.drawing import DRAWN, PARTS
-from mu_addon.blender.unit.fields import field
+from mu_addon.blender.unit.fields import description, field
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.steps import STEPS
 
@@ -94,7 +94,7 @@ def test_the_step_that_is_asked_for_is_of_hundredths_of_a_millimetre_in_any_scen
         units.system, units.scale_length = system, scale_length
         for section, name, step_mm in (("chambers", "wall_mm", 0.01), ("chambers", "cell_mm", 0.1)):
             group = getattr(root.mu_unit, section)
-            shown = group.bl_rna.properties[field(group, stack.description(section, name))]
+            shown = group.bl_rna.properties[field(group, description(section, name))]
             assert shown.step / 100.0 == pytest.approx(step_mm, rel=1e-5), (system, scale_length, name)
             assert shown.unit == "CAMERA", "a length that Blender shows in mm in any scene"
 
@@ -111,7 +111,7 @@ def test_a_steps_redo_panel_shows_true_lengths():
 def test_a_length_dragged_beyond_its_bound_ends_there():
     root = add()
     assert bpy.ops.mu.chambers(wall_mm_true=-9.1) == {"FINISHED"}
-    assert root.mu_unit.chambers.wall_mm == pytest.approx(stack.description("chambers", "wall_mm").low)
+    assert root.mu_unit.chambers.wall_mm == pytest.approx(description("chambers", "wall_mm").low)
     # What breaks a rule of units is refused in words that name it, and the unit stays.
     assert "neck" in refused(bpy.ops.mu.profile, neck_diameter_mm_true=1.0).lower()
     assert root.mu_unit.chambers.neck_diameter_mm == pytest.approx(12.5)

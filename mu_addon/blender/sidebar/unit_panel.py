@@ -4,27 +4,28 @@ from __future__ import annotations
 
 import bpy
 
+from ..body.state import FLAWS
+from ..evidence import state as evidence
 from ..grading import state as grading
 from ..gripper import object as gripper_object
+from ..jobs.panel import whole
 from ..live_bending import words as live_words
 from ..node_tree import following
 from ..shared import scene_units
-from ..shared.operators import NO_UNIT, linked
-from ..shared.panels import (
-    CHARACTERS,
-    TabPanel,
-    UnitPanel,
-    alert,
-    fix_button,
-    folded_section,
-    parameters,
-    wrapped,
-)
-from . import drawing, figures
-from . import object as unit_object
-from .broken import broken
-from .next_step import draw_next_step
+from ..shared.operators import linked
+from ..shared.panels import CHARACTERS, TabPanel, alert, wrapped
+from ..shared.wording import path_symbol
+from ..simulate import study_folder as studies
+from ..simulate.job import SIMULATION
+from ..simulate.panel import start_words
+from ..unit import drawing
+from ..unit import object as unit_object
+from ..unit.base_classes import NO_UNIT, UnitPanel, fix_button, folded_section, parameters
+from ..unit.broken import broken
+from . import figures
 
+LETTERS = 14
+"""Letters of a running stage's name; a longer one is numbered."""
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
 
 
@@ -112,7 +113,7 @@ def _head(layout, root) -> None:
     row = box.row(align=True)
     row.alert = False
     if not mending:
-        draw_next_step(row, root)
+        _draw_next_step(row, root)
         return
     if len(mending) > 1:
         row = row.split(factor=0.8, align=True)
@@ -122,6 +123,30 @@ def _head(layout, root) -> None:
         fix_button(grid, root, repair.section, repair.name, repair.value, found.text)
     if len(mending) > 1:
         row.operator("mu.fit_all", text=f"All {len(mending)}")
+
+
+def _draw_next_step(row, root) -> None:
+    """Draw the button of the next action on a unit, or the running job's progress, of the same height."""
+    for kind in (SIMULATION, evidence.DIAGNOSIS):
+        if kind.is_running(root):
+            fraction, text = whole(kind.child(root), LETTERS)
+            row.progress(factor=fraction, text=text)
+            return
+    data = evidence.measured_data(root)
+    if data is not None and data.measured is not None and evidence.diagnosis(root) is None:
+        row.operator("mu.evidence_diagnose", text="Diagnose the Data", icon="VIEWZOOM")
+        return
+    found = studies.findings(root)
+    if found is None or found.stale or not found.run.complete:
+        row.operator("mu.simulate", text=start_words(root), icon="PLAY")
+        return
+    best = found.ranking[0][0] if found.ranking else ""
+    if best and root.mu_unit.path != best:
+        row.operator("mu.path", text=f"Use Path {path_symbol(best)}", icon="CON_FOLLOWPATH").name = best
+    elif not unit_object.solid_is_current(root):
+        row.operator("mu.solid", text="Build Solid", icon="MESH_DATA")
+    else:
+        row.operator("mu.print_check", text="Check the Print", icon="VIEWZOOM")
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -164,7 +189,7 @@ def _own_body(layout, root) -> None:
         row.operator("mu.body_check", icon="VIEWZOOM")
         row.operator("mu.body_repair", icon="TOOL_SETTINGS")
         body.operator("mu.body", icon="MESH_MONKEY")
-        if root.mu_unit.envelope is not None or drawing.beside(root, drawing.FLAWS) is not None:
+        if root.mu_unit.envelope is not None or drawing.beside(root, FLAWS) is not None:
             body.operator("mu.body_remove", icon="X")
 
 

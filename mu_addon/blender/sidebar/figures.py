@@ -13,11 +13,11 @@ from ...reading import parse_json
 from ...run.progress import spell
 from ..printing import state as printing
 from ..shared.file_cache import UNREADABLE
-from ..steps import state as stack
-from . import object as unit_object
-from .broken import broken
-from .fields import sentence
-from .properties import to_unit
+from ..shared.wording import sentence
+from ..unit import object as unit_object
+from ..unit import stack
+from ..unit.broken import broken
+from ..unit.properties import to_unit
 
 LINES = 5
 """Fixed number of lines of the box at the head of the panel, so that nothing below it moves."""

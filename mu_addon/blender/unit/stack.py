@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ...design.anchors import windows
-from ...design.parameters import SECTIONS, Unit
-from ...design.quantity import Description, describe
+from ...design.parameters import Unit
 from ...design.steps import STEPS, Stack, Step, StepInputs
-from ..body import state as bodies
+from . import envelope
 
 STACK = Stack()
 """Values of every unit's steps, shared by units of one shape and by states before and after an undo."""
@@ -44,16 +43,10 @@ def given(root: Any, unit: Unit, quality: str = "interactive") -> StepInputs:
     # A unit of fewer chambers has fewer paths: the chosen one is kept until it exists again.
     path = root.mu_unit.path
     known = path in {window.name for window in windows(unit.chambers.count)}
-    body = bodies.envelope_in(root, unit)
+    body = envelope.envelope_in(root, unit)
     return StepInputs(unit, path if known else "", muted(root.mu_unit), quality, body)
 
 
 def own_parameters(step: Step) -> list[tuple[str, str]]:
     """(section, name) of a step's parameters."""
     return [(section, name) for section, name in (path.split(".") for path in step.own)]
-
-
-def description(section: str, name: str) -> Description:
-    """The core's description of a parameter."""
-    (core,) = (s for s in SECTIONS if s.section == section)
-    return next(d for d in describe(core) if d.name == name)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene import handles
+from ..shared import displays
 from ..unit import presets
-from . import displays
 
 
 class MU_MT_presets(bpy.types.Menu):

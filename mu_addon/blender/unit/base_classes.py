@@ -1,0 +1,167 @@
+"""Base classes of operators and panels of the active unit, and the fields of its parameters in panels."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from ...design.parameters import SECTIONS
+from ...design.quantity import Description, describe
+from ...design.wall_material import Wall, offered
+from ..shared.operators import RootOperator, RootPoll
+from ..shared.panels import RootPanel, fold, wrapped
+from ..shared.wording import label
+from .broken import broken
+from .fields import description, field, shown_value
+from .object import active_root
+
+NO_UNIT = "Select a Monolithic Unit, or add one: Add > Mesh > Monolithic Unit"
+# Panel place of each section's parameters. A new section of the core appears under Design.
+PLACES = {
+    "chambers": "design",
+    "lattice": "lattice",
+    "grading": "grading",
+    "waveguide": "path",
+    "material": "simulate",
+    "wall": "simulate",
+    "print": "print",
+}
+FIRST = {
+    "chambers": ("count", "cell_mm", "bladder_diameter_mm", "neck_diameter_mm", "wall_mm"),
+    "lattice": (
+        "kind",
+        "cells_x",
+        "cells_y_minus",
+        "cells_y_plus",
+        "junction_diameter_mm",
+        "midspan_diameter_mm",
+    ),
+    "waveguide": ("row", "well_pitch_mm"),
+}
+"""Parameters of a section that are always shown; others are folded. Other sections have none."""
+
+
+class UnitPoll(RootPoll):
+    """The poll of an operator on the active unit."""
+
+    find_root = staticmethod(active_root)
+    no_root = NO_UNIT
+
+
+class UnitOperator(UnitPoll, RootOperator):
+    """An operator that acts at once on the active unit."""
+
+
+class ValidUnitOperator(UnitOperator):
+    """An operator on the active unit that needs parameters within the design rules."""
+
+    @classmethod
+    def trouble(cls, root):
+        broken = root.mu_unit.trouble
+        return f"A design rule is broken: {broken.splitlines()[0]}" if broken else ""
+
+
+class UnitPanel(RootPanel):
+    """A panel of the active unit."""
+
+    bl_parent_id = "MU_PT_unit"
+    bl_options = {"DEFAULT_CLOSED"}
+    find_root = staticmethod(active_root)
+    place: tuple[str, ...] = ()
+    """Places of `PLACES` whose parameters the panel shows."""
+
+    def draw_header(self, context):
+        """Draw a mark if one of the panel's parameters breaks a rule, also while it is closed."""
+        root = self.find_root(context)
+        if self.place and root is not None and _blamed(root, _sections(self.place)):
+            self.layout.label(text="", icon="ERROR")
+
+
+def _sections(places: Collection[str]) -> list[str]:
+    """Sections whose parameters are shown at these places."""
+    return [s.section for s in SECTIONS if PLACES.get(s.section, "design") in places]
+
+
+def _blamed(root, sections: Collection[str]) -> bool:
+    """Return True if a parameter of these sections breaks a rule."""
+    found = broken(root)
+    return found is not None and found.blames(sections)
+
+
+def parameter(column, root, section: str, d: Description) -> None:
+    """Draw the field of one parameter; if it breaks a rule red, with the nearest valid value as a button.
+
+    The button is next to the field, so that nothing below it moves.
+    """
+    group = getattr(root.mu_unit, section)
+    found = broken(root)
+    if found is None or (section, d.name) not in found.fits:
+        column.prop(group, field(group, d))
+        return
+    row = column.row(align=True)
+    row.alert = True
+    row.prop(group, field(group, d))
+    value = found.fits[section, d.name]
+    if value is not None:
+        right = row.row(align=True)
+        right.alert = False
+        # Half as wide as the field, so that the field's unit is not cut: "2.25 m" would be metres.
+        right.scale_x = 0.6
+        fix_button(right, root, section, d.name, value, found.text, short=True)
+
+
+def fix_button(layout, root, section: str, name: str, value, why: str, short: bool = False) -> None:
+    """Draw a button that sets a parameter to a valid value: "Neck Ø 24 mm", or "→ 24" beside its field."""
+    d = description(section, name)
+    shown = shown_value(getattr(root.mu_unit, section), d, value)
+    text = f"→ {shown.removesuffix(' mm')}" if short else f"{label(d)} {shown}"
+    button = layout.operator("mu.fit", text=text)
+    button.section, button.name, button.why = section, name, why
+
+
+def parameters(layout, root, place: str) -> None:
+    """Draw fields of every section that belongs to a place; seldom changed ones are folded below it."""
+    props = root.mu_unit
+    folded = []
+    for section in SECTIONS:
+        if PLACES.get(section.section, "design") == place:
+            group = getattr(props, section.section)
+            column = layout.column(align=True)
+            shown = offered(group.law, group.friction_share) if section is Wall else None
+            first = FIRST.get(section.section)
+            for d in describe(section):
+                if first is not None and d.name not in first:
+                    folded.append((section.section, d))
+                elif shown is None or d.name in shown:
+                    parameter(column, root, section.section, d)
+    if folded:
+        _folded(layout, root, place, folded)
+
+
+def folded_place(layout, root, place: str, title: str) -> None:
+    """Draw a fold with the fields of every section that belongs to a place."""
+    body = fold(layout, f"MU_fold_{place}", title, _blamed(root, _sections([place])))
+    if body:
+        parameters(body, root, place)
+
+
+def folded_section(layout, root, section: str, title: str, hint: str):
+    """Draw a fold with a section that has a place of its own; its head is red while one of its fields is.
+
+    Returns the fold's layout, or None while it is closed.
+    """
+    body = fold(layout, f"MU_{section}", title, _blamed(root, [section]))
+    if body:
+        wrapped(body, hint, "INFO")
+        parameters(body, root, section)
+    return body
+
+
+def _folded(layout, root, place: str, fields: Sequence[tuple[str, Description]]) -> None:
+    """Draw a fold with fields; its head is red while one of them breaks a rule."""
+    found = broken(root)
+    wrong = found is not None and any((section, d.name) in found.fits for section, d in fields)
+    body = fold(layout, f"MU_more_{place}", "More", wrong)
+    if body:
+        column = body.column(align=True)
+        for section, d in fields:
+            parameter(column, root, section, d)
