@@ -24,7 +24,8 @@ from typing import NamedTuple
 
 PARTS = {
     "cvxopt": (),
-    "fonttools": ("fontTools/*.c", "fontTools/*.pyx", "fontTools/*.pxd"),
+    # Every compiled module has its source in Python beside it, which takes its place.
+    "fonttools": tuple(f"fontTools/*.{ending}" for ending in ("c", "pyx", "pxd", "so", "pyd")),
     "gmsh": ("gmsh-*.data/data/share/doc/*", "gmsh-*.data/data/include/*"),
     "ipctk": (),
     "kiwisolver": (),
