@@ -111,7 +111,7 @@ def test_a_bar_is_short_whatever_a_stage_is_called(monkeypatch):
     everything = told("job_cancel", key=SIMULATION.key(root))
     assert "limit point" in everything
     assert root.name in everything
-    assert everything.endswith("what it has finished is kept")
+    assert everything.endswith("finished stages are kept")
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}
     ended(child)
 
