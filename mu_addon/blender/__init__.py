@@ -81,6 +81,7 @@ _MODULES = (
     "results.legend",
     "results.probe",
     "path.legend",
+    "path.hover",
     "sensor.plot",
     "jobs.header",
     "sidebar.menus",

@@ -237,4 +237,4 @@ def test_runs_side_by_side(tmp_path):
     assert rows["Its deviation"].values == ("0.0500", "-")
     assert rows["Time taken"].values == ("480", "40")
     # What they share is not listed.
-    assert {"scale", "cell", "mesh, order", "protocol", "paths"}.isdisjoint(rows)
+    assert {"scale", "cell", "element order", "protocol", "paths"}.isdisjoint(rows)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import bpy
 
+from ...design.printing.finding import counted
 from ..import_data.importing import draw_import
 from ..jobs.panel import job_state, start_button
 from ..shared.panels import alert, wrapped
 from ..shared.wording import in_panel, readable
-from ..unit.base_classes import UnitPanel
+from ..unit.base_classes import DONE, OUTDATED, UnitPanel
 from . import state as evidence
 from . import timeline as evidence_motion
 
@@ -26,6 +27,13 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
 
     bl_idname = "MU_PT_evidence"
     bl_label = "Evidence"
+
+    @classmethod
+    def mark(cls, root):
+        if evidence.DIAGNOSIS.is_running(root):
+            return "TIME"
+        found = evidence.diagnosis(root)
+        return "" if found is None or not found.name else OUTDATED if found.stale else DONE
 
     def show(self, layout, context, root):
         layout.prop(root.mu_evidence, "folder")
@@ -74,7 +82,7 @@ def _experiments(layout, context, root, measured):
         layout.operator("mu.evidence_protocol", icon="GRAPH").experiment = shown
     if measured.remarks:
         header, body = layout.panel("MU_remarks", default_closed=True)
-        header.label(text=f"{len(measured.remarks)} remark(s) on the data", icon="INFO")
+        header.label(text=counted(len(measured.remarks), "remark", "remarks") + " on the data", icon="INFO")
         if body:
             for remark in measured.remarks:
                 wrapped(body, f"{remark.what} ({Path(remark.where).name})")

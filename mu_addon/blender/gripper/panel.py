@@ -39,7 +39,7 @@ class MU_PT_gripper(GripperPanel, bpy.types.Panel):
         row.prop(props, "cut", icon="MOD_BOOLEAN", toggle=True)
         if props.trouble:
             alert(layout, props.trouble)
-        layout.prop(props, "path")
+        layout.prop(props, "paths")
         for section in SECTIONS:
             column = layout.column(align=True)
             column.label(text=section.section.capitalize())

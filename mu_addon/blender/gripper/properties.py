@@ -2,6 +2,8 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
+from functools import lru_cache
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty, StringProperty
 
@@ -15,7 +17,7 @@ from ..shared import displays
 from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
-from ..unit.fields import generated_fields
+from ..unit.fields import generated_fields, path_menu
 from ..unit.properties import BESIDE_BLEND_FILE, title_property
 
 PARAMETERS_CHANGED = Signal()
@@ -36,6 +38,11 @@ def _generated(section: type):
 
 
 GROUPS = {section.section: _generated(section) for section in SECTIONS}
+
+
+@lru_cache(maxsize=32)
+def _chambers(finger: str) -> int:
+    return parameters.from_toml(finger).chambers.count
 
 
 def _cube_of(root):
@@ -61,12 +68,8 @@ class MU_PG_gripper(bpy.types.PropertyGroup):
         # The unit of both fingers, as TOML: a gripper does not change when a preset does.
         "finger": StringProperty(options={"HIDDEN"}),
         "title": title_property("gripper"),
-        "path": StringProperty(
-            name="Sensor Path",
-            description="Window of anchors that the waveguide of either finger follows, such as alpha4",
-            default="alpha4",
-            update=_changed,
-        ),
+        "path": StringProperty(default="alpha4", update=_changed, options={"HIDDEN"}),
+        "paths": path_menu(lambda props: _chambers(props.finger)),
         **{
             name: PointerProperty(type=group, description=group.__doc__ or name)
             for name, group in GROUPS.items()

@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
+from ...design.printing.finding import counted
 from ...errors import MuError
 from ...files import make_folder
 from ..shared import viewports
@@ -150,7 +151,9 @@ def _import(operator, root):
             one.key, one.words, one.experiment = question.key, question.words, p.name
             one.choices, one.value = "\n".join(question.choices), question.proposed
         write_page(found, folder)
-        operator.report({"WARNING"}, f"{len(found.asked)} question(s) in the panel Evidence")
+        operator.report(
+            {"WARNING"}, counted(len(found.asked), "question", "questions") + " in the panel Evidence"
+        )
         viewports.redraw()
         return {"FINISHED"}
     remarks = write(found, folder)
@@ -158,7 +161,7 @@ def _import(operator, root):
     _forget(root)
     for remark in remarks[:3]:
         operator.report({"WARNING"}, f"{remark.what} ({remark.where})")
-    operator.report({"INFO"}, f"{len(found.proposals)} experiment(s) imported")
+    operator.report({"INFO"}, counted(len(found.proposals), "experiment", "experiments") + " imported")
     viewports.redraw()
     return {"FINISHED"}
 

@@ -13,6 +13,10 @@ STAGE_LETTERS = 20
 """Letters of a stage that fit into a panel's bar with number and time; a longer one is only numbered."""
 
 
+STAGES = {"Model A": "motion"}
+"""Stages whose names are those of the paper, in plain words."""
+
+
 def start_button(layout, child, operator: str, icon: str, **settings) -> None:
     """Draw the button that starts a job, unless its child runs or waits."""
     if child is None or child.state not in (RUNNING, WAITING):
@@ -61,6 +65,7 @@ def whole(child, width: int = 0) -> tuple[float, str]:
     if child.stopping:
         return estimate.fraction, "stopping ..."
     stage = str(child.progress.get("stage", "starting"))
+    stage = STAGES.get(stage, stage)
     long = width and len(stage) > width
     if estimate.count:
         number = f"{estimate.number} of {estimate.count}"

@@ -8,6 +8,7 @@ from bpy.props import FloatProperty, FloatVectorProperty, StringProperty
 from mathutils import Vector
 
 from ...design.body import require_sound
+from ...design.printing.finding import counted
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ..body.operators import report_flaws, selected_meshes
@@ -107,7 +108,9 @@ class MU_OT_obstacle_check(ObstacleOperator, bpy.types.Operator):
     def act(self, context, root):
         core, chosen = to_unit(root.mu_unit), self.chosen(root)
         found = [flaw for obj in chosen for flaw in obstacles.examined(root, obj, core)]
-        report_flaws(self, root, found, f"{len(chosen)} obstacle(s), valid and clear of the unit")
+        report_flaws(
+            self, root, found, f"{counted(len(chosen), 'obstacle', 'obstacles')}, valid and clear of the unit"
+        )
 
 
 class MU_OT_obstacle_remove(ObstacleOperator, bpy.types.Operator):

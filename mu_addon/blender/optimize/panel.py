@@ -108,7 +108,7 @@ def _targets(layout, props) -> None:
         if target.kind in AT_PRESSURE and not asks_curve(target):
             column.prop(target, "pressure_kPa")
         if target.kind in OF_PATH:
-            column.prop(target, "path")
+            column.prop(target, "paths")
         if target.kind in AT_TWO:
             column.prop(target, "pressures_kPa")
         own = {"stiffness": "direction", "tip_position": "toward", "tip_force": "gap_mm"}.get(target.kind)

@@ -24,7 +24,7 @@ from ...optimization.settings import REFINE as SEARCH_REFINE
 from ..shared.blender_property import blender_property, exact
 from ..shared.registration import property_group_factory
 from ..shared.wording import label, sentence
-from ..unit.fields import true_scale
+from ..unit.fields import path_menu, true_scale
 from ..unit.properties import BESIDE_BLEND_FILE, section_of, to_unit
 
 SECTIONS = ("chambers", "lattice", "grading", "material")
@@ -56,7 +56,7 @@ KINDS = [
     ("mass", "Mass", "Mass without the waveguide, in g"),
     ("print_time", "Print Time", "Time of the print, upright, in h"),
     ("wall_thickness", "Wall Thickness", "Thickness of the thinnest chamber's wall, in mm"),
-    ("deviation", "J of a Path", "Mean deviation that the sensor along a path causes, in mm"),
+    ("deviation", "Deviation by a Path", "Mean deviation that the sensor along a path causes, in mm"),
     ("sensor_slope", "Slope of the Sensor", "Relative change of the light per degree, along a path"),
     ("walls_apart", "Walls Apart", "No wall passes through another under a pressure"),
     ("printable", "Printable", "No error in the print check of a proposed unit"),
@@ -115,9 +115,8 @@ class MU_PG_target(bpy.types.PropertyGroup):
         description="Pressure in kPa and value of each point, as -15: -10, 30: 16",
         default="-15: -10, 30: 16",
     )
-    path: StringProperty(
-        name="Path", description="Sensor path, alpha1 and on; empty: the free one", default="alpha4"
-    )
+    path: StringProperty(default="alpha4", options={"HIDDEN"})
+    paths: path_menu(lambda target: target.id_data.mu_unit.chambers.count, "The One Searched For")
     ask: EnumProperty(
         name="Shall Be",
         description="Goal of the quantity",

@@ -77,7 +77,7 @@ def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
     """
     active = unit_object.active_root(context)
     for root in [active, *(other for other in unit_object.roots() if other != active)]:
-        tubes = [] if root is None else _seen(root)
+        tubes = [] if root is None else seen(root)
         if tubes:
             return root, tubes
     return active, []
@@ -96,7 +96,7 @@ def _legend(context: Any, root: Any, known: ranking.Known, scale: float) -> None
         legend.write(text, left, bottom + 1.5 * size * line, size)
 
 
-def _seen(root: Any) -> list[tuple[str, Any]]:
+def seen(root: Any) -> list[tuple[str, Any]]:
     """Visible candidate paths, by name."""
     found = ((str(child.get(PART, "")), child) for child in root.children)
     return [

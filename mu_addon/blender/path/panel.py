@@ -6,9 +6,8 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...design.anchors import windows
-from ..shared.panels import wrapped
-from ..shared.wording import path_symbol
-from ..unit.base_classes import UnitPanel, parameters
+from ..shared.wording import anchors_of, path_symbol
+from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
 from .legend import BETTER
 from .picking import selected_candidate
@@ -25,6 +24,10 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
     bl_idname = "MU_PT_path"
     bl_label = "Sensor Paths"
     place = ("path",)
+
+    @classmethod
+    def mark(cls, root):
+        return DONE if root.mu_unit.path else ""
 
     def show(self, layout, context, root):
         props = root.mu_unit
@@ -47,7 +50,7 @@ def _list(layout, context, root) -> None:
     row.enabled = bool(ranked)
     row.prop(context.window_manager, "mu_path_order", expand=True)
     # Same height in both cases, so that a click on a run without a ranking moves nothing.
-    wrapped(layout, BETTER if ranked else "Simulate to rank them: with Place the Sensor")
+    layout.label(text=BETTER if ranked else "Simulate to rank them")
     column = layout.column(align=True)
     for window in in_order(root, ranked, context.window_manager.mu_path_order):
         chosen = root.mu_unit.path == window.name
@@ -56,7 +59,7 @@ def _list(layout, context, root) -> None:
         button = row.operator("mu.path", text=path_symbol(window.name), icon=icon, depress=chosen)
         button.name = "none" if chosen else window.name
         row = row.split(factor=0.45)
-        row.label(text=f"P{window.start} to P{window.start + window.length - 1}")
+        row.label(text=anchors_of(window))
         if window.name in ranked:
             j, rank = ranked[window.name]
             row.label(text=f"{j:.3f}  #{rank}")

@@ -23,13 +23,17 @@ from .candidates import CANDIDATE
 
 
 class MU_OT_path(UnitOperator, bpy.types.Operator):
-    """Lay the waveguide along this path; without a name, along the candidate selected in the viewport"""
+    """Lay the waveguide along this path"""
 
     bl_idname = "mu.path"
     bl_label = "Choose Sensor Path"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: StringProperty(name="Path", description="Name of a path, alpha1 ..; `none` removes the waveguide")
+    name: StringProperty(
+        name="Path",
+        description="Name of a path, alpha1 ..; `none` removes the waveguide, "
+        "nothing takes the candidate that is selected in the viewport",
+    )
 
     def act(self, context, root):
         name = self.name or selected_candidate(context)

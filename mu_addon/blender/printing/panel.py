@@ -7,11 +7,13 @@ import math
 
 import bpy
 
+from ...design.printing.finding import counted
 from ...run.child import FAILED
 from ..jobs.panel import job_state
 from ..shared.panels import alert, large_button, wrapped
+from ..shared.wording import path_symbol
 from ..unit import object as unit_object
-from ..unit.base_classes import UnitPanel, folded_place
+from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
 from . import layer, marks
 from . import state as printing
 from .properties import OWN_PRINTER
@@ -30,6 +32,13 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
     bl_idname = "MU_PT_print"
     bl_label = "Print"
     place = ("print",)
+
+    @classmethod
+    def mark(cls, root):
+        if printing.PRINTING.is_running(root):
+            return "TIME"
+        files = printing.exported(root)
+        return "" if files is None else OUTDATED if files.stale else DONE
 
     def show(self, layout, context, root):
         large_button(layout, "mu.solid", "MESH_DATA")
@@ -68,7 +77,7 @@ def _gates(layout, root, solid) -> None:
     ):
         column.label(text=text, icon="CHECKMARK")
     if solid["mu_path"]:
-        column.label(text=f"Waveguide along {solid['mu_path']}", icon="CHECKMARK")
+        column.label(text=f"Waveguide along {path_symbol(solid['mu_path'])}", icon="CHECKMARK")
 
 
 class _OfPrint(UnitPanel):
@@ -297,7 +306,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
         path = root.mu_unit.path
         wrapped(
             layout,
-            f"Waveguide along {path}" if path else "Without a waveguide: no path chosen",
+            f"Waveguide along {path_symbol(path)}" if path else "Without a waveguide: no path chosen",
             "INFO",
         )
         _check_state(layout, found)
@@ -317,9 +326,15 @@ def _check_state(layout, found) -> None:
         return
     count = {s: sum(f["severity"] == s for f in found.findings) for s in marks.FAULTS}
     if count["error"]:
-        alert(layout, f"The check found {count['error']} error(s): export asks first", "CANCEL")
+        alert(
+            layout,
+            f"The check found {counted(count['error'], 'error', 'errors')}: export asks first",
+            "CANCEL",
+        )
     else:
-        doubts = f", {count['warning']} warning(s) to decide on" if count["warning"] else ""
+        doubts = (
+            f", {counted(count['warning'], 'warning', 'warnings')} to decide on" if count["warning"] else ""
+        )
         wrapped(layout, f"Checked: no errors{doubts}", "CHECKMARK")
 
 
@@ -344,7 +359,7 @@ def _written(layout, found) -> None:
             vented["trapped_before_ml"],
             vented["trapped_after_ml"],
         )
-        words = f"{count} vent(s): {_ml(before)} trapped before, {_ml(after)} after"
+        words = f"{counted(count, 'vent', 'vents')}: {_ml(before)} trapped before, {_ml(after)} after"
         wrapped(column, words if count else f"No vent is needed: {_ml(before)} trapped at most", "INFO")
     for entry in found.manifest["refused"]:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")

@@ -72,7 +72,7 @@ FIELDS = (
         "deviation_mm",
         "Deviation",
         "mm",
-        "Distance between the unit with the sensor and Model A, point by point",
+        "Distance between the unit with the sensor and without it, point by point",
         amount=True,
     ),
     Field(
@@ -90,7 +90,7 @@ FIELDS = (
         "contact_pressure_kPa",
         "Self-Contact Pressure",
         "kPa",
-        "Between walls and struts that touch each other; of Model A, simulated with self-contact",
+        "Between walls and struts that touch each other, without a sensor; simulated with self-contact",
         amount=True,
         rare=5.0,
         spots=True,
@@ -106,7 +106,7 @@ FIELDS = (
         "dJ_by_modulus_mm_per_MPa",
         "Sensitivity dJ/dE",
         "mm/MPa",
-        "How much the motion changes if only the material there is stiffened; of Model A",
+        "How much the motion changes if only the material there is stiffened, without a sensor",
     ),
 )
 BY_NAME = {field.name: field for field in FIELDS}

@@ -111,7 +111,7 @@ def whose(root, motion, field: str) -> str:
         raise InputError(
             "this run was simulated without self-contact",
             str(motion.folder.parent),
-            "simulate Printed Struts with Self-Contact, or choose another run",
+            "simulate with Self-Contact, or choose another run",
         )
     if field == SENSITIVITY and not motion.sensitivity:
         raise InputError(

@@ -16,10 +16,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.displays import LEGEND
 from ..shared.viewports import Overlay
-from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places
@@ -120,14 +118,14 @@ def ramp(colours: Any, marks: list[tuple[float, str]], scale: float, left: float
     corner = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
     triangles = np.concatenate([corner + 2 * piece for piece in range(PIECES)])
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    data = {"pos": corners, "color": _display(np.repeat(colours, 2, axis=0)).tolist()}
+    data = {"pos": corners, "color": display(np.repeat(colours, 2, axis=0)).tolist()}
     batch_for_shader(shader, "TRIS", data, indices=triangles).draw(shader)
     size = round(11 * scale)
     for share, text in marks:
         write(text, x1 + 6 * scale, (BOTTOM + HEIGHT * share) * scale - 0.35 * size, size)
 
 
-def _display(linear: Any) -> Any:
+def display(linear: Any) -> Any:
     """Colours (c, 4) for a screen, sRGB and opaque, from linear ones."""
     linear = np.clip(linear, 0.0, 1.0)
     shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
@@ -151,8 +149,7 @@ def _names(context: Any, root: Any, motion: Any, size: int) -> None:
             y = place.y
             if base is not None:
                 y = name_height(y, base.y, below_headers(context.area, context.region) - 1.5 * size)
-            text = "Model A" if name == MODEL_A else path_symbol(name)
-            text += ", print" if what == motion_parts.PRINT else ""
+            text = motion_parts.owner(name) + (", print" if what == motion_parts.PRINT else "")
             blf.size(0, size)
             write(text, place.x - blf.dimensions(0, text)[0] / 2, y, size)
 

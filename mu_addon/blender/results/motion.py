@@ -34,6 +34,7 @@ from ..shared import displays, updates
 from ..shared.displays import MOTION
 from ..shared.registration import add_handlers, remove_handlers
 from ..shared.updates import Signal
+from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.properties import VIEW_CHANGED, to_unit
@@ -66,6 +67,11 @@ _played: dict[tuple[Path, str, bool], Played] = {}
 def parts(root: Any) -> list[Any]:
     """Objects that show a unit's motion."""
     return [child for child in root.children if child.get(MOTION)]
+
+
+def owner(name: str) -> str:
+    """Owner of a motion in words: the unit without a sensor, or with a path."""
+    return "Without a sensor" if name == MODEL_A else path_symbol(name)
 
 
 def shown(root: Any) -> list[tuple[str, str]]:

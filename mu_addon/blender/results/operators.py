@@ -32,7 +32,7 @@ class MotionOperator(UnitOperator):
 
 
 class MU_OT_motion(MotionOperator, bpy.types.Operator):
-    """Show or hide the motion of Model A or of a sensor path, as mesh or as print"""
+    """Show or hide the motion without a sensor or with a path, as mesh or as print"""
 
     bl_idname = "mu.motion"
     bl_label = "Show Motion"

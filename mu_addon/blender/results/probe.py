@@ -12,9 +12,7 @@ from bpy_extras.view3d_utils import (
     region_2d_to_vector_3d,
 )
 
-from ...usecases.simulate_and_place.motion_files import MODEL_A
 from ..shared.viewports import Overlay
-from ..shared.wording import path_symbol
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitPoll
 from . import field_colours, legend, places
@@ -37,7 +35,7 @@ def lines(root: Any, place: places.Place, scene: Any) -> list[str]:
     """Lines of the probe: value, owner, position at rest and now, time and pressure."""
     motion = motion_parts.motion_of(root)
     name = place.part[motion_parts.MOTION].partition("|")[0]
-    whose = "Model A" if name == MODEL_A else path_symbol(name)
+    whose = motion_parts.owner(name)
     found = [value_text(field_colours.BY_NAME[root.mu_motion.field], place.value)]
     for what, at in (("at rest", place.rest_mm), ("now", place.now_mm)):
         x, y, z = (float(v) + 0.0 for v in np.round(at, 2))

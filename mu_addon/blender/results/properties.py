@@ -41,6 +41,9 @@ def _redraw(settings, context):
 
 
 def _on_unit(settings, context):
+    if updates.are_paused():
+        # Hidden now, the candidates' tubes would stay.
+        return
     if settings.on_unit:
         # They would lie beside it as soon as it bends.
         unit_object.hide_candidates(settings.id_data)

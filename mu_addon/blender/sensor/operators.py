@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
+from ...design.printing.finding import counted
 from ...errors import InputError
 from ...sensing.session import SWEEP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
@@ -41,7 +42,10 @@ class MU_OT_sensor_ports(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         found = sensor.find_ports()
-        self.report({"INFO"}, f"{len(found)} serial port(s)" if found else "No serial port is there")
+        self.report(
+            {"INFO"},
+            counted(len(found), "serial port", "serial ports") if found else "No serial port is there",
+        )
         return {"FINISHED"}
 
 
@@ -178,7 +182,8 @@ class MU_OT_sensor_sweep(SessionOperator, bpy.types.Operator):
         angles = sensor.sweep_angles(root.mu_sensor)
         if len(set(angles)) < 3:
             raise InputError(
-                f"a sweep over {len(set(angles))} angle(s)", remedy="take a smaller step or a wider range"
+                f"a sweep over {counted(len(set(angles)), 'angle', 'angles')}",
+                remedy="take a smaller step or a wider range",
             )
         # Marks of an earlier sweep in this recording no longer count.
         session.child.send(f"mark {SWEEP}")

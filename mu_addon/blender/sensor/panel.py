@@ -7,6 +7,7 @@ from math import isfinite
 
 import bpy
 
+from ...design.printing.finding import counted
 from ...run.child import FAILED
 from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
@@ -46,7 +47,11 @@ class MU_PT_sensor(UnitPanel, bpy.types.Panel):
         if session is not None:
             _session(layout, root.mu_sensor, session)
         if sensor.others(root):
-            wrapped(layout, f"{len(sensor.others(root))} sensor(s) of other units connected", "INFO")
+            wrapped(
+                layout,
+                f"{counted(len(sensor.others(root)), 'sensor', 'sensors')} of other units connected",
+                "INFO",
+            )
             layout.operator("mu.sensor_disconnect", text="Disconnect Them", icon="UNLINKED").others = True
         _plot(layout, root.mu_sensor, session)
         _calibration(layout, root, session)
@@ -186,9 +191,9 @@ def _calibration(layout, root, session):
         body.operator("mu.sensor_sweep", icon="CON_ROTLIKE")
     else:
         _guide(body, guide)
-    row = body.row(align=True)
-    row.prop(settings, "data")
-    row.operator("mu.sensor_calibrate", text="", icon="CHECKMARK")
+    column = body.column(align=True)
+    column.prop(settings, "data")
+    column.operator("mu.sensor_calibrate", icon="CHECKMARK")
     row = body.row(align=True)
     row.prop(settings, "known_deg")
     row.operator("mu.sensor_zero", icon="PIVOT_CURSOR")

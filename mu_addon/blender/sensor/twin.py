@@ -1,6 +1,6 @@
 """The twin: the simulated unit, next to the design, bent to the angle of the real sensor.
 
-It moves between Model A's states and never beyond them. A signal outside the calibration or the simulated
+It moves between the simulated states and never beyond them. A signal outside the calibration or the simulated
 motion leaves the last pose, in red, with the reason above it.
 """
 
@@ -136,7 +136,7 @@ def _bend(root: Any, shape: _Shape, reading: Any) -> tuple[str, str]:
         part.data.update()
     pressure = shape.poses.pressure_at(reading.angle_deg)
     half = (reading.high_deg - reading.low_deg) / 2
-    return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, Model A at {pressure:.1f} kPa"
+    return LIVE, f"{reading.angle_deg:.1f} ± {half:.1f}°, simulated at {pressure:.1f} kPa"
 
 
 def _colour(root: Any, state: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from ...design.anchors import Window
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
 from ...errors import MuError
@@ -104,3 +105,8 @@ def _option(found: re.Match[str]) -> str:
 def error_text(error: MuError) -> str:
     """The error, its location, and the remedy, a line each."""
     return "\n".join(in_panel(text) for text in (error.what, error.where, error.remedy) if text)
+
+
+def anchors_of(window: Window) -> str:
+    """First and last anchor of a sensor path in words: "P4 to P6"."""
+    return f"P{window.start} to P{window.start + window.length - 1}"

@@ -11,6 +11,7 @@ from ..gripper import object as gripper_object
 from ..jobs.panel import whole
 from ..live_bending import words as live_words
 from ..node_tree import following
+from ..printing import state as printing
 from ..shared import scene_units
 from ..shared.operators import linked
 from ..shared.panels import CHARACTERS, TabPanel, alert, wrapped
@@ -127,7 +128,7 @@ def _head(layout, root) -> None:
 
 def _draw_next_step(row, root) -> None:
     """Draw the button of the next action on a unit, or the running job's progress, of the same height."""
-    for kind in (SIMULATION, evidence.DIAGNOSIS):
+    for kind in (SIMULATION, evidence.DIAGNOSIS, printing.PRINTING):
         if kind.is_running(root):
             fraction, text = whole(kind.child(root), LETTERS)
             row.progress(factor=fraction, text=text)
@@ -141,12 +142,23 @@ def _draw_next_step(row, root) -> None:
         row.operator("mu.simulate", text=start_words(root), icon="PLAY")
         return
     best = found.ranking[0][0] if found.ranking else ""
-    if best and root.mu_unit.path != best:
+    if best and root.mu_unit.path not in (best, *(found.summary.get("tied_with_chosen") or ())):
         row.operator("mu.path", text=f"Use Path {path_symbol(best)}", icon="CON_FOLLOWPATH").name = best
     elif not unit_object.solid_is_current(root):
         row.operator("mu.solid", text="Build Solid", icon="MESH_DATA")
     else:
+        _draw_print_step(row, root)
+
+
+def _draw_print_step(row, root) -> None:
+    """Draw the next action on the way from a solid to its files."""
+    check, files = printing.checked(root), printing.exported(root)
+    if check is None or check.stale:
         row.operator("mu.print_check", text="Check the Print", icon="VIEWZOOM")
+    elif files is None or files.stale:
+        row.operator("mu.print_export", text="Export the Files", icon="EXPORT")
+    else:
+        row.operator("mu.print_open", text="Open the Files", icon="FILE_FOLDER").what = printing.EXPORT
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import bpy
 
+from ...design.printing.finding import counted
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button, timed
 from ..shared.panels import wrapped
-from ..unit.base_classes import UnitPanel, folded_place
+from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
 from . import effects
+from . import study_folder as studies
 from .job import SIMULATION, announced
 
 
@@ -18,6 +20,13 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
     bl_idname = "MU_PT_simulate"
     bl_label = "Simulate"
     place = ("simulate",)
+
+    @classmethod
+    def mark(cls, root):
+        if SIMULATION.is_running(root):
+            return "TIME"
+        found = studies.findings(root)
+        return "" if found is None or not found.run.complete else OUTDATED if found.stale else DONE
 
     def show(self, layout, context, root):
         missing = start_child.missing()
@@ -46,7 +55,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         job_state(layout, child, "see Results")
         others = [key for key in start_child.running() if key != SIMULATION.key(root)]
         if others:
-            wrapped(layout, f"{len(others)} other job(s) running", "INFO")
+            wrapped(layout, counted(len(others), "other job runs", "other jobs run"), "INFO")
         folded_place(layout, root, "simulate", "Material")
         header, body = layout.panel("MU_computing", default_closed=True)
         header.label(text="Device and Folder")

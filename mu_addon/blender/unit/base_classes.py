@@ -75,6 +75,21 @@ class UnitPanel(RootPanel):
         if self.place and root is not None and _blamed(root, _sections(self.place)):
             self.layout.label(text="", icon="ERROR")
 
+    @classmethod
+    def mark(cls, root) -> str:
+        """Icon of the state of the panel's part of the work, at the right of its header; "" for none."""
+        return ""
+
+    def draw_header_preset(self, context):
+        """Draw the state's mark, also while the panel is closed."""
+        root = active_root(context)
+        if root is not None and (icon := self.mark(root)):
+            self.layout.label(text="", icon=icon)
+
+
+DONE, OUTDATED = "CHECKMARK", "FILE_REFRESH"
+"""Marks of a part of the work that is done, and of one that was done before the unit changed."""
+
 
 def _sections(places: Collection[str]) -> list[str]:
     """Sections whose parameters are shown at these places."""

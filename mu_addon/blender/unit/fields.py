@@ -2,14 +2,19 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
+from bpy.props import EnumProperty
+
+from ...design.anchors import windows
 from ...design.parameters import SECTIONS
 from ...design.quantity import Description, describe
 from ...design.repairs import tied
 from ..shared import updates
 from ..shared.blender_property import blender_property, exact, millimetres, step_of
-from ..shared.wording import label, tooltip
+from ..shared.wording import anchors_of, label, path_symbol, tooltip
 
 
 def true_length(name: str, title: str, text: str, step: float) -> dict[str, Any]:
@@ -80,3 +85,35 @@ def description(section: str, name: str) -> Description:
     """The core's description of a unit's parameter."""
     (core,) = (s for s in SECTIONS if s.section == section)
     return next(d for d in describe(core) if d.name == name)
+
+
+@cache
+def _path_items(count: int, named: str, free: str) -> list[tuple[str, str, str, int]]:
+    """Items of `path_menu`; cached, since Blender does not keep these strings alive."""
+    every = {"": free} if free else {}
+    every |= {w.name: f"{path_symbol(w.name)}: {anchors_of(w)}" for w in windows(count)}
+    # A path that a unit of fewer chambers does not have stays until another one is chosen.
+    every.setdefault(named, path_symbol(named))
+    return [(name or "free", text, "", number) for number, (name, text) in enumerate(every.items())]
+
+
+def path_menu(count_of: Callable[[Any], int], free: str = "") -> Any:
+    """A menu of sensor paths by symbol and anchors, kept in the property `path` beside it.
+
+    count_of: the chambers of the unit of such a group; free: title of an entry for no path, "" for none.
+    """
+
+    def items(group: Any, context: Any) -> list[tuple[str, str, str, int]]:
+        return _path_items(count_of(group), group.path, free)
+
+    def names(group: Any) -> list[str]:
+        return [name if name != "free" else "" for name, *_ in items(group, None)]
+
+    return EnumProperty(
+        name="Sensor Path",
+        description="Anchors along which the waveguide lies",
+        items=items,
+        get=lambda group: names(group).index(group.path),
+        set=lambda group, number: setattr(group, "path", names(group)[number]),
+        options={"SKIP_SAVE"},
+    )

@@ -157,7 +157,7 @@ def leave_a_sensor(tmp_path):
     before = s.watched.status["rows"]
     watch_sensor(lambda: s.watched.status["rows"] > before + 10)
     add()
-    assert "1 sensor(s) of other units connected" in sensor_panel_drawn()
+    assert "1 sensor of other units connected" in sensor_panel_drawn()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "study" / "seat.blend"))
     (root,) = unit_object.roots()
     assert sensor.of(root) is s

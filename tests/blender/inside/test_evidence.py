@@ -131,7 +131,7 @@ def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
         assert expected not in drawn()
     child = start("hang")
     watch(lambda: child.progress)
-    assert "0.50 50%, Model A" in drawn()
+    assert "0.50 50%, motion" in drawn()
     assert "mu.evidence_cancel" in drawn()
     assert not bpy.ops.mu.evidence_diagnose.poll()
     # The unit's own simulation is another one.

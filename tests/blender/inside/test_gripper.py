@@ -162,7 +162,7 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
 
     child = fake(grasps.GRASP, root, "hang")
     watch(lambda: child.progress)
-    assert "0.50 50%, Model A" in drawn()
+    assert "0.50 50%, motion" in drawn()
     assert "mu.grasp_cancel" in drawn()
     assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
     assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
@@ -271,6 +271,10 @@ def test_a_grasp_plays_on_the_timeline(tmp_path):
         assert "Stale" in drawn(), name
         setattr(props, name, before)
         assert not grasps.of(root).stale
+    props.paths = "alpha2"
+    assert props.path == "alpha2"
+    assert grasps.of(root).stale
+    props.paths = "alpha4"
     gripper_object.part(root, "cube").location.z += 2.0
     assert grasps.of(root).stale
     assert "Stale" in drawn()

@@ -62,7 +62,7 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     watch(lambda: one.progress)
     assert (one.state, two.state) == ("running", "waiting")
     assert SIMULATION.is_running(second)
-    assert "Model A (3 of 9)" in said()
+    assert "motion (3 of 9)" in said()
     assert "mu-1.0x: simulation: " in told("job_cancel", key=SIMULATION.key(first))
     assert "+1" in said()
     assert bpy.ops.mu.job_cancel() == {"FINISHED"}

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from PIL import Image
 
-from mu_addon.blender.path import candidates, picking, ranking
+from mu_addon.blender.path import candidates, hover, picking, ranking
 from mu_addon.blender.path import legend as path_legend
 from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.results import field_colours as fields
@@ -227,6 +227,16 @@ def test_the_legend_stands_in_the_scene(study):
     assert not bpy.data.curves
 
 
+def test_a_painted_field_takes_the_candidates_off_the_unit(study):
+    root = started(study)
+    root.mu_unit.candidates = True
+    assert candidates.candidate(root, "alpha1") is not None
+    assert bpy.ops.mu.field_show(field="displacement_mm") == {"FINISHED"}
+    assert not root.mu_unit.candidates
+    assert candidates.candidate(root, "alpha1") is None
+    assert not unit_object.behind(root)
+
+
 def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
     root = started(study)
     name, j, points = ranking.free(root)
@@ -312,6 +322,20 @@ def test_what_is_missing_is_said(study):
     assert "simulate this unit first" in refused(bpy.ops.mu.motion)
     root.mu_motion.cut = False
     assert "no motion to show" in root.mu_motion.trouble
+
+
+def test_the_bar_under_the_mouse_is_known_and_where_its_path_truly_runs():
+    root = add(preset="mu-1.0x")
+    bars = {"alpha1": [(10.0, 0.0), (10.0, 50.0)], "alpha2": [(20.0, 25.0), (20.0, 90.0)]}
+    assert hover.nearest((16.0, 30.0), bars, 7.0) == "alpha2"
+    assert hover.nearest((12.0, 80.0), bars, 7.0) == "", "beyond the end of the nearer one"
+    assert hover.nearest((12.0, 55.0), bars, 7.0) == "alpha1"
+    assert hover.nearest((0.0, 0.0), {}, 7.0) == ""
+    root.location.x = 100.0
+    bpy.context.view_layer.update()
+    points = np.array(hover.true_place(root, "alpha4"))
+    expected = anchor_points(to_unit(root.mu_unit))[3:] + np.array([100.0, 0.0, 0.0])
+    assert np.allclose(points, expected, atol=1e-4)
 
 
 def test_candidates_say_their_rank(study):

@@ -92,6 +92,9 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     target(root, "stiffness", direction="z", ask="maximise")
     target(root, "mass", ask="minimise")
     target(root, "deviation", path="alpha2", pressures_kPa=(-15.0, 30.0), ask="minimise")
+    root.mu_optimize.targets[-1].paths = "free"
+    assert root.mu_optimize.targets[-1].path == ""
+    root.mu_optimize.targets[-1].paths = "alpha2"
     target(root, "tip_force", gap_mm=1.5, ask="low", low=0.2)
     target(root, "tip_position", toward="z", ask="high", high=2.0)
     target(root, "workspace", pressures_kPa=(-10.0, 20.0), ask="maximise")

@@ -289,7 +289,7 @@ def test_the_probe_says_value_place_and_time(home):
     assert found.value <= places.largest(root).value + 1e-5
     first, _, _, last = probe.lines(root, found, scene)
     assert first == f"Displacement: {found.value:.4g} mm"
-    assert last == "Model A, 6.00 s, 40.0 kPa"
+    assert last == "Without a sensor, 6.00 s, 40.0 kPa"
     assert surfaces.hit((500.0, 0.0, 500.0), (0.0, 0.0, 1.0)) is None
     root.mu_motion.field = "contact_pressure_kPa"
     assert places.largest(root) is None

@@ -325,7 +325,7 @@ def test_the_twin_follows_the_simulated_sensor_and_never_beyond(tmp_path):
     slope = np.minimum(np.abs(shown), 180.0 - np.abs(shown))
     assert np.abs(slope - asked).max() < 0.5, np.abs(slope - asked).max()
     assert membrane.data.materials[0].name == "MU Twin"
-    assert "Model A at" in twin.status(root)[1]
+    assert "simulated at" in twin.status(root)[1]
 
     class Reading:
         light_V, angle_deg, low_deg, high_deg, possible = 2.0, 30.0, 29.0, 31.0, True
