@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from ..design import shapes
 from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
-from ..design.lattice import lattice_of
+from ..design.lattice import filled, lattice_of
 from ..design.parameters import Unit
 from ..design.profile import outer_polygon, outer_radius, outer_slope
 from ..design.solid import QUALITY, lattice_solid
@@ -84,12 +84,18 @@ def strut_volume_mm3(unit: Unit, body: Body | None = None) -> float:
     from manifold3d import Manifold, OpType
 
     d = covering(unit.printed, body)
-    facets = QUALITY["export"]
-    solid = lattice_solid(d, lattice_of(d), facets)
+    facets, lattice, share = QUALITY["export"], lattice_of(d), 1.0
+    profile = shapes.revolved(outer_polygon(d, facets.along_arc), facets.around_axis)
+    if body is None and lattice.factors is None:
+        # The cells that reach beyond x = 0, cut there: twice them is the whole, in two thirds of the time.
+        right = lattice.cells[lattice.cells[:, 0] > -d.kind.divisions]
+        lattice = filled(d.kind, right, d.cell, d.junction_diameter / 2.0, d.midspan_diameter / 2.0)
+        low, high = np.array(d.bounds).T
+        profile, share = profile + shapes.box(low - 1.0, high * [0.0, 1.0, 1.0] + [0.0, 1.0, 1.0]), 2.0
+    solid = lattice_solid(d, lattice, facets)
     if body is not None:
         solid = solid ^ body.manifold
-    profile = shapes.revolved(outer_polygon(d, facets.along_arc), facets.around_axis)
-    return float(Manifold.batch_boolean([solid, profile], OpType.Subtract).volume())
+    return share * float(Manifold.batch_boolean([solid, profile], OpType.Subtract).volume())
 
 
 def cuts(d: Dimensions, body: Body | None) -> list[Depth]:
