@@ -7,6 +7,7 @@
 
 import ast
 import datetime
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -16,15 +17,21 @@ HEAD = """# Tests that run at night
 `.venv/bin/python -m pytest -m nightly` runs these and dates those that pass. Beside each stands its guard by
 day; without one, its other parameters guard.
 
-test | guard by day | passed
+test|guard by day|passed
 ---|---|---
 """
+
+
+@cache
+def parsed(file):
+    """The syntax tree of a file."""
+    return ast.parse(file.read_text(encoding="utf-8"))
 
 
 def marked(file):
     """Nightly tests of a file: name -> test that guards by day."""
     found = {}
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = parsed(file)
     assigned = [n for n in tree.body if isinstance(n, ast.Assign)]
     of_all = _quick_test(filter(_is_pytestmark, assigned))
     constants = {t.id: n.value for n in assigned for t in n.targets if isinstance(t, ast.Name)}
@@ -40,7 +47,7 @@ def marked(file):
 
 def wholly_marked(file):
     """Nightly tests of a file of which no set of parameters runs by default."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = parsed(file)
     if any(isinstance(n, ast.Assign) and _is_pytestmark(n) and _quick_test([n]) for n in tree.body):
         return set(marked(file))
     direct = {
@@ -92,7 +99,7 @@ def write(passed=()):
         guard = f"`{quick}`" if where == file else f"`{where}::{quick}`"
         date = today if test in passed else known.get(test, "")
         cells = [f"`{test}`", "" if (where, quick) == (file, name) else guard, date]
-        rows.append(" | ".join(cells).rstrip("| ") + "\n")
+        rows.append("|".join(cells).rstrip("|") + "\n")
     PAGE.write_text(HEAD + "".join(rows), encoding="utf-8")
 
 

@@ -21,7 +21,7 @@ HIDDEN = pytest.mark.nightly("test_a_hidden_cause_is_found")
         pytest.param({"seed": 8, "noise": "two"}, {"clean"}, marks=HIDDEN),
         pytest.param({"seed": 2, "effect": "mullins_softening"}, {"exact"}, marks=HIDDEN),
         pytest.param({"seed": 3, "effect": "rate_independent_hysteresis"}, {"exact"}, marks=HIDDEN),
-        ({"seed": 4, "effect": "line_lag"}, IN_SET),
+        pytest.param({"seed": 4, "effect": "line_lag"}, IN_SET, marks=HIDDEN),
         ({"seed": 5, "effect": "wall_thickness"}, {"exact", "exact_with_rivals"}),
         pytest.param({"seed": 6, "effect": "marker_slip", "times": 10.0}, {"exact"}, marks=HIDDEN),
         # From a finer mesh than the judge's; what the mesh misses is named beside it, or too small to be.

@@ -15,6 +15,7 @@ from mu_addon.design.stl_and_nodes import write_nodes, write_stl
 from mu_addon.errors import InputError
 
 PRESETS = ("mu-0.75x", "mu-1.0x", "mu-1.5x")
+OTHER_SIZE = pytest.mark.nightly("test_presets_pass_every_gate")
 
 
 @cache
@@ -33,7 +34,14 @@ WITH_A_WAVEGUIDE = pytest.mark.nightly(
 
 
 @pytest.mark.parametrize("path", [None, pytest.param("alpha4", marks=WITH_A_WAVEGUIDE)])
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("mu-0.75x", marks=OTHER_SIZE),
+        "mu-1.0x",
+        pytest.param("mu-1.5x", marks=OTHER_SIZE),
+    ],
+)
 def test_presets_pass_every_gate(name, path):
     g = built(name, path).gates
     assert g.lattice_genus == g.lattice_genus_expected == 365
@@ -222,7 +230,14 @@ VARIED = {
 }
 
 
-@pytest.mark.parametrize("unit", VARIED.values(), ids=VARIED)
+@pytest.mark.parametrize(
+    "unit",
+    [
+        pytest.param(unit, marks=[pytest.mark.nightly("test_other_units_pass_the_gates")] * (name == "wide"))
+        for name, unit in VARIED.items()
+    ],
+    ids=VARIED,
+)
 def test_other_units_pass_the_gates(unit):
     s = solid.build_solid(unit, window(unit, "alpha1"))
     assert s.gates.lattice_genus == lattice_of(unit.dimensions).cycles

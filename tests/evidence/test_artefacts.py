@@ -49,7 +49,7 @@ FAULT = pytest.mark.nightly("test_an_instrument_s_fault_gets_no_name")
     ("spoilt", "kind"),
     [
         (coarse_gauge, "none"),
-        (coarse_camera, "none"),
+        pytest.param(coarse_camera, "none", marks=FAULT),
         (lost_markers, "none"),
         pytest.param(jitter, "unexplained", marks=FAULT),
         # What stands out alone does not count.

@@ -280,14 +280,15 @@ def test_a_mechanism_is_named_whatever_its_law(tmp_path, part, number):
     assert all(math.isfinite(v) for ends in verdict.intervals.values() for v in ends)
 
 
+WRONG_READING = pytest.mark.nightly("test_no_reading_that_is_wrong_decides_a_verdict")
+
+
 @pytest.mark.parametrize(
     ("battery", "number"),
     [
         (LATER, 52),
-        (LATER, 76),
-        pytest.param(
-            26112611, 4, marks=pytest.mark.nightly("test_no_reading_that_is_wrong_decides_a_verdict")
-        ),
+        pytest.param(LATER, 76, marks=WRONG_READING),
+        pytest.param(26112611, 4, marks=WRONG_READING),
     ],
 )
 def test_no_reading_that_is_wrong_decides_a_verdict(tmp_path, battery, number):
@@ -356,7 +357,7 @@ def test_what_happened_at_one_moment_is_no_choice_of_drifts(tmp_path):
     ("battery", "part", "number"),
     [
         # A wall that creeps by the third root of time, and gas that cools with its wall.
-        (LATER, "single", 80),
+        pytest.param(LATER, "single", 80, marks=ANOTHER_LAW),
         (LATER, "single", 79),
         # A load cell's filter of two poles, and Bouc and Wen's friction.
         (LATER, "single", 11),

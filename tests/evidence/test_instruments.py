@@ -226,13 +226,18 @@ def filtered(t, force, time_s=0.4):
     return np.array(out)[::100]
 
 
+ANOTHER_FAULT = pytest.mark.nightly("test_a_load_cell_s_fault_is_told_or_a_rival")
+
+
 @pytest.mark.parametrize(
     ("fault", "name"),
     [
         (lambda t, force: force, None),
         (lambda t, force: force + 5e-4 * t, "force_drift"),
-        (lambda t, force: force - 0.02 * np.log(1.0 + t / 10.0), "force_drift"),
-        (filtered, "force_lag"),
+        pytest.param(
+            lambda t, force: force - 0.02 * np.log(1.0 + t / 10.0), "force_drift", marks=ANOTHER_FAULT
+        ),
+        pytest.param(filtered, "force_lag", marks=ANOTHER_FAULT),
         (lambda t, force: force * (1.1 - 0.1 * force / 17.0), "force_nonlinearity"),
     ],
     ids=[

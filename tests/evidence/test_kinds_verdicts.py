@@ -117,7 +117,7 @@ def test_nothing_is_named_of_a_unit_without_weight():
 @pytest.mark.parametrize(
     "sets",
     [
-        2,
+        3,
         pytest.param(
             10,
             marks=pytest.mark.nightly(

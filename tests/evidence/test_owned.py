@@ -13,7 +13,7 @@ from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence.bench import experiment
 from tests.evidence.test_instruments import judged, noise
 
-CLOCK = np.arange(0.0, 300.0, 1.0)
+CLOCK = np.arange(0.0, 300.0, 2.0)
 
 
 def chambers(leaks, seed=0, again=1):
@@ -25,7 +25,7 @@ def chambers(leaks, seed=0, again=1):
             p, course = 50.0 + 2.0 * k, []
             for _ in CLOCK:
                 course.append(p)
-                for _ in range(100):
+                for _ in range(200):
                     p -= 0.01 * loss * p * (p + 202.65) / 202.65
             read = np.array(course) + noise(rng, 0.05, len(CLOCK))
             found.append(

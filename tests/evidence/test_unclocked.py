@@ -54,6 +54,9 @@ def test_outliers_of_a_curve_by_strain_are_a_remark(kind, many, rows, share):
     assert "at strain 0." in found.set_aside[0]
 
 
+OTHER_SETS = pytest.mark.nightly("test_readings_of_a_turned_unit_of_the_second_code")
+
+
 @pytest.mark.parametrize(
     ("faults", "noise", "kind"),
     [
@@ -66,7 +69,7 @@ def test_outliers_of_a_curve_by_strain_are_a_remark(kind, many, rows, share):
         ({"outside_cable": {"deg": 1.0}}, "quantised", "unexplained"),
     ],
 )
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", [0, 1, *(pytest.param(n, marks=OTHER_SETS) for n in range(2, 6))])
 def test_readings_of_a_turned_unit_of_the_second_code(faults, noise, kind, number):
     row = judged(Order("single", "unit_pose", faults, noise, 0.003, SEED + number))
     assert row["verdict"] == kind

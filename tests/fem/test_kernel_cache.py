@@ -73,14 +73,6 @@ def test_a_damaged_entry_is_made_anew(made, tmp_path, suffix, change):
     assert not entry.exists()
 
 
-def test_warp_makes_it_anew(made, tmp_path):
-    cache = shutil.copytree(made, tmp_path / "cache")
-    damage(cache, ".meta", lambda b: b"")
-    compiled(tmp_path, cache)
-    (entry,) = entries(next(cache.iterdir()))
-    assert is_whole(entry)
-
-
 @pytest.mark.parametrize("suffix", [".meta", ".o", ".cpp", "sha256.json"])
 @pytest.mark.parametrize("seed", range(10))
 def test_one_flipped_bit_is_found(made, tmp_path, suffix, seed):

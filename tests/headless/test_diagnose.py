@@ -8,7 +8,7 @@ import pytest
 from mu_addon.design.parameters import read_unit
 from tests.usecases.diagnosis_data import weighed_blocks
 
-from .processes import assert_clear_failure, here, run
+from .processes import assert_clear_failure, here
 
 REAL = Path(__file__).resolve().parents[1] / "data" / "real"
 
@@ -57,7 +57,7 @@ def test_homogenize_takes_the_model(overcured, tmp_path):
             out,
             *more,
         )
-        done = run("homogenize", *words)
+        done = here("homogenize", *words)
         assert (f"applied from {model}: " in done.stdout) == bool(more)
         assert done.returncode == 0, done.stderr
         stiff[name] = json.loads((out / "summary.json").read_text())["moduli_kPa"]["E100"]

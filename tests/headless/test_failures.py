@@ -143,13 +143,19 @@ def test_numbers_out_of_range(tmp_path, option, value):
     assert_clear_failure(done, 2, "what to do")
 
 
-def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
-    file, unit = tmp_path / "burst.csv", tmp_path / "unit.toml"
-    file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
+def three_chambers(folder):
+    """A unit's file."""
+    unit = folder / "unit.toml"
     unit.write_text("format = 1\n[chambers]\ncount = 3\n")
+    return unit
+
+
+def test_a_protocol_that_bursts_the_unit_keeps_the_states_before(tmp_path):
+    file, unit = tmp_path / "burst.csv", three_chambers(tmp_path)
+    file.write_text("time_s,pressure_kPa\n0,0\n1,1000\n")
     out = tmp_path / "out"
     job = Job(
-        read_unit(unit), read_protocol(file), MeshSettings(refine=0.5, order=1), times=21, stages=STAGES[:2]
+        read_unit(unit), read_protocol(file), MeshSettings(refine=0.3, order=1), times=21, stages=STAGES[:2]
     )
     write_study(job, out)
     done = here("resume", out)
@@ -168,7 +174,7 @@ def test_a_full_disk_is_told_and_leaves_no_half_file(tmp_path):
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 
-    done = run("design", "--preset", "mu-1.0x", "--out", out, preexec_fn=limit)
+    done = run("design", "--unit", three_chambers(tmp_path), "--out", out, preexec_fn=limit)
     assert_clear_failure(done, 5, "unit.stl", "cannot write", "what to do")
     assert not (out / "unit.stl").exists()
     assert not list(out.glob(".*"))
@@ -189,7 +195,8 @@ def test_an_unknown_path_is_refused_before_any_work(tmp_path):
 
 
 def test_json_messages_end_with_one_terminal_message(tmp_path):
-    good = run("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--json", "--no-report")
+    unit = three_chambers(tmp_path)
+    good = here("design", "--unit", unit, "--out", tmp_path / "out", "--json", "--no-report")
     messages = [json.loads(line) for line in good.stdout.splitlines()]
     assert {m["type"] for m in messages[:-1]} == {"plan", "progress"}
     assert messages[-1]["type"] == "result"

@@ -35,7 +35,7 @@ def finished(tmp_path_factory, with_light):
 
 def quick_in(folder, **changes):
     """Of linear elements: it shows as well that a run comes to the same digits by another way."""
-    return coarse(folder, **({"mesh": MeshSettings(refine=0.5, order=1), "mesh_check": False} | changes))
+    return coarse(folder, **({"mesh": MeshSettings(refine=0.35, order=1), "mesh_check": False} | changes))
 
 
 @pytest.fixture(scope="module")

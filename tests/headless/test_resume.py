@@ -15,7 +15,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
-from .processes import assert_clear_failure, command, run, worker_of
+from .processes import assert_clear_failure, command, here, run, worker_of
 
 UNIT = load_preset("mu-1.0x")
 JOB = Job(
@@ -29,7 +29,7 @@ JOB = Job(
 
 
 def resumed(folder):
-    done = run("resume", folder, "--no-report", "--workers", "1", "--json")
+    done = here("resume", folder, "--no-report", "--workers", "1", "--json")
     assert done.returncode == 0, done.stdout
     return json.loads(done.stdout.splitlines()[-1])["summary"]
 
@@ -97,4 +97,4 @@ def test_a_second_run_in_the_folder_is_refused_and_names_the_first(tmp_path):
 
 
 def test_a_folder_without_a_study_is_told(tmp_path):
-    assert_clear_failure(run("resume", tmp_path), 2, "this folder contains no study", "study.toml")
+    assert_clear_failure(here("resume", tmp_path), 2, "this folder contains no study", "study.toml")

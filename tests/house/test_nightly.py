@@ -9,11 +9,7 @@ def test_a_quick_test_guards_by_day_where_one_is_run_at_night():
     wrong = []
     for (file, name), (where, quick) in nightly.every().items():
         path = nightly.ROOT / where
-        names = {
-            node.name
-            for node in ast.parse(path.read_text(encoding="utf-8")).body
-            if isinstance(node, ast.FunctionDef)
-        }
+        names = {node.name for node in nightly.parsed(path).body if isinstance(node, ast.FunctionDef)}
         if quick not in names - nightly.wholly_marked(path):
             wrong.append(f"{file}::{name}: {where}::{quick} is no test that runs by default")
     assert wrong == []

@@ -56,7 +56,7 @@ def test_beams_bend_a_unit_as_solid_struts_do(mesh):
 
 def test_a_users_own_body_beyond_the_box_has_beams_in_all_of_it():
     box = trimesh.creation.box(bounds=[[-12.5, -12.5, 0.0], [12.5, 42.0, SMALL.printed.height]])
-    mesh = mesh_printed(SMALL, MeshSettings(refine=0.3), body=Body(box.vertices, box.faces))
+    mesh = mesh_printed(SMALL, MeshSettings(refine=0.2), body=Body(box.vertices, box.faces))
     assert (mesh.nodes[mesh.beams[:, 0], 1] > SMALL.printed.bounds[1][1]).any()
     lengths = np.linalg.norm(mesh.nodes[mesh.beams[:, 2]] - mesh.nodes[mesh.beams[:, 0]], axis=1)
     np.testing.assert_allclose(lengths, np.sqrt(3) / 2 * SMALL.printed.cell / Sizes().layers)

@@ -351,17 +351,21 @@ def test_options_that_mean_nothing(
     assert words in capsys.readouterr().err
 
 
-def test_escapes_in_a_file_are_spelt_out(tmp_path: Path) -> None:
+def test_escapes_in_a_file_are_spelt_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "unit.toml"
     path.write_text('format = 1\n"\\u001b]0;owned\\u0007" = 1\n')
-    run = [sys.executable, str(ASSETS.parent / "headless/run.py"), "design", "--unit", str(path)]
-    told = subprocess.run([*run, "--out", str(tmp_path / "o")], capture_output=True, check=False)
+    line = ["design", "--unit", str(path), "--out", str(tmp_path / "o")]
+    told = subprocess.run(
+        [sys.executable, str(ASSETS.parent / "headless/run.py"), *line], capture_output=True, check=False
+    )
     assert told.returncode == 2
     assert b"\x1b" not in told.stderr
     assert b"\\x1b" in told.stderr
-    told = subprocess.run([*run[:2], "design", "a\x1b[2J"], capture_output=True, check=False)
-    assert told.returncode == 2
-    assert b"\x1b" not in told.stderr
-    told = subprocess.run([*run, "--json", "--out", str(tmp_path / "o")], capture_output=True, check=False)
-    assert b"\x1b" not in told.stdout
-    assert "owned" in json.loads(told.stdout.splitlines()[-1])["what"]
+    with pytest.raises(SystemExit) as end:
+        main(["design", "a\x1b[2J"])
+    assert end.value.code == 2
+    assert "\x1b" not in capsys.readouterr().err
+    assert main([*line, "--json"]) == 2
+    said = capsys.readouterr().out
+    assert "\x1b" not in said
+    assert "owned" in json.loads(said.splitlines()[-1])["what"]

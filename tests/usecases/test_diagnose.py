@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -14,6 +15,7 @@ from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
+from mu_addon.evidence.drive import denoised_drives
 from mu_addon.evidence.effect import LIBRARY, Parameter
 from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
 from mu_addon.evidence.prediction.lattice_compression import LatticeStress
@@ -220,6 +222,24 @@ def test_a_unit_is_judged_by_its_angle_and_markers(request, tmp_path, gauge_kPa)
         if r["channel"] == "angle_deg" and r["role"] == "held_out"
     ]
     assert np.sqrt(np.mean(np.square(after))) == pytest.approx(gain["rmse_after"], rel=0.3)
+
+
+@pytest.mark.parametrize("gauge_kPa", [0.0, 0.02])
+def test_a_gauge_s_noise_is_averaged_out_and_remarked_on(tmp_path, gauge_kPa):
+    """Of what is predicted, which has noise as well, nothing is taken."""
+    measured = read_folder(bent_unit(tmp_path, {}, gauge_kPa=gauge_kPa))
+    freed, _ = denoised_drives(measured.experiments, analytic.simulator(measured.experiments))
+    remarks = diagnosing._noisy_gauges(measured, SimpleNamespace(experiments=freed))
+    assert [r.partition(" was averaged")[0] for r in remarks] == [
+        "the noise of pressure_kPa, up to 0.022,"
+    ] * (gauge_kPa > 0)
+    changed = {
+        c
+        for e, own in zip(measured.experiments, freed, strict=True)
+        for c in e.columns
+        if not np.array_equal(e[c], own[c])
+    }
+    assert changed == ({"pressure_kPa"} if gauge_kPa else set())
 
 
 @pytest.mark.parametrize(

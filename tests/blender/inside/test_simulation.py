@@ -169,7 +169,7 @@ def test_a_motion_from_start_to_stale(tmp_path):
     root.mu_unit.chambers.count = 2
     # Of its thirteen instants few have a pressure of their own.
     protocol = tmp_path / "both.csv"
-    rows = "0,0\n1.5,5\n3,5\n"
+    rows = "0,0\n0.25,5\n3,5\n"
     protocol.write_text(f"time_s,pressure_kPa\n{rows}")
     study = root.mu_unit.study
     study.command, study.refine, study.protocol = "simulate", 0.35, str(protocol)
