@@ -135,7 +135,7 @@ def test_a_recording_that_is_stopped_is_none_and_the_next_is_beside_it(tmp_path)
         threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
         record.USE_CASE.start(job, tmp_path / "run", context)
     assert context.status == 143
-    assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "partial"
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "cancelled"
     assert (tmp_path / "run" / "recording-1" / "index.ndjson").is_file()
     with run_to_end(Progress([])) as context:
         record.USE_CASE.start(record.Job(simulated=True, seconds=0.3), tmp_path / "other", context)
