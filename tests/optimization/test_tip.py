@@ -27,17 +27,17 @@ FREE = [
 ]
 LEVEL = NamedEffects({"gravity": {"density_kg_m3": 1010.0}}, 90.0)
 WITHOUT_WEIGHT = [
-    TipForce("touching", 8.0),
-    TipForce("farther", 8.0, 0.2),
-    TipPosition("aside", 8.0),
+    TipForce("touching", 2.5),
+    TipForce("farther", 2.5, 0.2),
+    TipPosition("aside", 2.5),
     TipPosition("along", -4.0, "z"),
-    Workspace("path", (-4.0, 8.0)),
+    Workspace("path", (-4.0, 2.5)),
 ]
 WITH_WEIGHT = [
     Angle("at rest", 0.0),
     TipPosition("at rest, aside", 0.0),
-    TipForce("force", 8.0, 0.2),
-    Workspace("path", (8.0,)),
+    TipForce("force", 2.5, 0.2),
+    Workspace("path", (2.5,)),
 ]
 
 
@@ -93,7 +93,7 @@ def test_a_larger_unit_presses_with_the_square_of_its_size():
 def test_the_tip_force_is_that_which_a_blocked_force_is_predicted_by():
     values = solved(level=False)[3]
     held = Body(UNIT, COARSE, gap_mm=0.0)
-    reading = run(Run(held, (0.0, 8.0), (), "", 0.0, False)).values[0]
+    reading = run(Run(held, (0.0, 2.5), (), "", 0.0, False)).values[0]
     assert reading[0] == pytest.approx(0.0, abs=1e-9)
     assert values["touching"] == pytest.approx(reading[1], rel=1e-6)
 
@@ -101,7 +101,7 @@ def test_the_tip_force_is_that_which_a_blocked_force_is_predicted_by():
 @pytest.mark.slow
 def test_a_wall_farther_away_is_pressed_less():
     body, _, _, values = solved(level=False)
-    asked = TipForce("force", 8.0, 2.0)
+    asked = TipForce("force", 2.5, 2.0)
     states, _ = solve(body.structure, asked.conditions)
     # Out of reach it would have to be pulled.
     assert values["touching"] > values["farther"] > 0.0 > asked.value(body.structure, states)
@@ -110,8 +110,8 @@ def test_a_wall_farther_away_is_pressed_less():
 @pytest.mark.slow
 def test_the_path_to_one_place_is_the_way_there():
     body, _, _, _ = solved(level=False)
-    places = [TipPosition(axis, 8.0, axis) for axis in "yz"]
-    path = Workspace("path", (8.0,))
+    places = [TipPosition(axis, 2.5, axis) for axis in "yz"]
+    path = Workspace("path", (2.5,))
     states, _ = solve(body.structure, path.conditions)
     rest = [TipPosition(axis, 0.0, axis).value(body.structure, states) for axis in "yz"]
     way = np.hypot(*(p.value(body.structure, states) - r for p, r in zip(places, rest, strict=True)))
