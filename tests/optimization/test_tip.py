@@ -50,18 +50,9 @@ def solved(level):
     return body, asked, states, {q.name: q.value(body.structure, states) for q in asked}
 
 
-ALL_FREEDOMS = pytest.mark.nightly("test_slopes_are_those_of_full_solutions_on_morphed_meshes")
-
-
-@pytest.mark.slow
+@pytest.mark.nightly("test_a_larger_unit_presses_with_the_square_of_its_size")
 @pytest.mark.parametrize(
-    ("level", "free"),
-    [
-        (True, FREE[:1]),
-        pytest.param(True, FREE[1:], marks=ALL_FREEDOMS),
-        pytest.param(False, FREE, marks=ALL_FREEDOMS),
-    ],
-    ids=["wall with weight", "moduli and scale with weight", "without weight"],
+    ("level", "free"), [(True, FREE), (False, FREE)], ids=["with weight", "without weight"]
 )
 def test_slopes_are_those_of_full_solutions_on_morphed_meshes(level, free):
     body, asked, states, values = solved(level)
