@@ -51,7 +51,8 @@ def job(tmp_path):
     """Of three chambers, which bend half as far as six."""
     (tmp_path / "unit.toml").write_text(to_toml(load_preset("mu-1.0x").evolve(count=3)))
     file = tmp_path / "design.toml"
-    file.write_text(TEXT.replace('preset = "mu-1.0x"', 'unit = "unit.toml"').replace("low = 1.2", "low = 0.6"))
+    own = TEXT.replace('preset = "mu-1.0x"', 'unit = "unit.toml"').replace("low = 1.2", "low = 0.6")
+    file.write_text(own)
     return job_from(file)
 
 
