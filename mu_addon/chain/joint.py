@@ -232,6 +232,13 @@ def fitted(states: Sequence[PlateState], free: PlateState, size: Array) -> dict[
         ridge = _RIDGE * np.linalg.norm(matrix) / np.sqrt(matrix.shape[1])
         held = np.vstack([matrix, ridge * np.eye(matrix.shape[1])])
         found[quadratic:] = np.linalg.lstsq(held, np.concatenate([left, np.zeros(matrix.shape[1])]), None)[0]
+        # Slopes too: states along the axes alone leave products of two variables to rounding.
         moved: Array = np.array([state.centre for state in every]) - free.centre - y @ slope_.T
-        bend = np.linalg.lstsq(products(y, EXPONENTS[:quadratic]), moved, 1e-6)[0].T
+        turned: Array = np.array([state.centre_slope * size for state in every]) - slope_
+        of_slopes = gradient_rows(y)[:, :, :quadratic].reshape(-1, quadratic)
+        bend = np.linalg.lstsq(
+            np.vstack([products(y, EXPONENTS[:quadratic]), of_slopes]),
+            np.vstack([moved, turned.transpose(0, 2, 1).reshape(-1, 3)]),
+            1e-6,
+        )[0].T
     return {"coefficients": found, "centre": free.centre, "centre_slope": slope_, "centre_bend": bend}
