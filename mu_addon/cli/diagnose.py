@@ -30,6 +30,12 @@ def add_diagnose(commands: Commands[Any]) -> None:
         help="Extended model of an earlier diagnosis, its model.toml. Its effects stay in the model; new "
         "causes are added.",
     )
+    command.add_argument(
+        "--unknown",
+        metavar="FILE",
+        help="TOML file with [[freedom]] tables, as of `optimize`: parameters of the unit's design that "
+        "nobody measured, with bounds. They are fitted beside every cause, and shapes.csv says which fit.",
+    )
     add_report(command)
 
 
@@ -37,13 +43,19 @@ def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
     """Diagnose the folder."""
     from ..evidence.extended import load_model
     from ..measured import read_folder
-    from ..usecases.diagnose.job import Job
+    from ..usecases.diagnose.job import Job, unit_behind
     from ..usecases.diagnose.run import USE_CASE
 
     unit = unit_if_named(options)
     known = load_model(Path(options.model)) if options.model else None
     measured = read_folder(Path(options.folder))
-    job = Job(measured, unit, known=known, self_contact=options.self_contact)
+    behind = unit_behind(measured.experiments, unit)
+    unknown = None
+    if options.unknown and behind:
+        from ..usecases.diagnose.unknown import unknown_of
+
+        unknown = unknown_of(Path(options.unknown), behind)
+    job = Job(measured, unit, known=known, self_contact=options.self_contact, unknown=unknown)
     USE_CASE.start(job, Path(options.out), context)
 
 

@@ -23,6 +23,7 @@ from ..resolved.printed_mesh import mesh_of
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
+from .drawn import Designs, Surface, require_enough
 from .effect import Parameter
 from .markers import Marker, attached
 from .prediction import blocked_force, pressure_step, unit_pose
@@ -82,7 +83,9 @@ class UnitSettings:
     names of those to run; whole: those run at every size, None for all; the others are run and trusted at
     `UnitEffect.first` alone. distal: chambers behind a clog. lattice: a law for the lattice in place of the
     unit's moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
-    `UnitResponse`. self_contact: of walls and struts of a resolved unit. workers: processes, one a core.
+    `UnitResponse`. self_contact: of walls and struts of a resolved unit. designs: units that differ in what
+    nobody measured, which is then fitted beside every hypothesis, None without any. workers: processes, one a
+    core.
     """
 
     mesh: MeshSettings = COARSE
@@ -97,6 +100,7 @@ class UnitSettings:
     farthest_mm: float = 4.0
     discrepancy: float = DISCREPANCY
     self_contact: bool = False
+    designs: Designs | None = None
     workers: int = attrs.field(factory=cores)
 
     @classmethod
@@ -291,8 +295,8 @@ def similar(unit: Unit) -> Unit:
 class _Plan:
     """Runs for one scale: `body`, similar to the unit, which is `enlarged` times as large.
 
-    changes: the mesh of effects and walls. whole: effects at every size (`UnitSettings`). readings_kPa: the
-    least and the greatest.
+    changes: the mesh of effects, walls and designs. whole: effects at every size (`UnitSettings`).
+    readings_kPa: the least and the greatest.
     """
 
     body: Body
@@ -305,6 +309,7 @@ class _Plan:
     readings_kPa: tuple[float, float]
     markers: tuple[Marker, ...]
     channels: tuple[str, ...]
+    designs: Designs | None = None
 
     @classmethod
     def of(
@@ -347,6 +352,7 @@ class _Plan:
             (float(readings.min()), float(readings.max())),
             markers,
             tuple(c for c in known if c in measured),
+            None if gap is not None else settings.designs,
         )
 
     @property
@@ -378,10 +384,40 @@ class _Plan:
         """The run of the base model."""
         return attrs.evolve(self.case(), body=self.body)
 
+    def of_designs(self) -> list[Run]:
+        """A run of every design, on the mesh of changes, at this scale."""
+        case, cases = self.case(), []
+        for unit in self.designs.units if self.designs else ():
+            drawn = similar(attrs.evolve(unit, scale=self.scale))
+            other = attrs.evolve(case, body=attrs.evolve(case.body, unit=drawn), outline=False)
+            cases.append(case if drawn == case.body.unit else other)
+        return cases
+
+    def surface(self, found: dict[str, Result], kept: Any) -> Surface | None:
+        """The response over the designs; those that do not reach a pressure are left out with a warning."""
+        if self.designs is None:
+            return None
+        base, reference = self.base(found), self.reference(found)
+        at, values = [], []
+        for place, case in zip(self.designs.at, self.of_designs(), strict=True):
+            result = self._unit(found[case.key()])
+            changed = self._taken_over(result, base, reference)
+            if np.isfinite(changed.values[kept]).all():
+                at.append(place)
+                values.append((self.larger * changed.values)[kept])
+            else:
+                shape = ", ".join(
+                    f"{p.name} {v:g}" for p, v in zip(self.designs.parameters, place, strict=True)
+                )
+                _warn(f"{shape} at {self.scale:g}x is left out: {result.why}")
+        require_enough(len(at), len(self.designs.parameters))
+        return Surface(self.designs.parameters, np.array(at), np.array(values))
+
     def runs(self, settings: UnitSettings) -> Iterator[Run]:
         """First the runs that runs of effects start from, then the longest."""
         yield self.case()
         yield self.base_case
+        yield from self.of_designs()
         for name in sorted(set(self.names(settings)), key=lambda n: (n != MESH_ERROR, n)):
             effect = effect_of(name)
             for orientation in self.orientations if effect.has_gravity else ((0.0, X),):
@@ -496,14 +532,15 @@ class _Plan:
             variants = {n: v for n, v in every.items() if v is not None}
             at = np.array(self.pressures_kPa)[reached]
             values_ = (self.larger * base.values)[kept]
+            surface = self.surface(found, kept)
             if self.changes:
                 way = values_ - (self.larger * reference.values)[kept]
-                at, values_, way, variants = _with_midpoints(at, values_, way, variants)
+                at, values_, way, variants, surface = _with_midpoints(at, values_, way, variants, surface)
                 variants |= self._mesh_errors(at, values_, way)
             turn, axis = orientation
             gap = (self.body.gap_mm or 0.0) * self.enlarged
             how = (self.scale, turn, axis, walls, settings.discrepancy, gap)
-            yield UnitResponse(self.channels, at, values_, variants, *how)
+            yield UnitResponse(self.channels, at, values_, variants, *how, surface)
 
     def _variant(
         self,
@@ -594,8 +631,8 @@ class _Plan:
 
 
 def _with_midpoints(
-    at: Array, base: Array, way: Array, variants: dict[str, Variant]
-) -> tuple[Array, Array, Array, dict[str, Variant]]:
+    at: Array, base: Array, way: Array, variants: dict[str, Variant], surface: Surface | None
+) -> tuple[Array, Array, Array, dict[str, Variant], Surface | None]:
     """Pressures (k,) in kPa with those midway in suction, and the rest of a response at these.
 
     There walls and struts touch one after the other, at pressures that differ between meshes by less than the
@@ -610,7 +647,9 @@ def _with_midpoints(
         return np.asarray(CubicSpline(at, values, axis=-1)(more))
 
     finer = {n: attrs.evolve(v, values=between(v.values)) for n, v in variants.items()}
-    return more, between(base), between(way), finer
+    if surface:
+        surface = attrs.evolve(surface, values=between(surface.values))
+    return more, between(base), between(way), finer, surface
 
 
 def _warn(text: str) -> None:

@@ -314,6 +314,12 @@ def _unit(document: Mapping[str, Any], origin: str, folder: Path) -> Unit:
     return read_unit(folder / _word(document, "unit", "", origin))
 
 
+def freedoms_in(document: Mapping[str, Any], text: str, origin: str, unit: Unit) -> list[Freedom]:
+    """The freedoms of a document's [[freedom]] tables; text: the document's, for lines. Raises InputError."""
+    tables = _tables(document, "freedom", origin)
+    return read_freedoms(tables, _places(text, "freedom", origin, len(tables)), unit)
+
+
 def _tables(document: Mapping[str, Any], key: str, origin: str) -> list[dict[str, Any]]:
     found = document.get(key, [])
     if not isinstance(found, list) or not all(isinstance(table, dict) for table in found):

@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import Direction, X, down
+from ..drawn import Surface
 from ..effect import Effect, Parameter
 from .camera import camera_effects, read_by_camera
 from .drift import drift, drifts, largest_reading, zeroed
@@ -75,8 +76,9 @@ class UnitResponse:
     of their effect. orientation_deg, orientation_axis: see `unit_pose.down`. walls: by their side of the
     unit, 1 for +y and -1 for -y. Interpolated by cubic splines, and linearly beyond the last pressures.
     discrepancy: standard deviation between codes of the same physics, as a smooth change of the pressure over
-    the largest one; 0 if the response is exact. gap_mm: of the load cell that holds the tip, if any. Raises
-    InputError for fewer than four pressures and for shapes that do not match.
+    the largest one; 0 if the response is exact. gap_mm: of the load cell that holds the tip, if any. drawn:
+    the response of units of another design; what an effect changes then grows as each channel's range does.
+    Raises InputError for fewer than four pressures and for shapes that do not match.
     """
 
     channels: tuple[str, ...]
@@ -89,6 +91,7 @@ class UnitResponse:
     walls: Mapping[int, ObstacleResponse] = attrs.field(factory=dict)
     discrepancy: float = 0.0
     gap_mm: float = 0.0
+    drawn: Surface | None = None
     _splines: Mapping[str, Any] = attrs.field(init=False, repr=False)
     _curves: dict[Any, Any] = attrs.field(init=False, repr=False, factory=dict)
 
@@ -118,7 +121,8 @@ class UnitResponse:
         """
         known = self.variants
         curve = self._curve(
-            tuple((n, v) for n, v in sizes.items() if n in known and v != known[n].parameter.null)
+            tuple((n, v) for n, v in sizes.items() if n in known and v != known[n].parameter.null),
+            tuple((p.name, sizes[p.name]) for p in self.of_design if p.name in sizes),
         )
         low, high = self.pressures_kPa[0], self.pressures_kPa[-1]
         within = low <= pressure_kPa.min() and pressure_kPa.max() <= high
@@ -133,23 +137,36 @@ class UnitResponse:
         side = self.walls.get(int(np.sign(sizes.get(CONTACT, 0.0))))
         return found if side is None else found + side.change(pressure_kPa, abs(sizes[CONTACT]))
 
+    @property
+    def of_design(self) -> tuple[Parameter, ...]:
+        """Parameters of the unit's design that may be fitted."""
+        return self.drawn.parameters if self.drawn else ()
+
     @cached_property
     def rest(self) -> Array:
         """Channels (c,) in their units without pressure and effects."""
         return self.at(np.zeros(1), {})[:, 0]
 
-    def _curve(self, sizes: tuple[tuple[str, float], ...]) -> Any:
-        """Response over pressure with variants of given sizes, cached as many experiments use the same."""
-        from scipy.interpolate import PPoly
+    def _curve(self, sizes: tuple[tuple[str, float], ...], design: tuple[tuple[str, float], ...] = ()) -> Any:
+        """Response over pressure with variants of given sizes, cached as many experiments use the same.
 
-        if sizes not in self._curves:
+        design: values by name of `of_design`.
+        """
+        from scipy.interpolate import CubicSpline, PPoly
+
+        key = sizes, design
+        if key not in self._curves:
             if len(self._curves) >= REMEMBERED:
                 self._curves.clear()
-            c = self._splines[""]
+            c, grown = self._splines[""], 1.0
+            values = self.drawn.of(dict(design)) if self.drawn and design else None
+            if values is not None:
+                c = CubicSpline(self.pressures_kPa, values, axis=1).c
+                grown = np.ptp(values, axis=1) / np.maximum(np.ptp(self.values, axis=1), np.finfo(float).tiny)
             for name, size in sizes:
-                c = c + self._splines[name](size)
-            self._curves[sizes] = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
-        return self._curves[sizes]
+                c = c + grown * self._splines[name](size)
+            self._curves[key] = PPoly.construct_fast(c, self.pressures_kPa, extrapolate=True, axis=0)
+        return self._curves[key]
 
 
 @attrs.frozen
@@ -189,7 +206,7 @@ MODULUS = Parameter("modulus_factor", "", 0.2, 5.0, 1.0, (1.0,), "batches of res
 def nuisances(channels: Sequence[str]) -> tuple[Parameter, ...]:
     """Parameters free in every fit of a unit: modulus factor, and each channel's zero in its unit."""
     zeros = [
-        Parameter(_zero(c), c.rpartition("_")[2], -most, most, 0.0, source=f"set by the {by}", linear=True)
+        Parameter(zero_of(c), c.rpartition("_")[2], -most, most, 0.0, source=f"set by the {by}", linear=True)
         for c in channels
         for most, by in [(1e6, "syringe") if c.startswith("volume") else (1e3, "camera")]
     ]
@@ -233,7 +250,8 @@ def discrepancies(spread: float) -> tuple[Parameter, ...]:
     )
 
 
-def _zero(channel: str) -> str:
+def zero_of(channel: str) -> str:
+    """Name of a channel's zero among the nuisances."""
     head, _, unit = channel.rpartition("_")
     return f"{head}_zero_{unit}"
 
@@ -357,7 +375,7 @@ class UnitPressure:
         self._responses = tuple(responses)
         self._past = pressure_histories(experiments)
         self._nearest: dict[tuple[float, float, Direction], UnitResponse] = {}
-        self._zeros = {r.channels: tuple(map(_zero, r.channels)) for r in self._responses}
+        self._zeros = {r.channels: tuple(map(zero_of, r.channels)) for r in self._responses}
         self.channels_known = self._responses[0].channels
         self.nuisances = (
             *believed(
@@ -372,7 +390,9 @@ class UnitPressure:
                 p = v.parameter
                 known[name] = known[name].narrowed(p.low, p.high) if name in known else p
         errors = {name: p for name, p in known.items() if math.isfinite(p.spread)}
-        self.nuisances = (*self.nuisances, *errors.values())
+        self.surfaces = tuple(r.drawn for r in self._responses if r.drawn)
+        of_design = {p.name: p for r in self._responses for p in r.of_design}
+        self.nuisances = (*self.nuisances, *errors.values(), *of_design.values())
         static = {name: Effect(name, (p,), (self.kind,)) for name, p in known.items() if name not in errors}
         walls = [wall for r in self._responses for wall in r.walls.items()]
         if walls:
@@ -393,7 +413,8 @@ class UnitPressure:
             *camera,
             *slips,
         )
-        self._sizes = {e.name: e.keys[0] for e in static.values()} | {n: p.name for n, p in errors.items()}
+        own = {n: p.name for n, p in errors.items()} | {name: name for name in of_design}
+        self._sizes = {e.name: e.keys[0] for e in static.values()} | own
         after = (e.name for e in (*camera, *slips))
         self._after = (*after, *self._sizes.values(), *self._zeros[self.channels_known], *DISCREPANCIES)
         self._effective: dict[Any, tuple[Experiment, Array]] = {}

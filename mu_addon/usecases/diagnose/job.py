@@ -24,14 +24,16 @@ from ...toml_writer import toml_text
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
+    from .unknown import Unknown
 
 UNIT = "unit.toml"
 KNOWN = "known.toml"
+UNKNOWN, SHAPES = "unknown.toml", "shapes.csv"
 LAYOUT = FolderLayout(
     "diagnose.toml",
     "# The inputs of this diagnosis; the measured data are named by the SHA-256 of their files.",
-    results=("verdict.json", "model.toml", "residuals.csv", "report.html"),
-    optional=(UNIT, KNOWN),
+    results=("verdict.json", "model.toml", "residuals.csv", "report.html", SHAPES),
+    optional=(UNIT, KNOWN, UNKNOWN),
 )
 
 
@@ -42,7 +44,7 @@ class Job:
     unit: of unit_pressure experiments and of blocks with counted cells, at any scale; by default the preset
     `PRESET`. self_contact: of its walls and struts. settings: of the simulation, in place of the printed
     body's. known: result of an earlier diagnosis, or None: its effects are in the model from the start and
-    stay; moduli and zeros are fitted again.
+    stay; moduli and zeros are fitted again. unknown: parameters of the unit's design to fit, too.
     """
 
     measured: Measured
@@ -50,8 +52,15 @@ class Job:
     settings: UnitSettings | None = None
     known: ExtendedModel | None = None
     self_contact: bool = SELF_CONTACT.field()
+    unknown: Unknown | None = None
 
     def __attrs_post_init__(self) -> None:
+        if self.unknown and not bends(self.measured.experiments):
+            raise InputError(
+                "no experiment bends a unit, whose parameters could be unknown",
+                str(self.measured.folder / FILE),
+                "leave --unknown out",
+            )
         if not any(e.role == "fit" for e in self.measured.experiments):
             raise InputError(
                 "every experiment is held out",
@@ -77,7 +86,10 @@ class Job:
     @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation."""
-        return unit_settings_of(self)
+        settings, subject = unit_settings_of(self), self.subject
+        if self.unknown is None or subject is None or settings.designs:
+            return settings
+        return attrs.evolve(settings, designs=self.unknown.designs(subject))
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; diagnose.toml is the first."""
@@ -93,6 +105,8 @@ class Job:
         texts = {LAYOUT.inputs: toml_text(values, LAYOUT.header)}
         if self.known is not None:
             texts[KNOWN] = self.known.text()
+        if self.unknown is not None:
+            texts[UNKNOWN] = self.unknown.text
         return texts if self.subject is None else texts | {UNIT: to_toml(self.subject)}
 
 
@@ -104,12 +118,16 @@ def read_job(folder: Path) -> Job:
         raise InputError("this run was made with settings given in Python", str(path), "run it there again")
     measured = read_folder(named_path(path, run, "data", "folder of measured data"))
     require_same_data(measured, values.get("data"), described(measured))
-    unit, known = folder / UNIT, folder / KNOWN
+    known, unknown = folder / KNOWN, folder / UNKNOWN
+    unit = read_unit(folder / UNIT) if (folder / UNIT).is_file() else None
+    if unknown.is_file():
+        from .unknown import unknown_of
     return Job(
         measured,
-        read_unit(unit) if unit.is_file() else None,
+        unit,
         **self_contact_in(values),
         known=load_model(known) if known.is_file() else None,
+        unknown=unknown_of(unknown, unit or load_preset(PRESET)) if unknown.is_file() else None,
     )
 
 

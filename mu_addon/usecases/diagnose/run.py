@@ -30,10 +30,11 @@ from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .job import LAYOUT, Job, bends, read_job
+from .job import LAYOUT, SHAPES, UNKNOWN, Job, bends, read_job
 from .judged_data import JudgedData, curves
 from .report import write_report
-from .simulators import BASE, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
+from .simulators import BASE, DESIGNS, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
+from .unknown import ROUNDS, Shapes, Unknown, leading, shapes
 from .words import advice, readable, sentence, to_do
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def _kept(folder: Path, inputs: Mapping[str, str]) -> dict[str, Any]:
         found = parse_json(file_bytes(folder / "summary.json"), "summary.json")
     except (OSError, InputError):
         return {}
-    whole = all((folder / name).is_file() for name in LAYOUT.results)
+    whole = all((folder / name).is_file() for name in LAYOUT.results if name != SHAPES or UNKNOWN in inputs)
     if not (
         same_inputs(folder, inputs)
         and whole
@@ -88,6 +89,10 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
     if first:
         context.summary["first_look"] = first
     settings: UnitSettings | None = job.unit_settings
+    fits = None
+    if job.unknown is not None and settings is not None:
+        settings, fits = _shapes(job, job.unknown, settings, folder, progress)
+        context.summary["unknown"] = fits.as_json()
     stage = EFFECTS
     while settings is not None:
         simulators, notes = simulators_of(
@@ -115,6 +120,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         f"{titles} could not be computed, and was not compared: {why}"
         for titles, why in verdict.refused.items()
     ]
+    notes += [fits.words()] if fits else []
     remarks = [*(f"{r.what} ({_place(r.where)})" for r in measured.remarks), *notes]
     unknown = dict.fromkeys(e.kind for e in measured.experiments if not simulator.knows(e))
     remarks += [f"there is no model for {kind}: its experiments were left out" for kind in unknown]
@@ -141,7 +147,7 @@ def _first_look(
     experiments = [e for e in job.measured.experiments if e.kind in OF_A_UNIT and e.kind not in LATER]
     if not any(e.role == "fit" for e in experiments):
         return None
-    settings = attrs.evolve(job.unit_settings, effects=())
+    settings = attrs.evolve(job.unit_settings, effects=(), designs=None)
     simulators, _ = simulators_of(experiments, job.subject, folder / "cache", progress, settings)
     simulator = Composite(simulators, known=known)
     with _stages(progress) as on_model:
@@ -150,6 +156,30 @@ def _first_look(
     with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
         pass
     return {"verdict": verdict.kind, "headline": headline, "sentence": words}
+
+
+def _shapes(
+    job: Job, unknown: Unknown, settings: UnitSettings, folder: Path, progress: Progress
+) -> tuple[UnitSettings, Shapes]:
+    """What the data say about unknown parameters without effects, and settings with every design simulated.
+
+    Where the surface between designs fits best, units are simulated and it is laid anew. Writes shapes.csv.
+    """
+    unit = job.subject
+    assert unit is not None
+    experiments = [e for e in job.measured.experiments if e.kind in OF_A_UNIT and e.kind not in LATER]
+    for round_ in range(ROUNDS + 1):
+        assert settings.designs is not None
+        alone = attrs.evolve(settings, effects=())
+        simulators, _ = simulators_of(experiments, unit, folder / "cache", progress, alone, DESIGNS)
+        surfaces = [s for simulator in simulators.values() for s in getattr(simulator, "surfaces", ())]
+        found = shapes(unknown, settings.designs, surfaces, Composite(simulators), experiments)
+        more = leading(found, unknown, settings.designs, unit)
+        if more is None or round_ == ROUNDS:
+            break
+        settings = attrs.evolve(settings, designs=more)
+    found.write(folder / SHAPES)
+    return settings, found
 
 
 def with_reference(model: ExtendedModel, simulators: Mapping[str, Simulator]) -> ExtendedModel:
@@ -292,6 +322,7 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     lines = [f"verdict: {summary['verdict']}: {summary['headline']}"]
     lines += [f"what to do: {summary['to_do']}"] if summary.get("to_do") else []
     lines.append(summary["sentence"])
+    lines += [f"shape: {summary['unknown']['words']}"] if "unknown" in summary else []
     for name, words in (("fit", "fitted data"), ("held_out", "held-out data")):
         errors = summary["gain"][name]
         if errors and summary["causes"]:
@@ -317,7 +348,7 @@ def plan_of(job: Job) -> Plan:
     ]
 
 
-KEPT = ("lattice", BASE, EFFECTS, SIZES)
+KEPT = ("lattice", BASE, DESIGNS, EFFECTS, SIZES)
 USE_CASE = UseCase(
     "diagnose", LAYOUT, read_job, diagnose_data, console_summary, begin_diagnosis, plan=plan_of, kept=KEPT
 )

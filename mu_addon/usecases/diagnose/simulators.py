@@ -27,6 +27,8 @@ BY_CHAMBERS = 1.6
 """Power of their number by which a printed unit's seconds grow: measured with three and six."""
 BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
 """Stages of a unit's simulation: without effects, at each effect's first sizes, at the others."""
+DESIGNS, DESIGN_S = "unit of every design", 50.0
+"""Stage of units with other values of unknown parameters, and the seconds of one of them."""
 SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
 """Shares of the seconds; the last stage is left out where no effect is in question."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
@@ -57,6 +59,8 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, set
         with suppress(InputError):
             lattice = [("lattice", 0.2 + LATTICE_S * to_compute(experiments, behind))]
     free = [(BASE, unit)] if kinds & set(FREE) else []
+    if settings.designs:
+        free.append((DESIGNS, DESIGN_S * len(settings.designs.units)))
     return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
 
 
