@@ -17,12 +17,13 @@ import json
 from pathlib import Path
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.design.settings import PRESET
 from mu_addon.evidence.unit_fem import KNOWN, UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.diagnose.job import PRESET, Job
+from mu_addon.usecases.diagnose.job import Job
 from mu_addon.usecases.diagnose.run import USE_CASE
 from mu_addon.usecases.diagnose.unknown import unknown_of
 
