@@ -49,11 +49,14 @@ def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
     unit = unit_if_named(options)
     known = load_model(Path(options.model)) if options.model else None
     measured = read_folder(Path(options.folder))
-    behind = unit_behind(measured.experiments, unit)
     unknown = None
-    if options.unknown and behind:
+    if options.unknown:
+        from ..design.parameters import load_preset
+        from ..design.settings import PRESET
         from ..usecases.diagnose.unknown import unknown_of
 
+        # Where no experiment is of a unit, the job refuses it.
+        behind = unit_behind(measured.experiments, unit) or load_preset(PRESET)
         unknown = unknown_of(Path(options.unknown), behind)
     job = Job(measured, unit, known=known, self_contact=options.self_contact, unknown=unknown)
     USE_CASE.start(job, Path(options.out), context)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mu_addon.design.assets import asset_root
 from mu_addon.design.parameters import read_unit
 from tests.usecases.diagnosis_data import weighed_blocks
 
@@ -89,6 +90,13 @@ def test_bad_data_are_named_by_file_and_row(tmp_path):
     done = here("diagnose", folder, "--out", tmp_path / "out")
     assert_clear_failure(done, 2, "block_1.csv", "row 3", "much")
     assert not (tmp_path / "out").exists()
+
+
+def test_unknown_dimensions_of_a_unit_need_experiments_on_one(tmp_path):
+    examples = asset_root() / "examples"
+    unknown = examples / "paper-bending" / "unknown.toml"
+    done = here("diagnose", examples / "paper-moduli", "--unknown", unknown, "--out", tmp_path / "out")
+    assert_clear_failure(done, 2, "no experiment bends a unit", "leave --unknown out")
 
 
 def test_no_folder_is_named(tmp_path):
