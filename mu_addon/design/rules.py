@@ -205,7 +205,7 @@ def _wall(d: Dimensions) -> None:
         of = f", {factor:g} times wall_mm in its thickest chamber," if factor > 1.0 else ""
         _refuse(
             rule,
-            f"a wall of {d.thickest_wall / s:g} mm{of} is too thick: {why} from {limit / s:.4g} mm on",
+            f"a wall of {d.thickest_wall / s:g} mm{of} is too thick: {why}",
             "[chambers] wall_mm",
             f"the largest wall that fits is {_below(fits / s / factor):g} mm",
         )

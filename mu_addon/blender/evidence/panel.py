@@ -8,7 +8,7 @@ import bpy
 
 from ...design.printing.finding import counted
 from ..import_data.importing import draw_import
-from ..jobs.panel import job_state, start_button
+from ..jobs.panel import job_state, start_button, timed_if_measured
 from ..shared.panels import alert, wrapped
 from ..shared.wording import in_panel, readable
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel
@@ -48,7 +48,7 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
             return
         _experiments(layout, context, root, found.measured)
         child = evidence.DIAGNOSIS.child(root)
-        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM")
+        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM", text=start_words(root, "Diagnose"))
         job_state(layout, child, "see below", JOB)
         judged = evidence.diagnosis(root)
         if judged is None or not judged.name:
@@ -57,6 +57,11 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
             )
             return
         _verdict(layout, root, judged)
+
+
+def start_words(root, name: str) -> str:
+    """Label of the button that starts the diagnosis, with what it takes once measured on this machine."""
+    return timed_if_measured(name, evidence.announced(root))
 
 
 def _experiments(layout, context, root, measured):

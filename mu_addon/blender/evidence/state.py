@@ -23,7 +23,7 @@ from ..jobs.start_child import JobKind
 from ..shared.file_cache import FileCache
 from ..shared.registration import property_group_factory
 from ..shared.wording import error_text
-from ..simulate import effects
+from ..simulate import effects, timings
 from ..simulate import study_folder as studies
 from ..unit.properties import BESIDE_BLEND_FILE, shape_hash, to_unit
 
@@ -89,7 +89,27 @@ def folder_of(root: Any) -> Path:
     return studies.folder_of(root) / FOLDER
 
 
+def _detail(data: dict[str, Any]) -> str:
+    """Detail of a diagnosis: the kinds of its experiments, which decide what is simulated."""
+    return f"diagnose {' '.join(sorted(kind for kind, *_ in data.values()))}"
+
+
+def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
+    """Detail of a finished diagnosis, and the seconds of its stages."""
+    data = parse_toml(file_text(folder / "diagnose.toml"), "diagnose.toml")["data"]
+    return _detail(data), parse_json(file_bytes(folder / "summary.json"), "summary.json")["seconds"]
+
+
+def announced(root: Any) -> float | None:
+    """Expected seconds of a diagnosis, as one of such data took on this machine; None before the first."""
+    found = measured_data(root)
+    if found is None or found.measured is None:
+        return None
+    return timings.announced(_detail(found.digest["data"]))
+
+
 DIAGNOSIS = JobKind(FOLDER, lambda root: root.mu_unit.uuid, folder_of, "diagnosis", heavy=True)
+timings.READERS[DIAGNOSIS.name] = _timed
 
 _data: FileCache[MeasuredFolder] = FileCache()
 _runs: FileCache[tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] = FileCache()

@@ -40,6 +40,11 @@ def timed(name: str, announced: tuple[float, bool]) -> str:
     return f"{name}, {'about' if measured else 'perhaps'} {rounded(seconds)}"
 
 
+def timed_if_measured(name: str, seconds: float | None) -> str:
+    """Label of a button with its job's expected seconds if they were measured on this machine."""
+    return name if seconds is None else timed(name, (seconds, True))
+
+
 def job_state(layout, child, where: str, prefix: str = "") -> None:
     """Draw the progress and the end of a job's child; nothing without a child.
 

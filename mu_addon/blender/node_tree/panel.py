@@ -50,7 +50,8 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
         column = layout.column()
         column.use_property_split = True
         column.prop(tree, "mu_folder")
-        column.prop(tree, "mu_reports")
+        # The name needs the whole width.
+        layout.prop(tree, "mu_reports")
         row = layout.row(align=True)
         row.operator("mu.tree_save", text="Save", icon="EXPORT")
         row.operator("mu.tree_load", text="Open", icon="IMPORT")
@@ -83,9 +84,8 @@ class MU_PT_node(_Panel, bpy.types.Panel):
             row = layout.row(align=True)
             for what in state.places(node):
                 row.operator("mu.node_open", text=what.capitalize()).what = what
-        column = layout.column()
-        column.use_property_split = True
-        node.draw_buttons_ext(context, column)
+        # Labels stand within the fields, as in the node: beside them "Base Cap (mm)" would be cut.
+        node.draw_buttons_ext(context, layout.column())
 
 
 def _entry(layout, text: str, kind: str) -> None:

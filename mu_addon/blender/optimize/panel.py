@@ -133,7 +133,8 @@ def _freedoms(layout, root, props) -> None:
         _remove(row, "freedoms", index)
         column = box.column(align=True)
         if freedom.parameter in NAMED:
-            column.prop(freedom, "values", text="Names")
+            # Without a label beside it: the names need the whole width.
+            column.prop(freedom, "values", text="")
             continue
         column.prop(freedom, "how", text="")
         d = FREE[freedom.parameter]

@@ -139,10 +139,10 @@ class MU_PG_target(bpy.types.PropertyGroup):
         precision=3,
     )
     low: FloatProperty(
-        name="Low", description="Lower bound, in the quantity's unit", default=20.0, precision=3
+        name="Least", description="Lower bound, in the quantity's unit", default=20.0, precision=3
     )
     high: FloatProperty(
-        name="High", description="Upper bound, in the quantity's unit", default=30.0, precision=3
+        name="Most", description="Upper bound, in the quantity's unit", default=30.0, precision=3
     )
 
 

@@ -9,7 +9,7 @@ import bpy
 
 from ...design.printing.finding import counted
 from ...run.child import FAILED
-from ..jobs.panel import job_state
+from ..jobs.panel import job_state, timed_if_measured
 from ..shared.panels import alert, large_button, wrapped
 from ..shared.wording import path_symbol
 from ..unit import object as unit_object
@@ -80,6 +80,11 @@ def _gates(layout, root, solid) -> None:
         column.label(text=f"Waveguide along {path_symbol(solid['mu_path'])}", icon="CHECKMARK")
 
 
+def start_words(root, name: str, command: str) -> str:
+    """Label of the button of a job for the printer, with what it takes once measured on this machine."""
+    return timed_if_measured(name, printing.announced(root, command))
+
+
 class _OfPrint(UnitPanel):
     bl_parent_id = "MU_PT_print"
 
@@ -98,7 +103,9 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
             layout.prop(settings, "printer_file")
         layout.prop(settings, "limits_file")
         layout.prop(settings, "up")
-        large_button(layout, "mu.print_check", "VIEWZOOM")
+        large_button(
+            layout, "mu.print_check", "VIEWZOOM", text=start_words(root, "Check Print", printing.CHECK)
+        )
         found = printing.checked(root)
         if found is None:
             wrapped(layout, "Not checked yet", "INFO")
@@ -310,7 +317,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             "INFO",
         )
         _check_state(layout, found)
-        large_button(layout, "mu.print_export", "EXPORT")
+        large_button(layout, "mu.print_export", "EXPORT", text=start_words(root, "Export", printing.EXPORT))
         _written(layout, printing.exported(root))
         layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
         row = layout.row(align=True)

@@ -31,6 +31,7 @@ from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
 from ..simulate import study_folder as studies
+from ..simulate import timings
 from ..unit import envelope, stack
 from ..unit.object import chosen_window
 from ..unit.properties import shape_hash, to_unit
@@ -77,7 +78,27 @@ def latest_folder(root: Any) -> Path:
     return folder_of(root, CHECK) if child is None else child.folder.parent
 
 
+def _detail(command: str, quality: str) -> str:
+    return f"{command} {quality}" if command == EXPORT else command
+
+
+def _timed(folder: Path) -> tuple[str, dict[str, Any]]:
+    """Detail of a finished job for the printer, and the seconds of its stages."""
+    inputs = folder / "export.toml"
+    quality = parse_toml(file_text(inputs), inputs.name)["quality"] if folder.name == EXPORT else ""
+    summary = folder / "summary.json"
+    return _detail(folder.name, quality), parse_json(file_bytes(summary), summary.name)["seconds"]
+
+
+def announced(root: Any, command: str) -> float | None:
+    """Expected seconds of a job for the printer, as measured on this machine; None before the first one."""
+    settings = root.mu_print
+    files = ("solid", *settings.formats, *(["vents"] if settings.vents else [])) if command == EXPORT else ()
+    return timings.announced(_detail(command, settings.quality), files)
+
+
 PRINTING = JobKind("print", lambda root: root.mu_unit.uuid, latest_folder, "print")
+timings.READERS[PRINTING.name] = _timed
 
 _printers: FileCache[Printer] = FileCache()
 _measured: FileCache[dict[str, Limit]] = FileCache()

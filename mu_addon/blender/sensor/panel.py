@@ -109,10 +109,10 @@ def _session(layout, settings, session):
     if not status:
         return
     column = box.column(align=True)
-    column.label(text=f"{status.get('format') or 'format not found yet'}, {status.get('rate_hz', 0):.0f} Hz")
+    column.label(text=f"{_format(status)}, {status.get('rate_hz', 0):.0f} Hz")
     column.label(text=f"{status.get('rows', 0)} samples on disk in {status.get('duration_s', 0):.0f} s")
     losses = [f"{status[key]} {word}" for key, word in LOSSES.items() if status.get(key)]
-    wrapped(column, ", ".join(losses) or "nothing lost", "ERROR" if losses else "CHECKMARK")
+    wrapped(column, ", ".join(losses) or "Nothing lost", "ERROR" if losses else "CHECKMARK")
     for words in status.get("complaint", ()):
         wrapped(column, in_panel(words), "INFO")
     for name, value in zip(session.channels, list(status.get("latest", ()))[3:], strict=False):
@@ -122,7 +122,7 @@ def _session(layout, settings, session):
     reading = session.reading
     if session.fresh and reading is not None and isfinite(reading.angle_deg):
         row = column.row()
-        row.label(text=f"angle {reading.angle_deg:.1f}°", icon="NONE" if reading.possible else "ERROR")
+        row.label(text=f"Angle {reading.angle_deg:.1f}°", icon="NONE" if reading.possible else "ERROR")
         row.label(text=f"{reading.low_deg:.1f} to {reading.high_deg:.1f}°")
     if session.trouble:
         box.alert = True
@@ -131,6 +131,12 @@ def _session(layout, settings, session):
     row.operator("mu.sensor_open", text="Recording", icon="FILE_FOLDER").what = "recording"
     if session.running:
         row.operator("mu.sensor_mark", icon="BOOKMARKS")
+
+
+def _format(status) -> str:
+    """Format of the lines on the port, in words."""
+    found = status.get("format")
+    return f"Format {found}" if found else "Format not found yet"
 
 
 def _plot(layout, settings, session):

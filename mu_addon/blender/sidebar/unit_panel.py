@@ -5,12 +5,14 @@ from __future__ import annotations
 import bpy
 
 from ..body.state import FLAWS
+from ..evidence import panel as evidence_panel
 from ..evidence import state as evidence
 from ..grading import state as grading
 from ..gripper import object as gripper_object
 from ..jobs.panel import whole
 from ..live_bending import words as live_words
 from ..node_tree import following
+from ..printing import panel as print_panel
 from ..printing import state as printing
 from ..shared import scene_units
 from ..shared.operators import linked
@@ -135,7 +137,8 @@ def _draw_next_step(row, root) -> None:
             return
     data = evidence.measured_data(root)
     if data is not None and data.measured is not None and evidence.diagnosis(root) is None:
-        row.operator("mu.evidence_diagnose", text="Diagnose the Data", icon="VIEWZOOM")
+        words = evidence_panel.start_words(root, "Diagnose the Data")
+        row.operator("mu.evidence_diagnose", text=words, icon="VIEWZOOM")
         return
     found = studies.findings(root)
     if found is None or found.stale or not found.run.complete:
@@ -154,9 +157,11 @@ def _draw_print_step(row, root) -> None:
     """Draw the next action on the way from a solid to its files."""
     check, files = printing.checked(root), printing.exported(root)
     if check is None or check.stale:
-        row.operator("mu.print_check", text="Check the Print", icon="VIEWZOOM")
+        words = print_panel.start_words(root, "Check the Print", printing.CHECK)
+        row.operator("mu.print_check", text=words, icon="VIEWZOOM")
     elif files is None or files.stale:
-        row.operator("mu.print_export", text="Export the Files", icon="EXPORT")
+        words = print_panel.start_words(root, "Export the Files", printing.EXPORT)
+        row.operator("mu.print_export", text=words, icon="EXPORT")
     else:
         row.operator("mu.print_open", text="Open the Files", icon="FILE_FOLDER").what = printing.EXPORT
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,16 @@ def measured(detail: str) -> dict[str, float]:
     if not isinstance(found, dict):
         return {}
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
+
+
+def announced(detail: str, stages: Iterable[str] = ()) -> float | None:
+    """Expected seconds of the stages of a job of that detail, without any of all of its last one.
+
+    None unless each was measured here.
+    """
+    taken = measured(detail)
+    every = [taken.get(name) for name in stages or taken]
+    return sum(s for s in every if s is not None) if every and None not in every else None
 
 
 def note(detail: str, seconds: dict[str, float]) -> None:

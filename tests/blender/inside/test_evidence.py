@@ -15,7 +15,7 @@ import pytest
 from mu_addon.blender.evidence import panel as evidence_panel
 from mu_addon.blender.evidence import state as evidence
 from mu_addon.blender.evidence import timeline as evidence_motion
-from mu_addon.blender.simulate import effects
+from mu_addon.blender.simulate import effects, timings
 from mu_addon.blender.simulate import panel as panels
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate.job import SIMULATION
@@ -69,14 +69,18 @@ def test_a_folder_is_checked_as_it_is_chosen(blocks):
     assert "1.5x: 4 rows" in drawn()
 
 
-def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path):
+def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path, monkeypatch):
     """The whole way with a real diagnosis; undone, saved, found again, and stale once the data change."""
     folder = tmp_path
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "seat.blend"))
     root = add()
     root.mu_evidence.folder = "//data"
+    monkeypatch.setattr(timings, "_file", lambda: folder / "timings.json")
     diagnose(root)
+    assert "Diagnose, about" not in drawn()
+    timings.note(*timings.READERS["evidence"](evidence.folder_of(root)))
+    assert "Diagnose, about" in drawn(), "by what such data took here"
     assert evidence.folder_of(root).parent == studies.folder_of(root)
     texts = drawn()
     assert "Named: overcure" in texts, texts

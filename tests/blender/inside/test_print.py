@@ -13,7 +13,10 @@ from mu_addon.blender.printing import layer, marks
 from mu_addon.blender.printing import panel as print_panel
 from mu_addon.blender.printing import state as printing
 from mu_addon.blender.printing.operators import MU_OT_print_export as operator
+from mu_addon.blender.results import runs
+from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import study_folder as studies
+from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
@@ -238,8 +241,51 @@ def test_markers_lead_to_every_place_and_undo_takes_them_back(tmp_path):
     assert not [o for o in bpy.data.objects if "mu_check" in o]
 
 
-def test_an_export_as_chosen(tmp_path):
+def test_the_next_step_goes_from_the_ranking_to_the_files(home, tmp_path, monkeypatch):
+    """The button at the top, each step once the one before it is done; with what was measured here."""
+    monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
+    root = add(preset="mu-0.75x")
+    root.mu_unit.study.folder = str(home)
+    unit_object.rebuild(root)
+    runs.refresh()
+
+    def step():
+        return drawn_by([unit_panel.MU_PT_unit])
+
+    assert "Use Path α4" in step()
+    bpy.ops.mu.path(name="alpha1")
+    assert "Use Path α4" in step(), "the chosen path is a worse one"
+    summary = studies.findings(root).run.folder / "summary.json"
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), "tied_with_chosen": ["alpha1"]}))
+    assert "Use Path" not in step(), "a tied path is as good"
+    assert "Build Solid" in step()
+    assert bpy.ops.mu.solid() == {"FINISHED"}
+    assert "Check the Print" in step()
+    assert "about" not in step().partition("Check the Print")[2], "nothing was measured yet"
+    timings.note("check", {"part": 9.0, "report": 11.0})
+    assert "Check the Print, about 20 s" in step()
+    assert "Check Print, about 20 s" in drawn()
+
+    write_check(root, [finding("drain", "warning")])
+    assert "Export the Files" in step()
+    timings.note(f"export {root.mu_print.quality}", {"solid": 21.0, "stl": 2.0, "3mf": 7.0, "step": 100.0})
+    assert "Export the Files, about 30 s" in step(), "of the chosen formats alone"
+    root.mu_print.formats = {"stl", "txt"}
+    assert "Export the Files about" not in step().replace(",", ""), "a format was never written here"
+
+    folder = printing.folder_of(root, "export")
+    write_unit(to_unit(root.mu_unit), folder / "unit.toml")
+    written = {"path": {"name": "alpha1"}, "resin": {"ml": 1.0, "g": 1.0}, "files": [], "refused": []}
+    (folder / MANIFEST).write_text(json.dumps({**written, "vents": None}))
+    assert "Open the Files" in step()
+    root.mu_unit.chambers.wall_mm = 1.05
+    assert "Open the Files" not in step()
+    assert "Simulate, " in step(), "another unit begins anew"
+
+
+def test_an_export_as_chosen(tmp_path, monkeypatch):
     """Files of a real export, with the path and less what the printer adds; asked first where in error."""
+    monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = add()
     assert [name for name, *_ in printing.FORMATS] == list(FORMATS)
@@ -279,6 +325,9 @@ def test_an_export_as_chosen(tmp_path):
     assert "nodes.txt" in texts
     assert "unit.3mf" not in texts
     assert "Done in" in texts
+    assert "Export, about" not in texts
+    timings.note(*timings.READERS["print"](printing.folder_of(root, "export")))
+    assert "Export, about" in drawn(), "by what it took"
     assert "Stale: they belong" not in texts
     root.mu_unit.chambers.wall_mm = 1.0
     assert "Stale: made with other parameters" in drawn()

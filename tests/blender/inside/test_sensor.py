@@ -92,9 +92,9 @@ def test_connect_pause_mark_and_disconnect(tmp_path):
     s = connected(root)
     texts = drawn()
     assert "Connected: simulated sensor" in texts, texts
-    assert "nothing lost" in texts, texts
+    assert "Nothing lost" in texts, texts
     assert "light_V" in texts, texts
-    assert "frames, " in texts
+    assert "Format frames, " in texts
     assert "samples on disk" in texts
     assert "Not calibrated" in texts
     assert not bpy.ops.mu.sensor_connect.poll()
@@ -170,7 +170,7 @@ def test_a_device_at_a_pty_that_is_unplugged_twice(tmp_path):
         texts = drawn()
         assert "2 reconnects" in texts, texts
         assert "lost" in texts, texts
-        assert "nothing lost" not in texts, texts
+        assert "Nothing lost" not in texts, texts
         age, low, high = s.traces.extremes()
         assert len(age) > 10
         assert (low[:4, -1] <= high[:4, -1]).all()
