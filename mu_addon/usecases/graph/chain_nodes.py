@@ -97,7 +97,7 @@ def chain_nodes() -> tuple[Definition, ...]:
                     path=FILE,
                 ),
                 setting(
-                    "reach_mm", "", "point that the tip is to reach, such as 0 -25 405; no protocol then"
+                    "reach_mm", "", "point that the tip is to reach, such as 0 -15 415; no protocol then"
                 ),
                 setting(
                     "low_kPa", 0.0, "lowest pressure allowed to reach it", unit="kPa", low=-99.0, high=1000.0
