@@ -58,7 +58,7 @@ def test_one_block_a_direction_does_not_tell_direction_from_specimen():
     assert {"anisotropy", "geometry_as_typed of specimen S1", "batch_variation of specimen S1"} <= titles(
         found
     )
-    assert "calliper" in found.proposal.what or "clamped anew" in found.proposal.what
+    assert "calliper" in found.proposal.what or "clamped again" in found.proposal.what
     assert "model is wrong" not in sentence(found)[1]
 
 

@@ -239,7 +239,7 @@ def test_readings_are_clipped_at_an_end_and_nowhere_else():
         assert not clipped_readings(t, clean).any()
 
 
-@pytest.mark.parametrize(("factor", "says"), [(1e-3, "1000 times as large"), (-1.0, "opposite")])
+@pytest.mark.parametrize(("factor", "says"), [(1e-3, "1000 times as large"), (-1.0, "sign is wrong")])
 def test_a_mistaken_unit_or_sign_is_asked_about_before_any_cause(factor, says):
     made = [
         attrs.evolve(e, columns={**e.columns, "stress_kPa": factor * e["stress_kPa"]})

@@ -90,6 +90,15 @@ def worker_of(folder):
     return int(json.loads((folder / "run.lock").read_text())["process"])
 
 
+def is_running(process):
+    """True until a process has closed its files, and so let its folder go: all its threads are zombies."""
+    states = []
+    for thread in Path(f"/proc/{process}/task").glob("*/stat"):
+        with contextlib.suppress(OSError):
+            states.append(thread.read_text().rpartition(")")[2].split()[0])
+    return any(state not in "ZX" for state in states)
+
+
 def assert_clear_failure(done, status, *words):
     """It ended with `status`, said every word, and showed no traceback."""
     text = done.stdout + done.stderr

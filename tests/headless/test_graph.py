@@ -1,6 +1,5 @@
 """`graph` as a user runs it: killed and resumed to the same digits, cached, bad files without a traceback."""
 
-import contextlib
 import json
 import shutil
 import subprocess
@@ -14,7 +13,7 @@ from mu_addon.graph import Node, NodeTree, Source, tree_text
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.templates import template
 
-from .processes import ROOT, assert_clear_failure, command, here, worker_of
+from .processes import ROOT, assert_clear_failure, command, here, is_running, worker_of
 
 PRESSED = Path(__file__).parents[1] / "data" / "pressed.csv"
 # A printed body of the fewest chambers, pressed once: as cheap as it gets.
@@ -89,15 +88,6 @@ def test_again_nothing_is_computed_and_a_changed_wall_only_its_own(whole, file, 
     assert (out / before["nodes"]["Motion 0.8"]["folder"] / "summary.json").is_file(), "runs are kept"
     resumed = here("resume", out, "--json")
     assert resumed.returncode == 0, resumed.stdout
-
-
-def is_running(process):
-    """True until a process has closed its files, and so let its folder go: all its threads are zombies."""
-    states = []
-    for thread in Path(f"/proc/{process}/task").glob("*/stat"):
-        with contextlib.suppress(OSError):
-            states.append(thread.read_text().rpartition(")")[2].split()[0])
-    return any(state not in "ZX" for state in states)
 
 
 def test_killed_it_goes_on_to_the_same_digits_and_repeats_nothing(whole, file, tmp_path):

@@ -15,7 +15,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
-from .processes import assert_clear_failure, command, here, run, worker_of
+from .processes import assert_clear_failure, command, here, is_running, run, worker_of
 
 UNIT = load_preset("mu-1.0x")
 JOB = Job(
@@ -62,8 +62,12 @@ def test_killed_at_any_stage_it_goes_on_to_the_same_digits(whole, with_light, tm
     while not list(tmp_path.glob(pattern)):
         assert process.poll() is None
         time.sleep(0.002)
+    worker = worker_of(tmp_path)
     process.kill()
     process.wait()
+    # It ends once its input does, and has the folder until then.
+    while is_running(worker):
+        time.sleep(0.002)
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cache").glob("*.npz")}
     found = resumed(tmp_path)
     assert found["J_hat_mm"] == expected["J_hat_mm"]

@@ -95,7 +95,7 @@ def test_columns_for_each_marker(tmp_path, text, names, time_s):
         ("frame,A x,A y\n0,1,2\n0,1,2\n", "does not increase", "row 3", "one animal or track"),
         ("frame,id,x,y\n0,1,1,2\n0,1,1,2\n", "two rows for one frame", "row 3", "keep the row"),
         ("id,x,y\n1,1,2\n1,1,2\n", "no column of frames", "a.csv", "frame, id, x and y"),
-        ("A x,A y,A x,A y\n1,2,3,4\n1,2,3,4\n", "two columns hold the x of A", "line 1", "a name of its own"),
+        ("A x,A y,A x,A y\n1,2,3,4\n1,2,3,4\n", "two columns hold the x of A", "line 1", "a different name"),
         ("a,b\n1,2\n3,4\n", "no tracked markers", "a.csv", "NAME right_px"),
         (DEEPLABCUT.replace("3,401", "2.5,401"), "not a whole number", "row 6", "correct"),
     ],

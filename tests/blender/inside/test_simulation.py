@@ -46,7 +46,7 @@ def test_panels_tell_what_a_child_says():
     child = launch(root, "hang")
     watch(lambda: child.progress)
     # Three seconds, counted down since the child said so.
-    assert re.search(r"0\.50 50%, Model A, [0-3](\.\d)? s left", drawn()), drawn()
+    assert re.search(r"0\.50 50%, motion, [0-3](\.\d)? s left", drawn()), drawn()
     assert "mu.cancel" in drawn()
     assert not bpy.ops.mu.simulate.poll()
     assert bpy.ops.mu.cancel() == {"FINISHED"}
