@@ -173,7 +173,10 @@ class _CoreNode(_Node):
         wrapped(layout, sentence(self.definition.text))
         for s in self.definition.settings:
             if s.shown:
-                layout.prop(self, attribute(s))
+                column = layout.column()
+                # A number's label stands within its field, where "Base Cap (mm)" is not cut.
+                column.use_property_split = self.bl_rna.properties[attribute(s)].type not in ("FLOAT", "INT")
+                column.prop(self, attribute(s))
         if getattr(self, "source", None):
             draw_source(self, layout)
 

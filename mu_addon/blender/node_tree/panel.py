@@ -84,7 +84,6 @@ class MU_PT_node(_Panel, bpy.types.Panel):
             row = layout.row(align=True)
             for what in state.places(node):
                 row.operator("mu.node_open", text=what.capitalize()).what = what
-        # Labels stand within the fields, as in the node: beside them "Base Cap (mm)" would be cut.
         node.draw_buttons_ext(context, layout.column())
 
 
