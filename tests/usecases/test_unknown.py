@@ -82,6 +82,8 @@ def test_a_shape_that_nobody_measured_is_found_and_no_cause_named(tmp_path, clos
     assert best["values"]["wall_mm"] * best["modulus"] == pytest.approx(WALL_MM, rel=0.03)
     assert best["misfit"] < 1.0
     assert found["readings"] == 6
+    assert best["predicted"]["1x, -20 kPa"] == pytest.approx(-70.0, abs=2.5)
+    assert best["predicted"]["1x, 50 kPa"] == pytest.approx(60.0, abs=2.5)
     low, high = found["intervals"]["wall_mm"]
     assert 0.4 <= low < best["values"]["wall_mm"] < high <= 0.9
     # Where it fits best, the unit was simulated: another wall than those of the sequence.

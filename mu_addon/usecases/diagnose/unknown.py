@@ -170,7 +170,7 @@ class Shape:
     """Values of the unknown parameters, by name, with all else fitted.
 
     simulated: the unit itself was, else its response is the surface's. misfit: chi squared. predicted: mean
-    of the first channel by experiment, its zero included. ends: parameters at a bound.
+    of the first channel by experiment, in its unit, its zero included. ends: parameters at a bound.
     """
 
     values: dict[str, float]
@@ -255,10 +255,12 @@ def shapes(
     def shape(fit: Fit, simulated: bool) -> Shape:
         values = {n: float(fit.values[n]) for n in names}
         free = [p for p in fitter.curved if p.name in fit.keys and p.name in (*names, MODULUS.name)]
-        predicted = fitter.predict(fit.values)
         first: dict[str, float] = {}
         for s in measured.series:
-            first.setdefault(measured.experiments[s.experiment].name, float(predicted[s.at].mean()))
+            # Not the record's values, which are in standard deviations where a folder states them.
+            experiment = measured.experiments[s.experiment]
+            found = simulator.predict(experiment, fit.values)[s.row]
+            first.setdefault(experiment.name, float(np.nanmean(found)))
         ends = tuple(p.name for p in free if _at_an_end(p, fit.values[p.name]))
         modulus, offset = (float(fit.values.get(n, null)) for n, null in ((MODULUS.name, 1.0), (zero, 0.0)))
         return Shape(values, modulus, offset, fit.chi2, first, ends, simulated)
