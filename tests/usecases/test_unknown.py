@@ -143,3 +143,18 @@ def test_the_shipped_file_of_the_papers_shape_is_of_the_preset():
     designs = read_unknown(text, "unknown.toml", UNIT).designs(UNIT)
     assert len(designs.units) == 7
     assert {u.chambers.wall_mm for u in designs.units} >= {0.4, 0.9}
+
+
+def test_no_cause_is_named_while_dimensions_are_unknown(tmp_path, closed_form):
+    folder = written(tmp_path / "data")
+    for path in folder.glob("*_0.75x.csv"):
+        path.write_text(path.read_text().replace("-70.0,", "-35.0,").replace("50.0,60.0,", "50.0,30.0,"))
+    settings = UnitSettings(MeshSettings(refine=0.3), pressures=7, margin=0.0, effects=(), workers=1)
+    unknown = read_unknown(TEXT, "unknown.toml", UNIT)
+    with run_to_end(Progress()) as context:
+        USE_CASE.start(
+            Job(read_folder(folder), UNIT, settings=settings, unknown=unknown), tmp_path / "out", context
+        )
+    assert context.summary["verdict"] == "unexplained"
+    remarks = json.loads((tmp_path / "out" / "summary.json").read_text())["remarks"]
+    assert any("no cause is named while dimensions are unknown" in r for r in remarks)

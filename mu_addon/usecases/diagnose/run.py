@@ -104,6 +104,13 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         # A first look at each effect tells which ones need all their sizes.
         of_a_unit = bends(measured.experiments)
         settings, stage = settings.further(verdict.in_question) if of_a_unit else None, SIZES
+    if job.unknown is not None and verdict.names:
+        # Free dimensions take up what speaks against a cause: the paper's ranges were named a batch's.
+        notes.append(
+            f"{', '.join(verdict.names)} would explain the rest, but no cause is named while dimensions are "
+            "unknown: put those that fit into the unit, and diagnose without --unknown"
+        )
+        verdict = attrs.evolve(verdict, kind="unexplained")
     notes += _known_before(job, simulator)
     model = extended_model(verdict, simulator.nuisances)
     block = simulators.get(lattice_compression.KIND)
