@@ -199,9 +199,9 @@ class JointAt:
 def fitted(states: Sequence[PlateState], free: PlateState, size: Array) -> dict[str, Array]:
     """Coefficients of a joint at one pressure, from its free state and others there.
 
-    Least squares of every state's gradient and stiffness, in the range's units, with mirror images; the free
-    state's stiffness is matched exactly. Returns coefficients, centre, centre_slope, centre_bend as in
-    `Joint`.
+    Least squares of every state's gradient and stiffness, and of its centre of mass and that one's slope, in
+    the range's units, with mirror images; the free state's stiffness is matched exactly. Returns
+    coefficients, centre, centre_slope, centre_bend as in `Joint`.
     """
     quadratic = len(_PAIRS)
     scaled = free.hessian * np.outer(size, size)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..design.strut_cell import relative_density, strut_cell
 from ..errors import ConvergenceError
+from ..fem import kinematics
 from ..fem.elements import shape_functions, solid_volumes, tet_quadrature
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
@@ -58,14 +59,13 @@ class PlateState:
             m * self.eta,
             m * self.gradient,
             m[:, None] * self.hessian * m,
-            _MIRROR3 * self.centre,
-            _MIRROR3[:, None] * self.centre_slope * m,
+            kinematics.MIRROR * self.centre,
+            kinematics.MIRROR[:, None] * self.centre_slope * m,
         )
 
 
 MIRROR = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Signs of a logarithm's components where space is mirrored in x = 0."""
-_MIRROR3 = np.array([-1.0, 1.0, 1.0])
 
 
 def nodal_mass_g(unit: Unit, mesh: Mesh, density_g_per_ml: float) -> Array:

@@ -43,7 +43,7 @@ def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
     """Diagnose the folder."""
     from ..evidence.extended import load_model
     from ..measured import read_folder
-    from ..usecases.diagnose.job import Job, unit_behind
+    from ..usecases.diagnose.job import Job
     from ..usecases.diagnose.run import USE_CASE
 
     unit = unit_if_named(options)
@@ -55,9 +55,7 @@ def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
         from ..design.settings import PRESET
         from ..usecases.diagnose.unknown import unknown_of
 
-        # Where no experiment is of a unit, the job refuses it.
-        behind = unit_behind(measured.experiments, unit) or load_preset(PRESET)
-        unknown = unknown_of(Path(options.unknown), behind)
+        unknown = unknown_of(Path(options.unknown), unit or load_preset(PRESET))
     job = Job(measured, unit, known=known, self_contact=options.self_contact, unknown=unknown)
     USE_CASE.start(job, Path(options.out), context)
 

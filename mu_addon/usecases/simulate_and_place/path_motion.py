@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...fem.kinematics import MIRROR
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate, roi, with_sensor
 from .motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
@@ -55,7 +56,7 @@ def keep_motion(
         fields = {key: values - without[key] for key, values in looked.of_states(moved, stiff).items()}
         further = {}
         if image is not None:
-            further["image_mm"] = difference_mm[:, image] * np.array([-1.0, 1.0, 1.0])
+            further["image_mm"] = difference_mm[:, image] * MIRROR
             for key, values in fields.items():
                 count = len(nodes[key.partition("_")[0]])
                 fields[key], further[IMAGE + key] = values[:, :count], values[:, count:]
