@@ -338,7 +338,7 @@ def print_part():
 
 def print_check():
     yield from new("MU_PT_print", "MU_PT_print_check")
-    yield from added(preset="mu-0.75x")
+    yield from added(cut=False, preset="mu-0.75x")
     assert called(bpy.ops.mu.print_check) == {"FINISHED"}
     child = printing.PRINTING.child(root())
     while child.state in ("running", "waiting"):

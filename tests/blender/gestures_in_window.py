@@ -1,4 +1,4 @@
-"""Runs inside a Blender with a window: forty gestures on units and node trees, what holds after each.
+"""Runs inside a Blender with a window: some seventy gestures on units, trees, runs and results.
 
 How long anything of the extension held the window, and what, is written to blocked.json in MU_TEST_FOLDER.
 With MU_HEARTBEAT it is how long anything held it, Blender's own work and drawing too: the longest time
@@ -14,10 +14,16 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import called, key, module, move, package, parts, run
+from simulated import called, dragged_in_redo_panel, key, module, move, package, parts, run
 
 FOLDER = Path(os.environ["MU_TEST_FOLDER"])
 unit_object, trees = module("blender.unit.object"), module("blender.node_tree.state")
+handles, printing = module("blender.scene.handles"), module("blender.printing.state")
+results = module("blender.results.motion")
+OPTIMIZATION, studies = (
+    module("blender.optimize.state").OPTIMIZATION,
+    module("blender.simulate.study_folder"),
+)
 classes, scene_units = module("blender.node_tree.classes"), module("blender.shared.scene_units")
 SIMULATION = module("blender.simulate.job").SIMULATION
 bending, viewports = module("blender.live_bending.state"), module("blender.shared.viewports")
@@ -154,6 +160,13 @@ def on_a_unit():
     yield from typed("Z", ctrl=True, shift=True)
     only()
 
+    gesture("a wall dragged in the redo panel")
+    before = only().mu_unit.chambers.wall_mm
+    assert called(bpy.ops.mu.chambers, "INVOKE_DEFAULT") == {"FINISHED"}
+    yield 1.0
+    yield from dragged_in_redo_panel(lambda: abs(only().mu_unit.chambers.wall_mm - before) > 1e-4)
+    assert abs(only().mu_unit.chambers.wall_mm - before) > 1e-4, "no field was found in the redo panel"
+
     gesture("Shift D")
     yield from typed("D", shift=True)
     yield from typed("ESC")
@@ -262,6 +275,23 @@ def in_files():
     bpy.context.scene.collection.objects.link(appended)
     yield 1.0
     assert len({r.mu_unit.uuid for r in roots()}) == 2
+    gesture("pasted into a scene of millimetres")
+    window, area, _ = parts()
+    metres, millimetres = bpy.context.scene, bpy.data.scenes.new("millimetres")
+    millimetres.unit_settings.scale_length = 0.001
+    select(roots()[0])
+    called(bpy.ops.view3d.copybuffer)
+    window.scene = millimetres
+    yield 0.7
+    called(bpy.ops.view3d.pastebuffer)
+    yield from until(lambda: len(roots()) == 3)
+    view = area.spaces.active.region_3d
+    yield from until(lambda: view.view_distance > millimetres.objects[0].dimensions.z > 50.0)
+    bpy.data.objects.remove(millimetres.objects[0])
+    window.scene = metres
+    bpy.data.scenes.remove(millimetres)
+    yield 0.7
+    viewports.frame(roots())
     gesture("two units: the active one is worked on")
     for root in roots():
         select(root)
@@ -418,6 +448,86 @@ def bent(root):
     yield from until(is_bent)
 
 
+def ended(child):
+    """Until a job has ended, in minutes, and what shows it has been drawn."""
+    while child.state in ("running", "waiting"):
+        yield 0.3
+    yield 2.0
+
+
+def pressed(operator, shown, **settings):
+    """A button pressed, which may first prepare its result in a process of its own, until it shows."""
+    called(operator, "INVOKE_DEFAULT", **settings)
+    yield from until(shown)
+    yield 1.5
+
+
+def painted(field):
+    """True once the colours of a shown motion are those of a field."""
+    motion = only().mu_motion
+    return motion.field == field and any(field in part.data.attributes for part in results.parts(only()))
+
+
+def with_results():
+    """Two walls simulated: fields, a difference, the solid, the print, a search; each button as a user's."""
+    root = only()
+    (FOLDER / "press.csv").write_text("time_s,pressure_kPa\n0,0\n2,-5\n4,20\n")
+    study = root.mu_unit.study
+    study.protocol, study.refine = str(FOLDER / "press.csv"), 0.35
+    for wall in (1.1, 0.98):
+        root.mu_unit.chambers.wall_mm = wall
+        yield from settled()
+        gesture(f"a run from its start to its end, wall {wall} mm")
+        called(bpy.ops.mu.simulate, "INVOKE_DEFAULT")
+        child = SIMULATION.child(root)
+        yield from ended(child)
+        assert child.state == "done", child.error
+    shown = studies.shown_run(root)
+    other = next(run.key for run in studies.runs_of(root) if run.key != shown.key)
+    for name in ("displacement_mm", "von_mises_kPa", "contact_pressure_kPa"):
+        gesture(f"{name} shown")
+        yield from pressed(bpy.ops.mu.field_show, lambda name=name: painted(name), field=name)
+    gesture("frames of the motion")
+    for frame in range(1, bpy.context.scene.frame_end, 6):
+        bpy.context.scene.frame_set(frame)
+        yield 0.1
+    gesture("the pressure of a result")
+    for kPa in range(-5, 21, 2):
+        handles.to_pressure(root, bpy.context.scene, float(kPa))
+        yield 0.1
+    gesture("Compare")
+    yield from pressed(bpy.ops.mu.run_compare, lambda: study.against == other, key=other)
+    gesture("Difference shown")
+    difference = "run_difference_mm"
+    yield from pressed(bpy.ops.mu.field_show, lambda: painted(difference), field=difference)
+    gesture("Clear Motion")
+    yield from pressed(bpy.ops.mu.motion_clear, lambda: not results.shown(root))
+    gesture("Build Solid")
+    yield from pressed(bpy.ops.mu.solid, lambda: unit_object.solid_is_current(only()))
+    gesture("the moving print")
+    yield from pressed(bpy.ops.mu.motion, lambda: ("model_a", "print") in results.shown(root), what="print")
+    gesture("its frames")
+    for frame in range(1, bpy.context.scene.frame_end, 12):
+        bpy.context.scene.frame_set(frame)
+        yield 0.1
+    called(bpy.ops.mu.motion_clear, "INVOKE_DEFAULT")
+    for name, operator in (("Check Print", bpy.ops.mu.print_check), ("Export", bpy.ops.mu.print_export)):
+        gesture(name)
+        called(operator, "INVOKE_DEFAULT")
+        yield from ended(printing.PRINTING.child(root))
+    gesture("Optimize")
+    for what in ("targets", "freedoms"):
+        called(bpy.ops.mu.optimize_list, "INVOKE_DEFAULT", what=what)
+    called(bpy.ops.mu.optimize, "INVOKE_DEFAULT")
+    child = OPTIMIZATION.child(root)
+    yield 3.0
+    assert child.state == "running", child.error
+    gesture("its end by Cancel")
+    child.cancel()
+    yield from ended(child)
+    assert child.state == "cancelled", (child.state, child.error)
+
+
 def session():
     yield 2.0
     if HEARTBEAT:
@@ -425,9 +535,17 @@ def session():
     else:
         sys.setprofile(blocked)
     try:
-        for part in (on_a_unit, in_other_scenes, in_files, in_trees, while_running, while_bending):
+        for part in (
+            on_a_unit,
+            in_other_scenes,
+            in_files,
+            in_trees,
+            while_running,
+            while_bending,
+            with_results,
+        ):
             yield from part()
-        assert len(done) >= 40, len(done)
+        assert len(done) >= 65, len(done)
     finally:
         sys.setprofile(None)
         told = {"gestures": done}

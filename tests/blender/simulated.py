@@ -63,6 +63,31 @@ def drag(start, end, steps=6):
     yield 1.5
 
 
+def dragged_in_redo_panel(changed):
+    """Drag the first field of the last operator's redo panel by 24 pixels until `changed()`."""
+    _, area, _ = parts()
+    corner = area.x + area.width * 0.35, area.y + area.height * 0.55
+    move(*corner)
+    yield 2.0
+    key("F9")
+    yield 5.0
+    # In the panel whose upper left corner is at the mouse; fonts differ a little.
+    for down in (52, 60, 45):
+        move(corner[0] + 224, corner[1] - down)
+        yield 1.5
+        event("LEFTMOUSE", "PRESS")
+        yield 1.0
+        for _ in range(6):
+            move(place[0] + 4, place[1])
+            yield 1.0
+        event("LEFTMOUSE", "RELEASE")
+        yield 4.0
+        if changed():
+            break
+    key("ESC")
+    yield 3.0
+
+
 def called(operator, how="EXEC_DEFAULT", **settings):
     """An operator called as the interface would, in the 3D view and with an undo step."""
     window, area, _ = parts()

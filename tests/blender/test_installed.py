@@ -122,7 +122,7 @@ def test_an_upgrade_keeps_the_users_presets(installed, home, archive):
 )
 def test_mouse_and_keys(script, installed, home, tmp_path):
     os.environ["MU_TEST_FOLDER"] = str(tmp_path)
-    call(home, HERE / script, tmp_path / "screen.png", 900, command=WINDOW)
+    call(home, HERE / script, tmp_path / "screen.png", 1800, command=WINDOW)
     assert (tmp_path / "outcome.txt").read_text() == "all went well", (tmp_path / "outcome.txt").read_text()
 
 

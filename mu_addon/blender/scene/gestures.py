@@ -19,7 +19,7 @@ from ..gripper import object as gripper_object
 from ..path.candidates import CANDIDATE
 from ..preview import nodes
 from ..preview.nodes import unit as unit_group
-from ..shared import displays, scene_units, updates
+from ..shared import displays, scene_units, updates, viewports
 from ..shared.registration import add_handlers, remove_handlers
 from ..unit import broken, preview_update
 from ..unit import object as unit_object
@@ -55,9 +55,11 @@ def look() -> None:
                 found.append(obj)
             elif found is roots and obj.override_library is not None:
                 overrides.append(obj)
+        known = set(_holders.values())
+        new = {root for root in roots if root.session_uid not in known}
         copies = _separate(roots)
         _follow(shown)
-        _true_sizes([*roots, *overrides], touched)
+        _bring_into_view(new & _true_sizes([*roots, *overrides], touched))
         for root in roots:
             if root in copies or _damaged(root):
                 _rebuild(root)
@@ -125,13 +127,14 @@ def _follow(shown: list[Any]) -> None:
             obj.hide_set(hidden)
 
 
-def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
+def _true_sizes(roots: list[Any], touched: list[Any]) -> set[Any]:
     """Keep true sizes and positions of roots and obstacles when the scene's unit of length changes.
 
     A root's scale records the unit that its size is right for, an obstacle's property does; both are undone
-    with the object. A scaled parent's factor is divided out. An unlocked root is left to the user.
+    with the object. A scaled parent's factor is divided out. An unlocked root is left to the user. Returns
+    the roots that were changed.
     """
-    moved = set()
+    moved: set[Any] = set()
     for root in roots:
         own = scene_units.true_scale(root, _scene_of(root))
         if own is None or not all(root.lock_scale) or all(abs(s - own) <= 1e-5 * own for s in root.scale):
@@ -149,6 +152,22 @@ def _true_sizes(roots: list[Any], touched: list[Any]) -> None:
             obj.location *= wanted / own
             obj.scale *= wanted / own
         obj.mu_obstacle.mm = wanted
+    return moved
+
+
+def _bring_into_view(arrived: set[Any]) -> None:
+    """Frame what was pasted or appended from a scene of another unit of length: views are of the old size."""
+    names = [displays.uuid_of(root) for root in arrived]
+    if not names or bpy.app.background:
+        return
+
+    def framed() -> None:
+        found = [root for root in map(displays.by_uuid, names) if root is not None]
+        if found:
+            viewports.frame(found)
+
+    # A handler of an update sees the sizes before it.
+    bpy.app.timers.register(framed, first_interval=0.0)
 
 
 def _scene_of(obj: Any) -> Any:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
+_AMOUNT = re.compile(r"(?<=\d) (?=%|(?:mm|kPa|N|s|min|h|MB|GB)\b)")
+HARD_SPACE = "\N{NO-BREAK SPACE}"
 
 
 class TabPanel:
@@ -37,12 +40,12 @@ class RootPanel(TabPanel):
 
 
 def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> None:
-    """Draw labels that show a text in several lines."""
+    """Draw labels that show a text in several lines; no line ends between a number and its unit."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for paragraph in text.split("\n"):
-        for line in textwrap.wrap(paragraph, width) or [""]:
-            column.label(text=line, icon=icon)
+        for line in textwrap.wrap(_AMOUNT.sub(HARD_SPACE, paragraph), width) or [""]:
+            column.label(text=line.replace(HARD_SPACE, " "), icon=icon)
             icon = "BLANK1" if icon != "NONE" else "NONE"
 
 

@@ -28,8 +28,15 @@ class Signal:
         if function in self._connected:
             self._connected.remove(function)
 
-    def send(self, root: Any) -> list[Any]:
-        """Call every connected function, in the order of connection; return their answers."""
+    def send(self, root: Any) -> None:
+        """Call every connected function, in the order of connection.
+
+        Nothing is returned: Blender takes a property's update function that returns a value for an error.
+        """
+        self.answers(root)
+
+    def answers(self, root: Any) -> list[Any]:
+        """What every connected function returns, in the order of connection."""
         return [function(root) for function in self._connected]
 
 

@@ -159,7 +159,7 @@ def _fingerprint(root: Any) -> str:
         return error.what
     steps = "".join(f"{entry.name}{entry.muted:d}{entry.shown:d}" for entry in props.stack)
     shown = shape_hash(unit), props.path, props.cut, props.candidates, steps, envelope.fingerprint(root)
-    return "|".join(map(str, (*shown, *DRAWN_BESIDE.send(root))))
+    return "|".join(map(str, (*shown, *DRAWN_BESIDE.answers(root))))
 
 
 def _draw(root: Any, unit: Unit) -> None:

@@ -177,3 +177,48 @@ def test_everything_a_designer_meets_says_what_it_is():
                 silent.append(f"{name}.{p.identifier}")
     assert len(shown) > 40
     assert not silent, silent
+
+
+def test_no_setting_is_an_error_to_set(tmp_path):
+    """Blender prints what fails in a property's update function: here each property is set to its value."""
+    import os
+
+    from .acting import add
+
+    root = add(preset="mu-1.0x")
+    for kind in ("targets", "freedoms"):
+        bpy.ops.mu.optimize_list(what=kind)
+    bpy.ops.mu.gripper_add()
+    gripper = bpy.context.view_layer.objects.active
+    groups = [getattr(root, name) for name in dir(root) if name.startswith("mu_") and name != "mu_gripper"]
+    assert len(groups) > 8
+    kept = os.dup(1), os.dup(2)
+    with (tmp_path / "output").open("w") as file:
+        for number in (1, 2):
+            os.dup2(file.fileno(), number)
+        done = sum(map(_set_again, [*groups, gripper.mu_gripper]))
+        for number, own in zip((1, 2), kept, strict=True):
+            os.dup2(own, number)
+            os.close(own)
+    output = (tmp_path / "output").read_text()
+    assert done > 150, done
+    assert "Error" not in output, output
+
+
+def _set_again(group):
+    """Set every setting in a group, and in the groups within, to its value; return their number."""
+    done = 0
+    for prop in group.bl_rna.properties:
+        if prop.identifier == "rna_type":
+            continue
+        value = getattr(group, prop.identifier)
+        if prop.type == "COLLECTION":
+            done += sum(_set_again(row) for row in value)
+        elif prop.type == "POINTER":
+            inner = isinstance(value, bpy.types.PropertyGroup)
+            done += _set_again(value) if inner else 0
+        elif not prop.is_readonly and not (prop.type == "ENUM" and value == ""):
+            # A list without items holds no value.
+            setattr(group, prop.identifier, value)
+            done += 1
+    return done

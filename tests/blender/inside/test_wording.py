@@ -1,5 +1,9 @@
 """Texts of the core as panels have them: nothing of the command line."""
 
+import re
+from unittest.mock import MagicMock
+
+from mu_addon.blender.shared.panels import wrapped
 from mu_addon.blender.shared.wording import in_panel
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 
@@ -12,3 +16,13 @@ def test_what_to_do_about_a_cause_names_buttons_and_no_options():
     assert in_panel(what_to_do(("overcure",))).startswith(
         "Apply the extended model; print with that offset (Comp"
     )
+
+
+def test_no_line_of_a_panel_ends_between_a_number_and_its_unit():
+    layout = MagicMock()
+    for end in range(20, 40):
+        wrapped(layout, f"{'x' * end} 12 % too small, by 3.5 mm in 2 structures")
+    lines = [call.kwargs["text"] for call in layout.column.return_value.label.call_args_list]
+    assert {"12 %", "3.5 mm", "2 structures"} <= set(re.findall(r"[\d.]+ \S[a-z]*", "\n".join(lines)))
+    assert not [line for line in lines if re.search(r"\d$", line) and not line.endswith(" 2")]
+    assert all("\N{NO-BREAK SPACE}" not in line for line in lines)
