@@ -418,8 +418,10 @@ def while_bending():
         viewports.redraw()
         yield 0.1
     gesture("Bend")
+    viewports.frame([root])
     root.mu_live.on = True
     yield from bent(root)
+    assert viewports.holds(parts()[1], viewports.corners(bending.parts(root))), "it is longer than at rest"
     gesture("the pressure dragged")
     for kPa in range(0, 41, 2):
         root.mu_live.pressure_kPa = kPa

@@ -142,13 +142,15 @@ def _dependence(layout, judged):
     if not rows:
         return
     header, body = layout.panel("MU_dependence", default_closed=True)
-    header.label(text="Residuals Depend on")
+    header.label(text="Structure of the Residuals")
     if body:
         for against, p, where in rows[:ROWS]:
-            row = body.row()
-            row.label(text=readable(against), icon="ERROR" if p < 0.01 else "BLANK1")
+            row = body.split(factor=0.62)
+            # Of the residual's size, not of its place.
+            name = "above stated noise" if against == "spread" else readable(against)
+            row.label(text=name, icon="ERROR" if p < 0.01 else "BLANK1")
             row.label(text="p < 1e-16" if p < 1e-16 else f"p = {p:.2g}")
-            if where and p < 0.01:
+            if where not in ("", "all") and p < 0.01:
                 wrapped(body, where, "BLANK1")
         if len(rows) > ROWS:
             body.label(text=f"{len(rows) - ROWS} more in the report")

@@ -205,8 +205,11 @@ def _tick() -> float | None:
 def _follow(root: Any, live: Live) -> None:
     """Send the process due requests, and show its answers."""
     if live.arrived is not None:
+        first = live.shape is None
         live.shape, live.arrived = live.arrived, None
         place(root)
+        if first:
+            _keep_in_view(root, live.shape)
         viewports.redraw()
         return
     if start_child.is_busy():
@@ -318,6 +321,15 @@ def pose(root: Any, shape: Shape) -> None:
         else:
             colours.plain(part, region)
         part.data.update()
+
+
+def _keep_in_view(root: Any, shape: Shape) -> None:
+    """A view that holds the unit at rest holds it bent: pressure lengthens it."""
+    reached = np.concatenate([v.reshape(-1, 3) for v in shape.vertices.values()])
+    low, high = reached.min(axis=0), reached.max(axis=0)
+    box = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    placed = np.array(root.matrix_world)
+    viewports.keep_in_view(viewports.corners([root]), box @ placed[:3, :3].T + placed[:3, 3])
 
 
 def _mean(share: Any, values: Any) -> Any:

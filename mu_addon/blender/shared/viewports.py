@@ -23,24 +23,49 @@ def areas() -> Iterator[Any]:
                 yield area
 
 
-def frame(objects: Iterable[Any], only: Any | None = None) -> None:
-    """Frame objects in every 3D view or in one, from its present side; also in background."""
+def corners(objects: Iterable[Any]) -> Any:
+    """Corners (8 n, 3) of the boxes of n objects as they are drawn, in the scene."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = [obj.evaluated_get(depsgraph) for obj in objects]
-    corners = np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    radius = ROOM * float(np.linalg.norm(corners - middle, axis=1).max())
+    return np.array([obj.matrix_world @ Vector(c) for obj in evaluated for c in obj.bound_box])
+
+
+def frame(objects: Iterable[Any], only: Any | None = None) -> None:
+    """Frame objects in every 3D view or in one, from its present side; also in background."""
+    points = corners(objects)
     for area in areas() if only is None else (only,):
-        region = next(region for region in area.regions if region.type == "WINDOW")
-        # The narrower side; unknown in background.
-        share = min(region.height / region.width, 1.0) if min(region.height, region.width) > 1 else LOWER
-        space = area.spaces.active
-        view = space.region_3d
-        view.view_location = middle
-        # Half the angle of the view is that of its width.
-        view.view_distance = radius / (share * SENSOR_MM / (2.0 * space.lens))
-        space.clip_start = min(space.clip_start, view.view_distance / 100.0)
-        space.clip_end = max(space.clip_end, 10.0 * view.view_distance)
+        _frame_points(area, points)
+
+
+def _frame_points(area: Any, points: Any) -> None:
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    radius = ROOM * float(np.linalg.norm(points - middle, axis=1).max())
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    # The narrower side; unknown in background.
+    share = min(region.height / region.width, 1.0) if min(region.height, region.width) > 1 else LOWER
+    space = area.spaces.active
+    view = space.region_3d
+    view.view_location = middle
+    # Half the angle of the view is that of its width.
+    view.view_distance = radius / (share * SENSOR_MM / (2.0 * space.lens))
+    space.clip_start = min(space.clip_start, view.view_distance / 100.0)
+    space.clip_end = max(space.clip_end, 10.0 * view.view_distance)
+
+
+def keep_in_view(before: Any, after: Any) -> None:
+    """Frame points (m, 3) in those 3D views that held others (n, 3) whole and do not hold these."""
+    for area in areas():
+        if holds(area, before) and not holds(area, after):
+            _frame_points(area, after)
+
+
+def holds(area: Any, points: Any) -> bool:
+    """Return True if all points (n, 3) are within a view, headers and sidebar over it left aside."""
+    projected = (
+        np.column_stack([points, np.ones(len(points))])
+        @ np.array(area.spaces.active.region_3d.perspective_matrix).T
+    )
+    return bool((np.abs(projected[:, :2]) <= projected[:, 3:]).all())
 
 
 def scale(factor: float) -> None:

@@ -30,6 +30,7 @@ _NAMES = {
     "sensor_modulus_kPa": "Sensor E (kPa)",
     "elongation_at_break": "Break Strain",
     "offset_xy_mm": "Offset XY",
+    "inclusion_radius_mm": "Inclusion R",
 }
 """Parameters whose own names are too vague beside a field, or too long for it."""
 

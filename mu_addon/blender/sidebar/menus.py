@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...design.steps import STEPS
 from ..scene import handles
 from ..shared import displays
 from ..unit import presets
@@ -46,6 +47,41 @@ def _add(self, context):
     self.layout.operator("mu.gripper_add", icon="MOD_MIRROR")
 
 
+SUBJECTS = {
+    "Design Step": [*STEPS, "fit_all", "tree_of_unit"],
+    "Body": ["body", "body_check", "body_repair", "body_remove"],
+    "Cell Painting": ["paint_struts", "paint_struts_apply", "paint_struts_discard"],
+    "Obstacles": ["obstacle", "obstacle_box", "obstacle_check"],
+    "Result": ["motion", "motion_range", "motion_legend", "motion_update", "motion_clear", "probe"],
+    "Run": ["open", "run_restore", "run_remove", "cancel"],
+    "Optimize": ["optimize"],
+    "Evidence": ["import_files", "evidence_diagnose", "evidence_apply", "evidence_remove"],
+    "Print": ["print_check", "print_marks", "print_clear", "print_layer", "print_layer_clear"],
+    "Print Files": ["print_export", "export_stl", "print_specimens", "print_check_file"],
+    "Sensor on the Bench": [
+        *("sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause", "sensor_mark"),
+        *("sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_calibrate", "sensor_zero", "sensor_twin"),
+    ],
+    "Gripper": ["grasp", "grasp_show", "gripper_delete"],
+}  # fmt: skip
+"""Actions on the active unit or gripper by subject, without those on one row of a list: a submenu each, so
+that Blender's menu search (F3), which finds what is in menus, finds them."""
+
+
+def _submenu(title: str) -> type:
+    def draw(self, context):
+        self.layout.operator_context = "INVOKE_REGION_WIN"
+        for name in SUBJECTS[title]:
+            self.layout.operator(f"mu.{name}")
+
+    name = f"MU_MT_{title.lower().replace(' ', '_')}"
+    members = {"__doc__": "Actions of this subject", "bl_idname": name, "bl_label": title, "draw": draw}
+    return type(name, (bpy.types.Menu,), members)
+
+
+_SUBMENUS = [_submenu(title) for title in SUBJECTS]
+
+
 class MU_MT_object(bpy.types.Menu):
     """Actions on a whole unit or gripper"""
 
@@ -61,15 +97,13 @@ class MU_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator("mu.simulate", icon="PLAY")
         layout.operator_menu_enum("mu.field_show", "field", text="Show on the Unit", icon="SHADING_RENDERED")
-        layout.operator("mu.solid", icon="MESH_DATA")
-        layout.operator("mu.print_check", icon="VIEWZOOM")
-        layout.operator("mu.export_stl", icon="EXPORT")
+        layout.separator()
+        for menu in _SUBMENUS:
+            layout.menu(menu.bl_idname)
         layout.separator()
         layout.operator("mu.select", icon="RESTRICT_SELECT_OFF")
         layout.operator("mu.rebuild", icon="FILE_REFRESH")
         layout.operator("mu.delete", icon="TRASH")
-        layout.separator()
-        layout.operator("mu.gripper_delete", icon="TRASH")
 
 
 def _object(self, context):
@@ -100,7 +134,7 @@ class MU_MT_more(bpy.types.Menu):
         layout.operator("mu.assets_remove")
 
 
-CLASSES = (MU_MT_presets, MU_MT_presets_remove, MU_MT_object, MU_MT_more)
+CLASSES = (MU_MT_presets, MU_MT_presets_remove, *_SUBMENUS, MU_MT_object, MU_MT_more)
 
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)

@@ -4,6 +4,7 @@ Timers never fire in background: the tests call what they call.
 """
 
 import time
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -14,7 +15,7 @@ from mu_addon.blender.live_bending import state as live
 from mu_addon.blender.live_bending import words
 from mu_addon.blender.results import motion as motion_parts
 from mu_addon.blender.scene import gestures, handles
-from mu_addon.blender.shared import displays
+from mu_addon.blender.shared import displays, viewports
 from mu_addon.blender.unit import object as unit_object
 
 from .acting import add
@@ -168,3 +169,18 @@ def test_what_cannot_be_bent_live_is_told(tmp_path):
     assert live.of(root).due_s is None
     root.mu_live.on = False
     assert unit_object.roots() == [root]
+
+
+def test_a_view_that_holds_the_unit_at_rest_holds_it_bent(monkeypatch):
+    """A view of 2 by 2: framed for what leaves it, left alone where the unit at rest is out of it already."""
+    framed = []
+    eye = SimpleNamespace(perspective_matrix=np.eye(4))
+    area = SimpleNamespace(spaces=SimpleNamespace(active=SimpleNamespace(region_3d=eye)))
+    monkeypatch.setattr(viewports, "areas", lambda: [area])
+    monkeypatch.setattr(viewports, "_frame_points", lambda area, points: framed.append(points))
+    box = np.array([[-0.8, -0.8, 0.0], [0.8, 0.8, 0.0]])
+    viewports.keep_in_view(box, 1.2 * box)
+    viewports.keep_in_view(1.3 * box, 1.4 * box)
+    assert len(framed) == 0
+    viewports.keep_in_view(box, 1.3 * box)
+    assert len(framed) == 1
