@@ -26,14 +26,12 @@ from .freedoms import PATH, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
-from .settings import FINER
+from .settings import BODY, FINER, HEADER, RESIN, UNIT
 from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
 from .unit_quantities import Mass
 
 FORMAT = 1
-UNIT, RESIN, BODY = "unit.toml", "resin.toml", "body.obj"
-HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit that it starts from."
 _KEYS = (
     "format", "preset", "unit", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",

@@ -7,6 +7,7 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
+from ...usecases.optimize.files import FRONT
 from ..jobs.panel import job_state, start_button, timed
 from ..shared.file_cache import icon_of
 from ..shared.panels import alert, wrapped
@@ -169,7 +170,7 @@ def _results(layout, found) -> None:
     row = box.row(align=True)
     row.operator("mu.optimize_open", text="Report", icon="URL").what = "report"
     row.operator("mu.optimize_open", text="Folder", icon="FILE_FOLDER").what = "folder"
-    icon = icon_of(found.folder / optimization.FRONT)
+    icon = icon_of(found.folder / FRONT)
     if icon is not None:
         layout.template_icon(icon, scale=FRONT_SIZE)
     for proposed in found.proposed:

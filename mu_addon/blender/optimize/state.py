@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import bpy
 
-from ...design.parameters import SECTIONS, Unit, read_unit
+from ...design.parameters import SECTIONS, Unit, read_unit, to_toml
 from ...design.quantity import describe
 from ...design.repairs import tied
 from ...errors import InputError, MuError
+from ...optimization.freedoms import Freedom, changed_unit
+from ...optimization.settings import BODY, HEADER, UNIT
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
+from ...toml_writer import toml_text
 from ...usecases.optimize.expected import search_plan
+from ...usecases.optimize.files import DESIGN, LAYOUT, MODEL
+from ..jobs import prepared
 from ..jobs.start_child import JobKind
 from ..shared.blender_property import exact
 from ..shared.file_cache import FileCache
@@ -29,9 +34,7 @@ if TYPE_CHECKING:
 
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
-DESIGN, UNIT, MODEL, SUMMARY = "design.toml", "unit.toml", "model.toml", "summary.json"
-FRONT = "front.png"
-"""Picture of two targets' front by the core, in the run's folder."""
+SUMMARY = "summary.json"
 
 
 TARGET_KEYS = ("name", "asked", "unit", "value", "objective", "met", "robust")
@@ -177,7 +180,6 @@ def job_of(root: Any) -> Job:
     """Optimisation job from a unit's properties; raises InputError."""
     # Imported late: it needs the solver's packages, which a Blender may lack.
     from ...optimization.design_file import parse_design
-    from ...toml_writer import toml_text
     from ...usecases.optimize.job import Job, job_from
 
     unit, s = to_unit(root.mu_unit), root.mu_optimize
@@ -189,16 +191,32 @@ def job_of(root: Any) -> Job:
     return Job(parse_design(toml_text(document(root)), DESIGN, unit, body=body))
 
 
+def unread_texts(root: Any) -> dict[str, str]:
+    """The texts of `job_of` from the panel's lists, by name of the file, not checked; raises InputError."""
+    tables, unit = document(root), to_unit(root.mu_unit)
+    body = envelope.envelope_in(root, unit)
+    fixed = {table["parameter"]: table["fixed"] for table in tables["freedom"] if "fixed" in table}
+    beside = {UNIT: to_toml(changed_unit(unit, [Freedom(name) for name in fixed], list(fixed.values())))}
+    tables["unit"] = tables.pop("unit")  # last, as the core writes it
+    if body is not None:
+        tables["body"], beside[BODY] = BODY, body.text()
+    return {DESIGN: toml_text(tables, HEADER), **beside}
+
+
 def write_inputs(root: Any, folder: Path) -> None:
     """Write the inputs of the unit's optimisation into a folder; raises InputError, OutputError."""
-    from ...usecases.optimize.job import LAYOUT
-
-    job = job_of(root)
-    texts = job.texts()
+    own = root.mu_optimize
+    files = own.source == "file" or any(".toml" in freedom.values for freedom in own.freedoms)
+    if files or prepared.at_once():
+        job = job_of(root)
+        texts, orientation_deg = job.texts(), job.design.orientation_deg
+    else:
+        # The job reads and checks them: the packages that this takes would hold the window for a second.
+        texts, orientation_deg = unread_texts(root), exact(own.orientation_deg) if own.has_gravity else None
     model = root.mu_unit.study.effects
     if model:
         turned = effects.inputs(root).get("orientation_deg", 0.0)
-        if turned != (job.design.orientation_deg or 0.0):
+        if turned != (orientation_deg or 0.0):
             raise InputError(
                 f"the unit is turned by {turned:g} degrees in Simulate, but not here",
                 "Optimize, Own Weight",

@@ -11,22 +11,14 @@ from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
 from ...fem.unit_materials import materials_of
-from ...optimization.design_file import BODY, HEADER, RESIN, UNIT, Design, read_design
+from ...optimization.design_file import Design, read_design
 from ...optimization.settings import WORKERS
 from ...optimization.unit_body import Mechanics
 from ...reading import file_text
-from ...run.folder import FolderLayout
 from ..simulate_and_place.extended_unit import extend
 from ..simulate_and_place.named_effects import NamedEffects
+from .files import DESIGN, MODEL
 
-DESIGN, MODEL = "design.toml", "model.toml"
-TABLE, REPORT, FRONT = "designs.csv", "report.html", "front.png"
-LAYOUT = FolderLayout(
-    DESIGN,
-    HEADER,
-    results=(TABLE, REPORT, FRONT, "proposed-*.toml", "proposed-*.png"),
-    optional=(UNIT, RESIN, "resin-*.toml", BODY, MODEL),
-)
 # No file of inputs is longer, in bytes.
 _LONGEST = 1_000_000
 

@@ -26,7 +26,8 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from . import charts
 from .expected import MOST_CHECKED, search_plan
-from .job import FRONT, LAYOUT, MODEL, REPORT, TABLE, Job, mechanics_of, read_job
+from .files import FRONT, LAYOUT, MODEL, REPORT, TABLE
+from .job import Job, mechanics_of, read_job
 from .report import write_report
 from .words import changes, outcome, reasons, verdict
 from .worker import asked_of, several

@@ -112,6 +112,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
 
     expected = sum(seconds for _, seconds in optimization.plan_of(root))
     assert f"Optimize, perhaps {rounded(expected)}" in drawn()
+    assert optimization.unread_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
     design = read_job(tmp_path / "run").design
     unit = to_unit(root.mu_unit)
@@ -183,6 +184,7 @@ def test_the_users_own_body_goes_along(tmp_path):
     for vertex in cube.data.vertices:
         vertex.co = np.array(vertex.co) * half + [0.0, 5.5, 37.5]
     root.mu_unit.envelope = cube.data
+    assert optimization.unread_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
     job = read_job(tmp_path / "run")
     np.testing.assert_allclose(np.ptp(job.design.body.bounds, axis=0), 2 * half, atol=1e-4)
@@ -202,6 +204,19 @@ def test_what_the_core_refuses_is_said_and_nothing_is_written(tmp_path):
     assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"FINISHED"}
     assert bpy.ops.mu.optimize_unlist(what="targets", index=0) == {"CANCELLED"}
     assert not bpy.ops.mu.optimize.poll()
+
+
+def test_in_a_window_the_job_refuses_what_the_core_does(tmp_path, monkeypatch):
+    root = add()
+    root.mu_unit.study.folder = str(tmp_path)
+    target(root, "angle", ask="range", low=30.0, high=20.0)
+    free(root, "chambers.wall_mm")
+    monkeypatch.setattr(optimization.prepared, "at_once", lambda: False)
+    assert bpy.ops.mu.optimize() == {"FINISHED"}
+    child = optimization.OPTIMIZATION.child(root)
+    assert ended(child).state == "failed"
+    assert "low is not below high" in child.error["what"]
+    assert "low is not below high" in drawn()
 
 
 def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
@@ -333,7 +348,7 @@ def test_the_panel_says_how_to_begin_what_is_entered_and_what_a_sign_means(tmp_p
     summary.write_text(json.dumps(said))
     assert "Question mark: met" in drawn()
     pictures = drawn().count("a picture")
-    picture(to_unit(root.mu_unit), optimization.folder_of(root) / optimization.FRONT)
+    picture(to_unit(root.mu_unit), optimization.folder_of(root) / panels.FRONT)
     assert drawn().count("a picture") == pictures + 1
 
 
