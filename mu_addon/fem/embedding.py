@@ -38,6 +38,22 @@ class Embedding(Probe):
         found[self.mirrored, 0] *= -1.0
         return found
 
+    def displacements(self, states: Array) -> Array:
+        """Displacements (s, p, 3) in mm of the points, in single precision, in states (s, n, 3) at once.
+
+        A third of the time of one state after another: a window waits for it.
+        """
+        by_node = np.ascontiguousarray(states.transpose(1, 0, 2).reshape(states.shape[1], -1), np.float32)
+        weights, found = (
+            self.weights.astype(np.float32),
+            np.zeros((len(self.nodes), by_node.shape[1]), np.float32),
+        )
+        for k in range(self.nodes.shape[1]):
+            found += weights[:, k, None] * by_node[self.nodes[:, k]]
+        moved = found.reshape(len(found), -1, 3).transpose(1, 0, 2)
+        moved[:, self.mirrored, 0] *= -1.0
+        return moved
+
 
 def embed(mesh: Mesh, points: Array) -> Embedding:
     """Embed points (p, 3) in mm in a mesh, so that they move with its deformation.

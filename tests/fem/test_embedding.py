@@ -79,7 +79,10 @@ def test_a_half_mesh_carries_both_sides():
     u[half.symmetry_nodes("x"), 0] = 0.0
     whole = mirror(half, "x")
     points = scattered(100, [-0.95, 0.05, 0.05], 0.95)
-    found = embed(half, points).displacement(u)
+    carried = embed(half, points)
+    found = carried.displacement(u)
+    together = carried.displacements(np.array([u, -2.0 * u]))
+    np.testing.assert_allclose(together, [found, -2.0 * found], atol=1e-6 * np.abs(u).max())
     assert np.allclose(found, embed(whole, points).displacement(mirror_displacement(half, u, "x")), atol=1e-9)
     other = attrs.evolve(half, nodes=half.nodes * [-1, 1, 1], tets=half.tets[:, FLIPPED_TET])
     assert np.allclose(embed(other, points).displacement(u * [-1, 1, 1]), found, atol=1e-9)

@@ -187,10 +187,9 @@ class Motion:
     def carried(self, name: str, embedding: Embedding) -> Array:
         """Displacements (s, p, 3) in mm of embedded points at Model A's states, of Model A or of a path."""
         own, image = self.sides(name)
-        moved = np.array([embedding.displacement(u) for u in own], np.float32)
+        moved = embedding.displacements(own)
         if image is not None:
-            far = np.array([embedding.displacement(u) for u in image], np.float32)
-            moved[:, embedding.mirrored] = far[:, embedding.mirrored]
+            moved[:, embedding.mirrored] = embedding.displacements(image)[:, embedding.mirrored]
         return moved
 
     def embedding_file(self, points: Array) -> Path:
