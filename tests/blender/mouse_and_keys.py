@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import event, key, module, move, parts, place, run
+from simulated import drag, key, module, move, parts, run
 
 unit_object = module("blender.unit.object")
 
@@ -47,16 +47,10 @@ def session():
     # The slider, with the panel as it first opens; a few rows up and down where fonts differ.
     region = parts()[2]
     for rows in (0, -1, 1, -2, 2, 3):
-        move(region.x + 175, region.y + region.height - 450 + 20 * rows)
-        yield 1.5
+        start = region.x + 175, region.y + region.height - 450 + 20 * rows
         built = unit_object.roots()[0].mu_unit.built
-        event("LEFTMOUSE", "PRESS")
-        yield 1.0
-        for _ in range(6):
-            move(place[0] + 4, place[1])
-            yield 1.2
-        event("LEFTMOUSE", "RELEASE")
-        yield 3.0
+        yield from drag(start, (start[0] + 24, start[1]), pause=1.2)
+        yield 1.5
         if abs(wall() - 0.9) > 1e-4:
             break
         if unit_object.roots()[0].mu_unit.built != built:

@@ -50,15 +50,15 @@ def click(x, y):
     yield 1.5
 
 
-def drag(start, end, steps=6):
-    """From one place to another with the left button held."""
+def drag(start, end, steps=6, pause=0.3):
+    """From one place to another with the left button held; pause: in s after each step."""
     move(*start)
     yield 1.0
     event("LEFTMOUSE", "PRESS")
     yield 0.5
     for k in range(1, steps + 1):
         move(*(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
-        yield 0.3
+        yield pause
     event("LEFTMOUSE", "RELEASE")
     yield 1.5
 
@@ -73,15 +73,8 @@ def dragged_in_redo_panel(changed):
     yield 5.0
     # In the panel whose upper left corner is at the mouse; fonts differ a little.
     for down in (52, 60, 45):
-        move(corner[0] + 224, corner[1] - down)
-        yield 1.5
-        event("LEFTMOUSE", "PRESS")
-        yield 1.0
-        for _ in range(6):
-            move(place[0] + 4, place[1])
-            yield 1.0
-        event("LEFTMOUSE", "RELEASE")
-        yield 4.0
+        yield from drag((corner[0] + 224, corner[1] - down), (corner[0] + 248, corner[1] - down), pause=1.0)
+        yield 2.5
         if changed():
             break
     key("ESC")
