@@ -167,11 +167,6 @@ def root():
     return unit_object.roots()[0]
 
 
-def over_view(right=0.35, up=0.55):
-    _, area, _ = parts()
-    move(area.x + area.width * right, area.y + area.height * up)
-
-
 def scrolled(times):
     """The sidebar turned down."""
     region = parts()[2]
@@ -637,7 +632,7 @@ if bpy.app.background:
 else:
     import math
 
-    from simulated import called, event, key, module, move, package, parts, run
+    from simulated import called, event, key, module, move, over_view, package, parts, run
 
     unit_object, printing = module("blender.unit.object"), module("blender.printing.state")
     handles = module("blender.scene.handles")

@@ -44,10 +44,8 @@ class Embedding(Probe):
         A third of the time of one state after another: a window waits for it.
         """
         by_node = np.ascontiguousarray(states.transpose(1, 0, 2).reshape(states.shape[1], -1), np.float32)
-        weights, found = (
-            self.weights.astype(np.float32),
-            np.zeros((len(self.nodes), by_node.shape[1]), np.float32),
-        )
+        weights = self.weights.astype(np.float32)
+        found = np.zeros((len(self.nodes), by_node.shape[1]), np.float32)
         for k in range(self.nodes.shape[1]):
             found += weights[:, k, None] * by_node[self.nodes[:, k]]
         moved = found.reshape(len(found), -1, 3).transpose(1, 0, 2)

@@ -14,16 +14,13 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import called, dragged_in_redo_panel, key, module, move, package, parts, run
+from simulated import called, dragged_in_redo_panel, key, module, over_view, package, parts, run
 
 FOLDER = Path(os.environ["MU_TEST_FOLDER"])
 unit_object, trees = module("blender.unit.object"), module("blender.node_tree.state")
 handles, printing = module("blender.scene.handles"), module("blender.printing.state")
 results = module("blender.results.motion")
-OPTIMIZATION, studies = (
-    module("blender.optimize.state").OPTIMIZATION,
-    module("blender.simulate.study_folder"),
-)
+studies, OPTIMIZATION = module("blender.simulate.study_folder"), module("blender.optimize.state").OPTIMIZATION
 classes, scene_units = module("blender.node_tree.classes"), module("blender.shared.scene_units")
 SIMULATION = module("blender.simulate.job").SIMULATION
 bending, viewports = module("blender.live_bending.state"), module("blender.shared.viewports")
@@ -98,12 +95,6 @@ def roots():
 def only():
     (root,) = roots()
     return root
-
-
-def over_view():
-    """The mouse over the 3D view, where keys go."""
-    _, area, _ = parts()
-    move(area.x + area.width * 0.4, area.y + area.height * 0.5)
 
 
 def select(*objects):

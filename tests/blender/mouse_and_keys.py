@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import drag, key, module, move, parts, run
+from simulated import drag, key, module, over_view, parts, run
 
 unit_object = module("blender.unit.object")
 
@@ -26,8 +26,7 @@ def session():
     yield 3.0
     parts()[2].active_panel_category = "MU"
     yield 2.0
-    middle = area.x + area.width * 0.4, area.y + area.height * 0.5
-    move(*middle)
+    over_view()
     yield 2.0
     key("A", shift=True)
     yield 3.0
@@ -62,7 +61,7 @@ def session():
     dragged = wall()
     (root,) = unit_object.roots()
     assert not unit_object.behind(root)
-    move(*middle)
+    over_view()
     yield 1.5
     key("Z", ctrl=True)
     yield 3.0

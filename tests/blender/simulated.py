@@ -42,6 +42,13 @@ def move(x, y):
     event("MOUSEMOVE", "NOTHING")
 
 
+def over_view(right=0.4, up=0.5):
+    """Move the mouse over the 3D view, where keys go, to shares of its width and height; gives the place."""
+    _, area, _ = parts()
+    move(area.x + area.width * right, area.y + area.height * up)
+    return tuple(place)
+
+
 def click(x, y):
     """A click of the left button, once Blender has seen the mouse there."""
     move(x, y)
@@ -65,9 +72,7 @@ def drag(start, end, steps=6, pause=0.3):
 
 def dragged_in_redo_panel(changed):
     """Drag the first field of the last operator's redo panel by 24 pixels until `changed()`."""
-    _, area, _ = parts()
-    corner = area.x + area.width * 0.35, area.y + area.height * 0.55
-    move(*corner)
+    corner = over_view(0.35, 0.55)
     yield 2.0
     key("F9")
     yield 5.0

@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import called, dragged_in_redo_panel, key, module, move, parts, run
+from simulated import called, dragged_in_redo_panel, key, module, over_view, run
 
 unit_object, stack = module("blender.unit.object"), module("blender.unit.stack")
 drawing = module("blender.unit.drawing")
@@ -33,12 +33,11 @@ def session():
     assert stack.STACK.counts - before == {"chambers": 1}
     yield 4.0
     yield from dragged_in_redo_panel(lambda: abs(unit().chambers.wall_mm - 0.9) > 1e-4)
-    _, area, _ = parts()
     dragged = unit().chambers.wall_mm
     assert abs(dragged - 0.9) > 1e-4, "no field was found in the redo panel"
     assert abs(dragged - 0.9) < 0.5, f"24 pixels changed the wall from 0.9 to {dragged:.4g} mm"
     assert not unit_object.behind(unit_object.roots()[0])
-    move(area.x + area.width * 0.5, area.y + area.height * 0.3)
+    over_view(0.5, 0.3)
     yield 2.0
     key("Z", ctrl=True)
     yield 4.0
@@ -51,7 +50,7 @@ def session():
     called(bpy.ops.mu.mute, step="cells")
     yield 4.0
     assert shown() == whole - {"lattice"}, shown()
-    move(area.x + area.width * 0.5, area.y + area.height * 0.3)
+    over_view(0.5, 0.3)
     yield 2.0
     key("Z", ctrl=True)
     yield 4.0

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated import called, click, drag, key, module, move, parts, run
+from simulated import called, click, drag, key, module, move, over_view, parts, run
 
 FOLDER = Path(os.environ["MU_TEST_FOLDER"])
 unit_object, trees = module("blender.unit.object"), module("blender.node_tree.state")
@@ -49,9 +49,7 @@ def moved_to_a_collection():
     root = only()
     root.mu_unit.candidates = True
     yield 2.0
-    _, area, _ = parts()
-    middle = area.x + area.width * 0.4, area.y + area.height * 0.5
-    move(*middle)
+    middle = over_view()
     yield 1.0
     key("M")
     yield 1.5

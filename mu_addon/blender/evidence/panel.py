@@ -142,11 +142,11 @@ def _dependence(layout, judged):
     if not rows:
         return
     header, body = layout.panel("MU_dependence", default_closed=True)
-    header.label(text="Structure of the Residuals")
+    header.label(text="Dependence of the Residual")
     if body:
         for against, p, where in rows[:ROWS]:
             row = body.split(factor=0.62)
-            # Of the residual's size, not of its place.
+            # The test of the residual's size depends on no quantity.
             name = "above stated noise" if against == "spread" else readable(against)
             row.label(text=name, icon="ERROR" if p < 0.01 else "BLANK1")
             row.label(text="p < 1e-16" if p < 1e-16 else f"p = {p:.2g}")

@@ -191,7 +191,7 @@ def job_of(root: Any) -> Job:
     return Job(parse_design(toml_text(document(root)), DESIGN, unit, body=body))
 
 
-def unread_texts(root: Any) -> dict[str, str]:
+def unchecked_texts(root: Any) -> dict[str, str]:
     """The texts of `job_of` from the panel's lists, by name of the file, not checked; raises InputError."""
     tables, unit = document(root), to_unit(root.mu_unit)
     body = envelope.envelope_in(root, unit)
@@ -211,8 +211,8 @@ def write_inputs(root: Any, folder: Path) -> None:
         job = job_of(root)
         texts, orientation_deg = job.texts(), job.design.orientation_deg
     else:
-        # The job reads and checks them: the packages that this takes would hold the window for a second.
-        texts, orientation_deg = unread_texts(root), exact(own.orientation_deg) if own.has_gravity else None
+        # The job checks them: the packages that this takes would hold the window for a second.
+        texts, orientation_deg = unchecked_texts(root), document(root).get("orientation_deg")
     model = root.mu_unit.study.effects
     if model:
         turned = effects.inputs(root).get("orientation_deg", 0.0)

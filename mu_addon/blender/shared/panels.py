@@ -8,7 +8,7 @@ import textwrap
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 _AMOUNT = re.compile(r"(?<=\d) (?=%|(?:mm|kPa|N|s|min|h|MB|GB)\b)")
-HARD_SPACE = "\N{NO-BREAK SPACE}"
+_HARD_SPACE = "\N{NO-BREAK SPACE}"
 
 
 class TabPanel:
@@ -44,8 +44,8 @@ def wrapped(layout, text: str, icon: str = "NONE", width: int = CHARACTERS) -> N
     column = layout.column(align=True)
     column.scale_y = 0.85
     for paragraph in text.split("\n"):
-        for line in textwrap.wrap(_AMOUNT.sub(HARD_SPACE, paragraph), width) or [""]:
-            column.label(text=line.replace(HARD_SPACE, " "), icon=icon)
+        for line in textwrap.wrap(_AMOUNT.sub(_HARD_SPACE, paragraph), width) or [""]:
+            column.label(text=line.replace(_HARD_SPACE, " "), icon=icon)
             icon = "BLANK1" if icon != "NONE" else "NONE"
 
 

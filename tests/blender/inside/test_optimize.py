@@ -112,7 +112,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
 
     expected = sum(seconds for _, seconds in optimization.plan_of(root))
     assert f"Optimize, perhaps {rounded(expected)}" in drawn()
-    assert optimization.unread_texts(root) == optimization.job_of(root).texts()
+    assert optimization.unchecked_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
     design = read_job(tmp_path / "run").design
     unit = to_unit(root.mu_unit)
@@ -184,7 +184,7 @@ def test_the_users_own_body_goes_along(tmp_path):
     for vertex in cube.data.vertices:
         vertex.co = np.array(vertex.co) * half + [0.0, 5.5, 37.5]
     root.mu_unit.envelope = cube.data
-    assert optimization.unread_texts(root) == optimization.job_of(root).texts()
+    assert optimization.unchecked_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
     job = read_job(tmp_path / "run")
     np.testing.assert_allclose(np.ptp(job.design.body.bounds, axis=0), 2 * half, atol=1e-4)

@@ -196,10 +196,12 @@ def test_no_setting_is_an_error_to_set(tmp_path):
     with (tmp_path / "output").open("w") as file:
         for number in (1, 2):
             os.dup2(file.fileno(), number)
-        done = sum(map(_set_again, [*groups, gripper.mu_gripper]))
-        for number, own in zip((1, 2), kept, strict=True):
-            os.dup2(own, number)
-            os.close(own)
+        try:
+            done = sum(map(_set_again, [*groups, gripper.mu_gripper]))
+        finally:
+            for number, own in zip((1, 2), kept, strict=True):
+                os.dup2(own, number)
+                os.close(own)
     output = (tmp_path / "output").read_text()
     assert done > 150, done
     assert "Error" not in output, output
