@@ -15,8 +15,9 @@ from .numbering import Numbered, Numbering, Row
 
 Array = np.ndarray[Any, Any]
 
-# Least step of the host's time from sample to sample, the last digit that a recording has.
-_TICK_S = 1e-6
+# Least step of the host's time from sample to sample: more than the last digit of a recording (1e-6 s), since
+# steps of exactly that, counted from any start, are written as one value now and then.
+_TICK_S = 2e-6
 
 
 @attrs.frozen

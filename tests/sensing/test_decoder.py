@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import random
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 from mu_addon.errors import MuError
 from mu_addon.sensing.decoder import Decoder
 from mu_addon.sensing.framing import info_frame, sample_frame
+from mu_addon.sensing.recording import Recorder, read_recording
 from mu_addon.sensing.samples import Samples
 from mu_addon.usecases.sensor.stream import require_samples
 
@@ -240,6 +243,20 @@ def test_host_time_follows_the_least_delayed() -> None:
     # The least delay remains, as no clock can tell it from the offset.
     assert np.median(error[1000:]) == pytest.approx(0.001, abs=0.001)
     assert np.ptp(error[1000:]) < 0.004
+
+
+@given(st.floats(0.0, 1e6), st.integers(0, 10**9))
+@settings(max_examples=30)
+def test_samples_of_one_instant_have_rising_times_in_the_file(start_s: float, later: int) -> None:
+    # Half of the last digit after the start: rounding errors decide which way each time is rounded.
+    groups = fed(Decoder(), b"1.0 2.0\n" * 2000, [16_000], start_s + 1e-6 * (later + 0.5))
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = Recorder(Path(folder), {})
+        for samples in groups:
+            recorder.write(samples, start_s)
+        recorder.close()
+        (recording,) = read_recording(Path(folder))
+    assert np.diff(recording.columns["time_s"]).min() > 0
 
 
 def test_json_values_of_all_kinds() -> None:
