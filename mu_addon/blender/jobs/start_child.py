@@ -12,7 +12,9 @@ from __future__ import annotations
 import atexit
 import importlib
 import importlib.util
+import math
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,8 @@ from ..shared.updates import Signal
 from . import lasting_jobs
 
 INTERVAL_S = 0.2
+REDRAW_S = 1.0
+"""Time between two drawings of a job that runs."""
 LOAD_AFTER_S, LOAD_EVERY_S = 1.0, 0.1
 WRITERS = (
     "tomlkit",
@@ -236,17 +240,37 @@ def _begin_next() -> bool:
     return True
 
 
+class _Redraws:
+    """Redraws of the running jobs, as few as show the time left: a frame takes a tenth of a second of the
+    solver's processor where there is no graphics card."""
+
+    def __init__(self) -> None:
+        self._news, self._last_s = False, -math.inf
+
+    def tell(self, news: bool, changed: bool) -> None:
+        """Redraw if due. news: a job has sent something; changed: one has started or ended."""
+        self._news |= news
+        if not changed and time.monotonic() - self._last_s < REDRAW_S:
+            return
+        self._last_s = time.monotonic()
+        # The time left counts down between messages, too.
+        viewports.redraw_status()
+        # A report of progress changes no scene.
+        if changed:
+            viewports.redraw()
+        elif self._news:
+            viewports.redraw_panels()
+        self._news = False
+
+
+_redraws = _Redraws()
+
+
 def _poll() -> float | None:
     before = running()
     news = poll()
     if news or before:
-        # Redraw the bar each time: the time left counts down between messages.
-        viewports.redraw_status()
-        # A report of progress changes no scene: drawing one takes long without a graphics card.
-        if before != running():
-            viewports.redraw()
-        elif news:
-            viewports.redraw_panels()
+        _redraws.tell(news, before != running())
     for key in set(before) - set(running()):
         lasting_jobs.drop(key)
         JOB_ENDED.send(key)

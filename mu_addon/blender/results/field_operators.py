@@ -16,8 +16,6 @@ from . import field_colours, places, run_motions
 from . import motion as motion_parts
 from .operators import MotionOperator, show_colours
 
-ROOM = 1.25
-"""Factor on the framed view's size, for a margin."""
 OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
 """View from +x, for a body that is cut open."""
 
@@ -132,17 +130,13 @@ def frame_in_view(context, root) -> None:
          for part in shown
          for vertices in (motion_parts.vertices_of(part.data), places.moved(part))]
     )  # fmt: skip
-    low, high = points.min(axis=0), points.max(axis=0)
     inward = root.matrix_world.to_quaternion() @ OPEN
     for area in viewports.areas():
         view = area.spaces.active.region_3d
         toward = root.matrix_world.to_quaternion().inverted() @ (view.view_rotation @ Vector((0, 0, 1)))
         if root.mu_motion.cut and toward.x < 0.5:
             view.view_rotation = inward
-        view.view_location = Vector((low + high) / 2.0)
-        # Distance at which an upright sphere around it would fill the height.
-        lens = area.spaces.active.lens
-        view.view_distance = ROOM * float(np.linalg.norm(high - low)) / 2.0 * lens / 18.0
+        viewports.frame_points(area, points)
 
 
 CLASSES = (MU_OT_field_show,)

@@ -34,10 +34,11 @@ def frame(objects: Iterable[Any], only: Any | None = None) -> None:
     """Frame objects in every 3D view or in one, from its present side; also in background."""
     points = corners(objects)
     for area in areas() if only is None else (only,):
-        _frame_points(area, points)
+        frame_points(area, points)
 
 
-def _frame_points(area: Any, points: Any) -> None:
+def frame_points(area: Any, points: Any) -> None:
+    """Frame points (n, 3) of the scene in a 3D view, from its present side."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     radius = ROOM * float(np.linalg.norm(points - middle, axis=1).max())
     region = next(region for region in area.regions if region.type == "WINDOW")
@@ -56,7 +57,7 @@ def keep_in_view(before: Any, after: Any) -> None:
     """Frame points (m, 3) in those 3D views that held others (n, 3) whole and do not hold these."""
     for area in areas():
         if holds(area, before) and not holds(area, after):
-            _frame_points(area, after)
+            frame_points(area, after)
 
 
 def holds(area: Any, points: Any) -> bool:

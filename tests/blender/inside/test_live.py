@@ -177,7 +177,7 @@ def test_a_view_that_holds_the_unit_at_rest_holds_it_bent(monkeypatch):
     eye = SimpleNamespace(perspective_matrix=np.eye(4))
     area = SimpleNamespace(spaces=SimpleNamespace(active=SimpleNamespace(region_3d=eye)))
     monkeypatch.setattr(viewports, "areas", lambda: [area])
-    monkeypatch.setattr(viewports, "_frame_points", lambda area, points: framed.append(points))
+    monkeypatch.setattr(viewports, "frame_points", lambda area, points: framed.append(points))
     box = np.array([[-0.8, -0.8, 0.0], [0.8, 0.8, 0.0]])
     viewports.keep_in_view(box, 1.2 * box)
     viewports.keep_in_view(1.3 * box, 1.4 * box)
