@@ -241,14 +241,16 @@ def _begin_next() -> bool:
 
 
 class _Redraws:
-    """Redraws of the running jobs, as few as show the time left: a frame takes a tenth of a second of the
-    solver's processor where there is no graphics card."""
+    """Redraws for the running jobs, one each `REDRAW_S`.
+
+    Without a graphics card a frame takes a tenth of a second of the processor that the solver needs.
+    """
 
     def __init__(self) -> None:
         self._news, self._last_s = False, -math.inf
 
     def tell(self, news: bool, changed: bool) -> None:
-        """Redraw if due. news: a job has sent something; changed: one has started or ended."""
+        """Redraw if due. news: a job has sent something; changed: one has ended."""
         self._news |= news
         if not changed and time.monotonic() - self._last_s < REDRAW_S:
             return
