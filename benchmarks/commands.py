@@ -45,7 +45,7 @@ ROWS = (
     f"simulate {UNIT} {QUICK}",
     f"place {UNIT} {QUICK} --stations 11",
     "resume FOLDER",
-    f"homogenize {UNIT} --no-specimen --refine 0.5",
+    f"homogenize {UNIT} --friction none --refine 0.5",
     "fit-material tests/data/treloar",
     "import tension.csv --set kind=coupon --set mode=uniaxial --set section_mm=12.5x3 --set length_mm=40",
     "diagnose assets/examples/paper-moduli",

@@ -17,8 +17,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
 from .errors import OutputError
 
 _REMEDY = {
@@ -103,13 +101,18 @@ def write_json(path: Path, value: Any) -> None:
     write_text(path, json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a header line and `rows` to `path`, floats to their last digit; raises OutputError."""
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A header line and `rows` as CSV, floats to their last digit."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(rows)
-    write_text(path, stream.getvalue())
+    return stream.getvalue()
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header line and `rows` to `path`, see `csv_text`; raises OutputError."""
+    write_text(path, csv_text(columns, rows))
 
 
 def append_lines(stream: IO[bytes], lines: bytes) -> None:
@@ -147,6 +150,8 @@ def read_npz(path: Path, most_bytes: int = _MOST_UNPACKED) -> dict[str, Any] | N
     No code in the file is run. Memory for an array is allocated only after checking that the archive holds as
     many bytes as its header claims. The limits are `most_bytes` in all and a ratio to the archive's size.
     """
+    import numpy as np
+
     try:
         # A pipe would be waited for.
         if not path.is_file():
@@ -170,6 +175,8 @@ def _most_unpacked(packed: int) -> int:
 
 def _check_header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> None:
     """Raise ValueError unless a member is one array, of plain numbers or text, of exactly its size."""
+    import numpy as np
+
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)
         if version != (1, 0):
@@ -185,6 +192,8 @@ def write_npz(path: Path, arrays: Mapping[str, Any], packed: bool = True) -> Non
     packed: compress them, unless so strongly that `read_npz` would refuse them. Not for files that a window
     reads: unpacking is slow.
     """
+    import numpy as np
+
     # Packed in memory: on a full disk an archive fails again when it is deleted, with a traceback.
     archive = io.BytesIO()
     if packed:
@@ -202,7 +211,7 @@ def plain(value: Any) -> Any:
     """`value` as JSON types: arrays as lists, numpy numbers as numbers, paths as text, nan as null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(item) for item in value]

@@ -19,8 +19,15 @@ if TYPE_CHECKING:
     from .cell_mesh import CellMeshSettings as CellMeshSettings
     from .cell_mesh import cell_materials as cell_materials
     from .cell_mesh import mesh_cell as mesh_cell
+    from .compression import STRAINS as STRAINS
     from .compression import Compression as Compression
+    from .compression import Friction as Friction
+    from .compression import Limits as Limits
+    from .compression import Plates as Plates
+    from .compression import Reached as Reached
     from .compression import compress as compress
+    from .compression import compression_of as compression_of
+    from .compression import limits_of as limits_of
     from .effective_file import Effective as Effective
     from .effective_file import read_effective as read_effective
     from .effective_file import write_effective as write_effective
@@ -32,8 +39,10 @@ if TYPE_CHECKING:
     from .foam_fit import lattice_law as lattice_law
     from .specimen import Specimen as Specimen
     from .specimen import block_specimen as block_specimen
+    from .stress_strain_curve import DEFAULT as DEFAULT
     from .stress_strain_curve import Curve as Curve
     from .stress_strain_curve import moduli as moduli
+    from .stretch import Stretched as Stretched
     from .stretch import StretchSettings as StretchSettings
     from .stretch import stretch_lattice as stretch_lattice
 else:

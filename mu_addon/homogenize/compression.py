@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import attrs
@@ -102,6 +102,22 @@ class Compression:
         return f"valid to {100 * self.valid_to_strain:.3g} % nominal strain: {'; '.join(reasons)}"
 
 
+@attrs.frozen(eq=False)
+class Reached:
+    """What a compression to a strain came to. ended: why the path ends at this state, before that strain."""
+
+    state: Compressed
+    ended: str = ""
+
+
+@attrs.frozen(eq=False)
+class Limits:
+    """Where a test's assumptions end: see `Compression`."""
+
+    touch: StrutContact | None
+    loss: Loss | None
+
+
 def compress(
     specimen: Specimen,
     strains: Sequence[float] = STRAINS,
@@ -110,18 +126,14 @@ def compress(
     threads: int = 2,
     mean_dilatation: bool = False,
     stability: bool = True,
-    on_state: Callable[[Compressed], None] | None = None,
-    load: Callable[[float], Compressed | None] = lambda strain: None,
-    store: Callable[[Compressed], None] = lambda state: None,
 ) -> Compression:
     """Equilibria at nominal strains in ascending order, compression positive, of a specimen between plates.
 
     friction: faces slide on the plates ("slide") or stick to them ("stick"), the bounds of real plates;
-    neither lifts off. `load` gives the state at a strain that an earlier run kept with `store`; a resumed run
-    finds identical states. Equilibria keep the mirror planes of the block; `stability` asks where others
-    branch off, for about as many factorisations again. A path that cannot be followed further ends, with the
-    reason. Raises InputError for strains not ascending between 0 and 1 or an unknown friction, and
-    ConvergenceError where there is no first state.
+    neither lifts off. Equilibria keep the mirror planes of the block; `stability` asks where others branch
+    off, for about as many factorisations again. A path that cannot be followed further ends, with the reason.
+    Raises InputError for strains not ascending between 0 and 1 or an unknown friction, and ConvergenceError
+    where there is no first state.
     """
     strains = [float(s) for s in strains]
     if not strains or not (np.diff([0.0, *strains, 1.0]) > 0).all():
@@ -129,33 +141,63 @@ def compress(
             f"nominal strains {strains}", "compression test", "give them in ascending order between 0 and 1"
         )
     plates = Plates(specimen, friction, threads, mean_dilatation)
-    states, ended = [plates.rest], ""
+    reached: list[Reached] = []
     for strain in strains:
-        state = load(strain)
-        if state is None:
-            state, failure = plates.reach(strain, states)
-            if failure is None:
-                store(state)
-            elif state is plates.rest:
-                raise failure
-            else:
-                ended = failure.what
-        if state is not states[-1]:
-            states.append(state)
-            if on_state:
-                on_state(state)
-        if ended:
+        reached.append(plates.reached(strain, reached))
+        if reached[-1].ended:
             break
-    reached, moves, held = [s.strain for s in states], [s.u for s in states], plates.held
     # Its factor makes room for others.
     del plates
-    touch, loss = first_strut_contact(specimen.mesh, reached, moves), None
+    limits = limits_of(specimen, friction, reached, threads, mean_dilatation, stability)
+    return compression_of(specimen, friction, reached, limits)
+
+
+def _followed(specimen: Specimen, reached: Sequence[Reached]) -> list[Compressed]:
+    """The states from rest on, without one that a failed step repeats."""
+    states = [Compressed(0.0, np.zeros_like(specimen.mesh.nodes), 0.0, 0.0)]
+    for one in reached:
+        if one.state.strain > states[-1].strain:
+            states.append(one.state)
+    return states
+
+
+def limits_of(
+    specimen: Specimen,
+    friction: Friction,
+    reached: Sequence[Reached],
+    threads: int = 2,
+    mean_dilatation: bool = False,
+    stability: bool = True,
+) -> Limits:
+    """Where struts meet, and with `stability` where the block buckles, on a path of states."""
+    states = _followed(specimen, reached)
+    strains, moves = [s.strain for s in states], [s.u for s in states]
+    touch, loss = first_strut_contact(specimen.mesh, strains, moves), None
     if stability:
         # Only what comes before is of interest.
-        count = len(states) if touch is None else int(np.searchsorted(reached, touch.strain)) + 1
-        motions = SymmetryBreakingModes(specimen, held, threads, mean_dilatation)
-        loss = first_loss(motions, reached[:count], moves[:count])
-    return Compression(specimen, friction, tuple(states), touch, loss, ended)
+        count = len(states) if touch is None else int(np.searchsorted(strains, touch.strain)) + 1
+        motions = SymmetryBreakingModes(specimen, _held(specimen, friction), threads, mean_dilatation)
+        loss = first_loss(motions, strains[:count], moves[:count])
+    return Limits(touch, loss)
+
+
+def compression_of(
+    specimen: Specimen, friction: Friction, reached: Sequence[Reached], limits: Limits
+) -> Compression:
+    """The test of a path's states and its limits."""
+    states = tuple(_followed(specimen, reached))
+    return Compression(specimen, friction, states, limits.touch, limits.loss, reached[-1].ended)
+
+
+def _held(specimen: Specimen, friction: Friction) -> Array:
+    """Supports (n, 3) on a plate that faces slide on or stick to; raises InputError for another friction."""
+    if friction not in ("slide", "stick"):
+        raise InputError(f"unknown friction {friction!r}", "compression test", "choose slide or stick")
+    held = np.zeros(specimen.mesh.nodes.shape, bool)
+    held[specimen.mesh.tip, 2] = True
+    if friction == "stick":
+        held[specimen.mesh.tip] = True
+    return held
 
 
 class Plates:
@@ -167,18 +209,20 @@ class Plates:
     def __init__(
         self, specimen: Specimen, friction: Friction, threads: int = 2, mean_dilatation: bool = False
     ) -> None:
-        if friction not in ("slide", "stick"):
-            raise InputError(f"unknown friction {friction!r}", "compression test", "choose slide or stick")
         mesh = specimen.mesh
         self.specimen = specimen
-        self.held = np.zeros(mesh.nodes.shape, bool)
-        self.held[mesh.tip, 2] = True
-        if friction == "stick":
-            self.held[mesh.tip] = True
+        held = _held(specimen, friction)
         self.equilibrium = Equilibrium(
-            Model(mesh, self.held, threads=threads, mean_dilatation=mean_dilatation), specimen.materials
+            Model(mesh, held, threads=threads, mean_dilatation=mean_dilatation), specimen.materials
         )
         self.rest = Compressed(0.0, np.zeros_like(mesh.nodes), 0.0, 0.0)
+
+    def reached(self, strain: float, earlier: Sequence[Reached]) -> Reached:
+        """The state at a nominal strain, from those before it; raises ConvergenceError if there is none."""
+        state, failure = self.reach(strain, [self.rest, *(one.state for one in earlier)])
+        if failure is not None and state is self.rest:
+            raise failure
+        return Reached(state, "" if failure is None else failure.what)
 
     def reach(
         self, strain: float, history: Sequence[Compressed]

@@ -24,7 +24,7 @@ class UseCase(Generic[Job]):
     in its folder, fills `context.summary`, sets `context.report` and returns the result. console_summary: a
     run's summary in a few lines of text. begin: prepares a folder, if `folder.begin` is not enough. plan:
     expected stages of a job, with their seconds on two cores; kept: first letters of the names of stages that
-    a resumed run takes from its cache.
+    a resumed run takes from its cache; plan_in: in their place, the stages with the seconds that are left.
     """
 
     name: str
@@ -35,6 +35,7 @@ class UseCase(Generic[Job]):
     begin: Callable[[Job, Path, RunContext], None] | None = None
     plan: Callable[[Job], Plan] = lambda job: ()
     kept: tuple[str, ...] = ()
+    plan_in: Callable[[Job, Path, RunContext], Plan] | None = None
 
     def start(self, job: Job, folder: Path, context: RunContext) -> Any:
         """Run a job in a folder and write its report, also if it stops early; return the result.
@@ -48,8 +49,11 @@ class UseCase(Generic[Job]):
         else:
             begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
         context.console_summary = self.console_summary
-        plan = [stage for stage in self.plan(job) if context.wants_report or stage[0] != "report"]
-        context.progress.plan(remaining(plan, shares_done(folder), self.kept))
+        if self.plan_in is not None:
+            plan = self.plan_in(job, folder, context)
+        else:
+            plan = remaining(self.plan(job), shares_done(folder), self.kept)
+        context.progress.plan([stage for stage in plan if context.wants_report or stage[0] != "report"])
         found = self.run(job, folder, context)
         context.write_report()
         return found

@@ -14,6 +14,8 @@ import attrs
 from ..errors import InputError
 from ..run.context import RunContext
 from ..run.usecase import UseCase
+from ..studies import STUDIES
+from ..studies.use_case import use_case
 
 # Modules with `USE_CASE` by the first file of inputs, imported on demand.
 MODULES = {
@@ -23,7 +25,6 @@ MODULES = {
     "check.toml": ".check_print.run",
     "export.toml": ".export.run",
     "specimens.toml": ".export.specimens",
-    "homogenize.toml": ".homogenize.run",
     "grip.toml": ".grip.run",
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
@@ -43,13 +44,15 @@ def use_case_of(folder: Path) -> UseCase[Any]:
     # Not the Path's own question, which raises for a name that the system refuses.
     there = [module for name, module in MODULES.items() if os.path.isfile(folder / name)]
     cases: list[UseCase[Any]] = [import_module(module, __package__).USE_CASE for module in there]
+    cases += [use_case(name) for name in STUDIES if os.path.isfile(folder / f"{name}.toml")]
     if cases:
         # A file whose first line is another's is read all the same: its reader reports the fault best.
         return next((case for case in cases if case.layout.is_of(folder)), cases[0])
+    names = (*MODULES, *(f"{name}.toml" for name in STUDIES))
     raise InputError(
         "this folder contains no study and no other run",
         str(folder),
-        f"give a folder that holds one of {', '.join(MODULES)}, as a run writes it",
+        f"give a folder that holds one of {', '.join(names)}, as a run writes it",
     )
 
 

@@ -50,7 +50,8 @@ def test_homogenize_takes_the_model(overcured, tmp_path):
         words = (
             "--preset",
             "mu-1.0x",
-            "--no-specimen",
+            "--friction",
+            "none",
             "--refine",
             "0.5",
             "--no-report",

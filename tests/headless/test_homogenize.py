@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from mu_addon.homogenize.effective_file import read_effective
-from mu_addon.usecases.homogenize import run
+from mu_addon.studies import homogenize
 
 from .processes import here
 
 COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
 # A block between plates takes two thirds of the time.
-CELL = ("--no-specimen", "--refine", "0.3")
+CELL = ("--friction", "none", "--refine", "0.3")
 TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
 
 
@@ -37,7 +37,7 @@ def table(path):
 
 @pytest.mark.slow
 def test_it_leaves_tensor_curve_law_and_report(tmp_path, monkeypatch):
-    monkeypatch.setattr(run, "STRETCHES", (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1))
+    monkeypatch.setattr(homogenize, "STRETCHES", (-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1))
     out, done = homogenised(tmp_path, CELL)
     summary = json.loads((out / "summary.json").read_text())
     assert summary["status"] == "complete"
@@ -59,7 +59,9 @@ def test_it_leaves_tensor_curve_law_and_report(tmp_path, monkeypatch):
         assert words in report or words.replace("&#x27;", "'") in report
 
 
-@pytest.mark.nightly("tests/homogenize/test_compression.py::test_a_cancelled_run_goes_on_to_the_same_states")
+@pytest.mark.nightly(
+    "tests/homogenize/test_compression.py::test_a_path_goes_on_from_its_states_to_the_same_ones"
+)
 def test_a_block_between_plates_is_pressed_drawn_and_reported(pressed):
     out, _ = pressed
     moduli = json.loads((out / "summary.json").read_text())["moduli_kPa"]
@@ -70,7 +72,9 @@ def test_a_block_between_plates_is_pressed_drawn_and_reported(pressed):
     assert "Block between plates" in (out / "report.html").read_text()
 
 
-@pytest.mark.nightly("tests/homogenize/test_compression.py::test_a_cancelled_run_goes_on_to_the_same_states")
+@pytest.mark.nightly(
+    "tests/homogenize/test_compression.py::test_a_path_goes_on_from_its_states_to_the_same_ones"
+)
 def test_it_resumes_from_what_was_finished(pressed):
     out, _ = pressed
     before = (out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()
@@ -88,7 +92,8 @@ def test_other_inputs_set_the_old_results_aside(pressed):
         "homogenize",
         "--preset",
         "mu-1.5x",
-        "--no-specimen",
+        "--friction",
+        "none",
         "--refine",
         "0.5",
         "--no-report",
@@ -122,7 +127,7 @@ def test_bad_input_is_named(tmp_path, more, status, words):
 def test_an_offset_that_fills_the_cell_is_named(tmp_path):
     unit = tmp_path / "unit.toml"
     unit.write_text("format = 1\nscale = 0.2\n[print]\noffset_xy_mm = 0.5\noffset_z_mm = 0.5\n")
-    done = here("homogenize", "--unit", str(unit), "--no-specimen", "--out", str(tmp_path / "out"))
+    done = here("homogenize", "--unit", str(unit), "--friction", "none", "--out", str(tmp_path / "out"))
     assert done.returncode == 2
     assert "[print]" in done.stderr or "offset" in done.stderr
     assert "Traceback" not in done.stderr

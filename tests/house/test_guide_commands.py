@@ -27,7 +27,7 @@ QUICK = {
     "simulate": QUICK_STUDY,
     "place": (*QUICK_STUDY, "--stations", "11", "--no-mesh-check"),
     "grip": ("--refine", "0.25"),
-    "homogenize": ("--cells", "2", "--no-specimen"),
+    "homogenize": ("--cells", "2", "--friction", "none"),
     "design": ("--no-report",),
 }
 SMALL = {"mu-1.0x": "mu-0.75x"}

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import mu_addon
+from mu_addon import studies as declared
 from mu_addon.chain import settings as chain
 from mu_addon.cli.main import parser
 from mu_addon.design import settings as design
@@ -23,7 +24,6 @@ from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
 from mu_addon.usecases.graph.study_nodes import study_nodes
 from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
 from mu_addon.usecases.grip import settings as grip
-from mu_addon.usecases.homogenize import settings as lattice
 from mu_addon.usecases.parameter_study import settings as sweep
 from mu_addon.usecases.simulate_and_place import settings as study
 
@@ -63,7 +63,8 @@ def settings_of(file):
 @cache
 def every():
     """Names of all settings."""
-    return {d.name for file in STATED for d in settings_of(file)}
+    given = (one.description for name in declared.STUDIES for one in declared.study(name).inputs().values())
+    return {d.name for d in (*(d for file in STATED for d in settings_of(file)), *filter(None, given))}
 
 
 def restated(source, names):
@@ -140,7 +141,6 @@ def options(command):
         *(("place", d) for d in (mesh.REFINE, study.TIMES, study.STATIONS)),
         *(("place", d) for d in (study.WORKERS, study.CHECKS, study.PATHS)),
         *(("place", d) for d in (path.SHORTEST, path.LONGEST, path.BEND, device.DEVICE)),
-        *(("homogenize", d) for d in (lattice.CELLS, lattice.FRICTION, lattice.STRAIN, lattice.REFINE)),
         *(("sweep", d) for d in (sweep.WORKERS, sweep.ADD)),
         ("optimize", search.WORKERS),
         *(("grip", d) for d in (grip.DENSITY, design.FRICTION, grip.BEYOND, design.QUALITY)),
@@ -162,7 +162,6 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
         ("sweep", mesh.SOLID_STRUTS),
-        ("homogenize", lattice.REFINE),
         ("sweep", sweep.POINTS),
         ("grip", grip.DENSITY),
         ("export", export.QUALITY),

@@ -12,7 +12,6 @@ from mu_addon.design.solid import QUALITY as FACETS
 from mu_addon.design.steps import STEPS, Stack, Step, StepInputs
 from mu_addon.errors import InputError
 from mu_addon.graph import Evaluation, Kept, Node, NodeTree, Source, faults, read_tree, tree_text
-from mu_addon.homogenize.compression import Friction
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.graph import design_nodes
@@ -21,7 +20,6 @@ from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.job import Job, job_of_file, read_job
 from mu_addon.usecases.graph.run import USE_CASE
 from mu_addon.usecases.graph.templates import steps_of, template, template_names
-from mu_addon.usecases.homogenize.settings import FRICTIONS
 
 
 def evaluated(tree, kept=None):
@@ -60,7 +58,6 @@ def test_every_step_of_the_core_is_a_node_a_new_one_by_itself(monkeypatch):
 
 
 def test_lists_that_stand_in_for_those_of_the_use_cases():
-    assert set(FRICTIONS) == set(Friction.__args__)
     assert QUALITY.choices == tuple(FACETS)
 
 

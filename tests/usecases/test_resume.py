@@ -20,6 +20,9 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.studies import STUDIES
+from mu_addon.studies.homogenize import Homogenize
+from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
 from mu_addon.usecases.check_print import job as check
@@ -32,7 +35,6 @@ from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
 from mu_addon.usecases.grip.settings import Cube, Grip
-from mu_addon.usecases.homogenize import job as homogenize
 from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.optimize import job as optimize
 from mu_addon.usecases.parameter_study.plan import parse_plan
@@ -44,6 +46,10 @@ from mu_addon.usecases.simulate_and_place import job as study
 DATA = Path(__file__).parent.parent / "data"
 OLD = DATA / "folders"
 UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))
+
+
+def lattice(unit, resin, **more):
+    return Homogenize(unit=unit, resin=ResinInput().made(resin, {"unit": unit}), **more)
 
 
 def jobs(folder):
@@ -82,8 +88,8 @@ def jobs(folder):
     yield specimens.Job(UNIT, resin)
     yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)
     yield live_bending.Job()
-    yield homogenize.Job(UNIT, homogenize.resin_of("elastic-50a-v1", UNIT), 2, ("stick",), 0.25, 2 / 3)
-    yield homogenize.Job(UNIT, homogenize.resin_of(None, load_preset("mu-1.5x")), frictions=())
+    yield lattice(UNIT, "elastic-50a-v1", cells=2, friction="stick", strain=0.25, refine=2 / 3)
+    yield lattice(load_preset("mu-1.5x"), None, friction="none")
     yield grip.Job(
         load_gripper("gripper"),
         (Cube(10.0, 1 / 3),),
@@ -111,7 +117,7 @@ def test_every_job_is_read_back_from_its_folder(tmp_path):
         assert found.layout.is_of(folder)
         seen.add(found.layout.inputs)
     # These two are made from recordings: tests/usecases/test_calibrate.py, test_bench_nodes.py.
-    assert seen == set(MODULES) - {"calibrate.toml", "motion.toml"}
+    assert seen == {*MODULES, *(f"{name}.toml" for name in STUDIES)} - {"calibrate.toml", "motion.toml"}
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in OLD.iterdir()))
@@ -167,7 +173,7 @@ def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
     [
         ("cells = 2.5", "2.5 does not fit"),
         ("cells = 99", "cells = 99 is out of bounds"),
-        ("frictions = 3", "3 does not fit"),
+        ("friction = 3", "3 does not fit"),
         ("colour = 1", "unknown key 'colour'"),
         ("run = 1", "run is not a table"),
         ("format = 2", "format 2"),
@@ -175,7 +181,7 @@ def test_an_older_diagnosis_says_how_to_go_on(tmp_path):
     ],
 )
 def test_inputs_that_were_changed_by_hand_are_named(tmp_path, line, what):
-    keep_inputs(tmp_path, homogenize.Job(UNIT, homogenize.resin_of(None, UNIT)).texts())
+    keep_inputs(tmp_path, lattice(UNIT, None).texts())
     path = tmp_path / "homogenize.toml"
     key = line.partition(" ")[0]
     kept = [old for old in path.read_text().splitlines() if not old.startswith(f"{key} =")]

@@ -29,10 +29,6 @@ from ..grip.job import Job as GripJob
 from ..grip.job import detailed
 from ..grip.run import USE_CASE as GRIP
 from ..grip.settings import Cube
-from ..homogenize.job import Job as HomogenizeJob
-from ..homogenize.job import frictions_of
-from ..homogenize.job import resin_of as lattice_resin
-from ..homogenize.run import USE_CASE as HOMOGENIZE
 from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
@@ -136,20 +132,6 @@ def figure_of(call: Call) -> Outputs:
     if found is None:
         raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
     return {"number": float(found)}
-
-
-def homogenize_order(call: Call) -> Order:
-    """Run that homogenizes the lattice."""
-    s, unit = call.settings, call.inputs["unit"].unit
-    job = HomogenizeJob(
-        unit=unit,
-        resin=lattice_resin(s["resin"], unit),
-        cells=s["cells"],
-        frictions=frictions_of(s["specimen"]),
-        strain=s["strain"],
-        refine=s["refine"],
-    )
-    return Order(HOMOGENIZE, job)
 
 
 def _window(design: Design) -> Any:

@@ -11,8 +11,6 @@ from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ..export import settings as export
 from ..grip.settings import COARSE, CUBES, DENSITY
-from ..homogenize.settings import CELLS, RESIN, SPECIMEN, STRAIN
-from ..homogenize.settings import REFINE as CELL_REFINE
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .parts import refuse_body
 from .shared_settings import (
@@ -25,6 +23,7 @@ from .shared_settings import (
     TIMES,
     of_orders,
 )
+from .studies import MUTED, node_of
 
 SIMULATE, PLACE, PRINT, GRASP = "Simulate", "Sensor", "Print", "Gripper"
 
@@ -66,8 +65,6 @@ FIGURES = (
 )
 _TAKES_UNIT = Input("unit", ("unit",), "link a unit")
 _TAKES_STUDY = Input("study", ("study",), "link a node Simulate or Rank Paths")
-# A run that a muted node does not start; what follows it is left out with it.
-_LEFT_OUT = "this node and those that need it are not computed"
 
 
 def study_nodes() -> tuple[Definition, ...]:
@@ -95,7 +92,7 @@ def study_nodes() -> tuple[Definition, ...]:
             ),
             order=of_orders("simulate_order"),
             read=of_orders("study_of"),
-            muting=_LEFT_OUT,
+            muting=MUTED,
             remark=_study_remark,
         ),
         Definition(
@@ -156,19 +153,7 @@ def study_nodes() -> tuple[Definition, ...]:
             make=of_orders("figure_of"),
             remark=lambda outputs: f"{outputs['number']:.6g}",
         ),
-        Definition(
-            "homogenize",
-            "Homogenize",
-            SIMULATE,
-            "the lattice's moduli from its struts and its resin",
-            (_TAKES_UNIT,),
-            (Output("moduli", "file", "moduli, and a law of the lattice's continuum"),),
-            tuple(map(Setting, (RESIN, CELLS, SPECIMEN, STRAIN, CELL_REFINE))),
-            order=of_orders("homogenize_order"),
-            read=lambda call, done: {"moduli": done},
-            muting=_LEFT_OUT,
-            remark=lambda outputs: f"{outputs['moduli'].summary['moduli_kPa']['E100']:.4g} kPa",
-        ),
+        node_of("homogenize"),
         Definition(
             "check",
             "Check Print",
@@ -186,7 +171,7 @@ def study_nodes() -> tuple[Definition, ...]:
             ),
             order=of_orders("check_order"),
             read=of_orders("check_of"),
-            muting=_LEFT_OUT,
+            muting=MUTED,
             remark=lambda outputs: "verdict: {verdict}".format(**outputs["check"].summary),
         ),
         Definition(
@@ -203,7 +188,7 @@ def study_nodes() -> tuple[Definition, ...]:
             ),
             order=of_orders("export_order"),
             read=lambda call, done: {"files": done},
-            muting=_LEFT_OUT,
+            muting=MUTED,
             remark=lambda outputs: outputs["files"].folder.name,
         ),
         Definition(
@@ -234,7 +219,7 @@ def study_nodes() -> tuple[Definition, ...]:
             ),
             order=of_orders("grip_order"),
             read=lambda call, done: {"grasp": done},
-            muting=_LEFT_OUT,
+            muting=MUTED,
             remark=_grasp_remark,
         ),
     )

@@ -9,13 +9,16 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...homogenize.elasticity import young_modulus
-from ...homogenize.stress_strain_curve import Curve
-from ...report.heatmaps import MAP
-from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
-from ...report.render import Camera, Floats, Image, Part, fit, png, render
-from ...report.results import Picture
-from ...report.unit_pictures import WHITE
+from ..homogenize.compression import Compression
+from ..homogenize.elasticity import young_modulus
+from ..homogenize.foam_fit import FoamFit
+from ..homogenize.stress_strain_curve import Curve
+from ..homogenize.stretch import Stretched
+from .heatmaps import MAP
+from .plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
+from .render import Camera, Floats, Image, Part, fit, png, render
+from .results import Picture
+from .unit_pictures import WHITE, skin
 
 STRUT_COLOR = (0.62, 0.69, 0.77)
 PLATE_COLOR = (0.30, 0.33, 0.38)
@@ -48,7 +51,7 @@ def cell_picture(nodes: Floats, faces: Any, size: float, density: float, width: 
 
 def _frame(size: float) -> list[Part]:
     """The edges of a cell's box as thin rods."""
-    from ...report.shapes import tube
+    from .shapes import tube
 
     radius = 0.006 * size
     found = []
@@ -75,7 +78,7 @@ def modulus_surface(C: Floats, width: int = 620) -> Picture:
     color = colormaps[MAP](share)[:, :3]
     part = Part(directions * modulus[:, None], faces, color)
     reach = 1.15 * high
-    from ...report.shapes import tube
+    from .shapes import tube
 
     rods = [
         Part(*tube(np.array([-reach * e, reach * e]), 0.008 * reach, 8), PLATE_COLOR, whole=True)
@@ -196,6 +199,15 @@ def specimen_pictures(
     ]
 
 
+def test_pictures(test: Compression) -> list[tuple[str, Picture]]:
+    """File name and picture of a test at rest, half way and at its end."""
+    mesh, last = test.specimen.mesh, test.states[-1]
+    middle = min(test.states, key=lambda s: abs(s.strain - last.strain / 2))
+    states = [(s.strain, s.u) for s in (test.states[0], middle, last)]
+    made = specimen_pictures(mesh.nodes, skin(mesh.tets), states, np.zeros(3))
+    return [(f"specimen_{100 * e:.0f}.png", p) for (e, _), p in zip(states, made, strict=True)]
+
+
 def _plate(middle: Floats, side: float, z: float, outward: int) -> Part:
     """A flat plate square to z."""
     x, y = middle[:2]
@@ -223,6 +235,18 @@ class Line:
     valid_to: float = np.inf
 
 
+def lines_of(tests: Mapping[str, Compression], cell: Stretched | None) -> list[Line]:
+    """Compressed side of each test, by its name, and of the periodic cell."""
+    found = []
+    for name, curve, valid in [
+        *((name, test.curve, test.valid_to_strain) for name, test in tests.items()),
+        *([("periodic lattice", cell.curve, np.inf)] if cell else []),
+    ]:
+        side = curve.stretch <= 1
+        found.append(Line(name, -curve.strain[side][::-1], -1e3 * curve.stress_MPa[side][::-1], valid))
+    return found
+
+
 def compression_chart(lines: Sequence[Line]) -> str:
     """Nominal stress against strain; dashed where struts have met."""
     with canvas(WIDTH, 3.3) as (figure, svg):
@@ -247,27 +271,16 @@ def compression_chart(lines: Sequence[Line]) -> str:
     return svg()
 
 
-def stretch_charts(cell: Curve, law: Mapping[str, Floats]) -> tuple[str, str]:
-    """Stress and lateral stretch of the periodic cell (dots) and of the fitted law (line) against strain.
-
-    law: its "strain", "stress_kPa" and "lateral" (k,).
-    """
-    charts = []
-    for values, fitted, axis in (
-        (cell.stress_MPa * 1e3, law["stress_kPa"], "nominal stress [kPa]"),
-        (cell.lateral.mean(axis=1), law["lateral"], "lateral stretch"),
-    ):
-        with canvas(WIDTH, 2.9) as (figure, svg):
-            axes = figure.add_axes((0.16, 0.17, 0.80, 0.79))
-            axes.axvline(0, color=QUIET, linewidth=0.8)
-            axes.plot(law["strain"] * 100, fitted, "-", color=CHOSEN, linewidth=1.8, label="fitted law")
-            axes.plot(cell.strain * 100, values, "o", color=BY_LENGTH[0], markersize=3.5, label="cell")
-            axes.set(xlabel="strain [%]", ylabel=axis)
-            axes.legend(loc="upper left" if axis.startswith("nominal") else "lower center")
-        charts.append(svg())
-    return charts[0], charts[1]
-
-
-def kPa(value: float) -> str:
-    """A stress in kPa to three figures."""
-    return signed(f"{value:.0f} kPa" if abs(value) >= 1000 else f"{value:.3g} kPa")
+def stretch_chart(cell: Curve, fit: FoamFit, lateral: bool) -> str:
+    """Stress, or lateral stretch, of the periodic cell (dots) and of the fitted law (line) against strain."""
+    along = np.linspace(*fit.stretch, 121)
+    fitted = fit.uniaxial(along)[1] if lateral else 1e3 * fit.uniaxial(along)[0]
+    values = cell.lateral.mean(axis=1) if lateral else cell.stress_MPa * 1e3
+    with canvas(WIDTH, 2.9) as (figure, svg):
+        axes = figure.add_axes((0.16, 0.17, 0.80, 0.79))
+        axes.axvline(0, color=QUIET, linewidth=0.8)
+        axes.plot((along - 1) * 100, fitted, "-", color=CHOSEN, linewidth=1.8, label="fitted law")
+        axes.plot(cell.strain * 100, values, "o", color=BY_LENGTH[0], markersize=3.5, label="cell")
+        axes.set(xlabel="strain [%]", ylabel="lateral stretch" if lateral else "nominal stress [kPa]")
+        axes.legend(loc="lower center" if lateral else "upper left")
+    return svg()

@@ -1,0 +1,84 @@
+"""The report of a study, of the parts that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from ..files import write_bytes, write_text
+from ..run.execution import Execution
+from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table
+from ..run.versions import package_versions
+from .html import cards, facts_table, figure, note, number, page, picture_figure, table
+from .plots import signed
+
+_ALWAYS = {"summary.json": "all results of this run as numbers", "log.ndjson": "log of this run"}
+
+
+def write_page(work: Execution, stopped: str = "") -> None:
+    """Draw the pictures and write report.html; stopped: why an incomplete run stopped."""
+    with work.context.progress.stage("report"):
+        versions = package_versions()
+        work.context.summary["versions"] = versions
+        write_text(work.folder / "report.html", page_of(work, versions, stopped))
+
+
+def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> str:
+    """The whole report as HTML text, of all results that there are."""
+    study = work.study
+    lead = "".join(_html(work, parts) for one, parts in work.shown if not one.title)
+    sections = [(one.key, one.title, _html(work, parts)) for one, parts in work.shown if one.title]
+    sections += [
+        ("files", "Files of this run", facts_table("file", "content", _files(work))),
+        ("versions", "Versions", facts_table("program", "version", versions)),
+    ]
+    warnings = work.context.summary.get("warnings", [])
+    return page(study.title(), signed(study.subtitle()), note(warnings, stopped), lead, sections)
+
+
+def _html(work: Execution, parts: Sequence[Part]) -> str:
+    """HTML of parts; neighbouring figures become one row of cards."""
+    html = ""
+    facts: list[tuple[str, str]] = []
+    for part in [*parts, None]:
+        if isinstance(part, Fact):
+            facts += [(escape(part.name), escape(part.shown))] if part.shown else []
+            continue
+        html += cards(facts) if facts else ""
+        facts = []
+        html += "" if part is None else _one(work, part)
+    return html
+
+
+def _one(work: Execution, part: Part) -> str:
+    if isinstance(part, Sentence) and part.page:
+        words = signed(escape(part.text))
+        strong = signed(escape(part.strong))
+        words = words.replace(strong, f"<strong>{strong}</strong>", 1) if strong else words
+        return f'<p class="answer">{words}</p>' if part.answer else f"<p>{words}</p>"
+    if isinstance(part, Table):
+        rows = [([*map(number, cells)], i in part.best) for i, cells in enumerate(part.rows)]
+        return table(part.caption, part.head, rows)
+    # A run that was asked to stop leaves out what takes long to draw.
+    if work.context.hurried:
+        return ""
+    if isinstance(part, Chart):
+        return figure(part.make(), escape(part.caption), part.alt or part.caption)
+    if isinstance(part, Pictures):
+        found = part.make()
+        for name, picture in found:
+            write_bytes(work.folder / name, picture.png)
+        shown = "".join(picture_figure(picture) for _, picture in found)
+        return f'<div class="{"pair" if len(found) < 3 else "triple"}">{shown}</div>'
+    if isinstance(part, Beside):
+        columns = "".join(f"<div>{_one(work, inner)}</div>" for inner in part.parts)
+        return f'<div class="pair">{columns}</div>'
+    return ""
+
+
+def _files(work: Execution) -> dict[str, Any]:
+    """Content of each file that the folder has, inputs first."""
+    inputs = dict.fromkeys(work.study.texts(), "inputs of this run")
+    known = {**inputs, **work.study.files, **_ALWAYS}
+    return {name: what for name, what in known.items() if (work.folder / name).exists()}

@@ -1,0 +1,113 @@
+"""What a study shows, as parts: report, terminal, panel and summary.json render the same ones.
+
+A part states values and words, never how a face draws them. What takes time to make (a chart, a picture) is
+a function, called by a face that shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from ..files import csv_text
+
+
+@attrs.frozen
+class Fact:
+    """A figure with its name.
+
+    shown: its text with the unit, "" where no face shows it as a figure; key: its place in summary.json,
+    levels separated by dots, "" if it is not there.
+    """
+
+    name: str
+    value: Any
+    shown: str = ""
+    key: str = ""
+
+
+def recorded(key: str, value: Any) -> Fact:
+    """A value of summary.json that no other face shows."""
+    return Fact(key, value, key=key)
+
+
+@attrs.frozen
+class Sentence:
+    """A sentence; answer: it answers the study's question; terminal: it is printed at the end of a command.
+
+    page: it stands in the report; strong: words of it to be set off there.
+    """
+
+    text: str
+    answer: bool = False
+    terminal: bool = False
+    page: bool = True
+    strong: str = ""
+
+
+@attrs.frozen
+class Table:
+    """A table of texts. head: title and "n" for numbers, of each column; best: rows to mark."""
+
+    caption: str
+    head: Sequence[tuple[str, str]]
+    rows: Sequence[Sequence[Any]]
+    best: Sequence[int] = ()
+
+
+@attrs.frozen
+class File:
+    """A file of the run's folder; make: its bytes or text, or None if it wrote the path that it is given."""
+
+    name: str
+    make: Callable[[Path], bytes | str | None]
+
+
+def csv(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> File:
+    """A CSV file; numbers to their last digit."""
+
+    return File(name, lambda path: csv_text(columns, rows))
+
+
+@attrs.frozen
+class Chart:
+    """A chart; make: its SVG text."""
+
+    make: Callable[[], str]
+    caption: str
+    alt: str = ""
+
+
+@attrs.frozen
+class Pictures:
+    """Pictures side by side, each also a file of the folder; make: file name and picture of each."""
+
+    make: Callable[[], Sequence[tuple[str, Any]]]
+
+
+@attrs.frozen
+class Beside:
+    """Parts side by side."""
+
+    parts: Sequence[Any]
+
+
+@attrs.frozen
+class Warn:
+    """A warning, told when it is found and repeated in the report."""
+
+    text: str
+
+
+Part = Fact | Sentence | Table | File | Chart | Pictures | Beside | Warn
+
+
+def flat(parts: Sequence[Part]) -> list[Part]:
+    """The parts, those side by side included, in order."""
+    found: list[Part] = []
+    for part in parts:
+        found += flat(part.parts) if isinstance(part, Beside) else [part]
+    return found

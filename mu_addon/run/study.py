@@ -1,0 +1,328 @@
+"""A study is declared once, as a class: its inputs, its stages, and what it shows.
+
+    @attrs.frozen
+    class Ring(Study):
+        \"\"\"Stiffness of an elastic ring pressed between plates.\"\"\"
+
+        name = "ring"
+        files = {"curve.csv": "force against closing"}
+        radius_mm: float = setting(described("radius_mm", 12.5, "mean radius", unit="mm", low=1, high=100))
+
+        @stage("bending stiffness", seconds=0.1)
+        def stiffness(self, radius_mm: float) -> float: ...
+
+        @section("result", "Result")
+        def result(self, stiffness: float) -> Iterator[Part]: ...
+
+Command, inputs' file, node, plan, cache, resume, report and summary follow (`execution`, `cli.studies`,
+`report.study_page`, `usecases.graph.studies`). The parameters of a stage name what it needs: inputs, values
+derived from them, results of other stages. Nothing else can make its cached result stale. A declaration
+imports public faces of packages alone, which load when they are used.
+"""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import attrs
+
+from .folder import RUN, FolderLayout
+from .inputs import FORMAT, read_inputs, structured
+
+if TYPE_CHECKING:
+    from .progress import Progress
+
+_INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
+TELL = "tell"
+"""Parameter by which a stage reports its progress: see `Tell`."""
+
+
+@attrs.frozen
+class Input:
+    """One input of a study. kind: how faces ask for it; "setting" for a plain value.
+
+    description: of the plain value that it is, or is made of (`design.quantity.Description`), else None.
+    decides: False for one that decides no figure, such as a number of processes: it is in no key, and in the
+    table [run] of the inputs' file. metavar: stands for the value in a command's help. An input of another
+    kind overrides `made`, `write` and `read`.
+    """
+
+    kind: str
+    description: Any = None
+    decides: bool = True
+    metavar: str | None = None
+
+    def made(self, value: Any, given: Mapping[str, Any]) -> Any:
+        """The input of a plain value of its description; given: the inputs before it. Raises InputError."""
+        return value
+
+    def write(self, name: str, value: Any) -> tuple[dict[str, Any], dict[str, str]]:
+        """Keys of the inputs' file, and texts of further files by name."""
+        return {name: value}, {}
+
+    def read(self, name: str, document: dict[str, Any], folder: Path) -> Any:
+        """The value, its keys taken out of the file's document; raises InputError."""
+        raise NotImplementedError
+
+
+def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
+    """attrs field of an input that is a plain value, of the description's name, default and bounds."""
+    given = Input("setting", description, decides, metavar)
+    return attrs.field(
+        default=description.default, converter=description.checked, metadata={_INPUT: given}, kw_only=True
+    )
+
+
+def given(one: Input, **more: Any) -> Any:
+    """attrs field of an input of another kind."""
+    return attrs.field(metadata={_INPUT: one}, kw_only=True, **more)
+
+
+@attrs.frozen
+class Over:
+    """The set that a stage is repeated over.
+
+    names: of the stage's parameters that a member gives, one or several; members: the members of a study, in
+    order. needs: of a member, by parameter, the one member or the list of members of a stage's set that it
+    takes; a parameter that is not there takes the whole set. A stage that names itself takes earlier members.
+    """
+
+    names: tuple[str, ...]
+    members: Callable[[Any], Sequence[Any]]
+    needs: Callable[[Any, Any], Mapping[str, Any]] = lambda study, member: {}
+
+    def values(self, member: Any) -> dict[str, Any]:
+        """The parameters that a member gives."""
+        return dict(zip(self.names, member if len(self.names) > 1 else (member,), strict=True))
+
+
+@attrs.frozen
+class Stage:
+    """A stage of a study: see `stage`."""
+
+    name: str
+    method: Callable[..., Any]
+    title: str
+    seconds: Callable[[Any], float]
+    revision: int
+    over: Over | None
+    wanted: Callable[[Any], bool]
+    kept: bool
+    failing: str
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of what it takes, without those that a member gives."""
+        own = self.over.names if self.over else ()
+        return tuple(p for p in parameters_of(self.method) if p not in own and p != TELL)
+
+    def title_of(self, member: Any) -> str:
+        """Its title, for a member of its set."""
+        return self.title.format(**self.over.values(member)) if self.over else self.title
+
+    @property
+    def result_type(self) -> Any:
+        """The type of its result, as the method declares it."""
+        return typing.get_type_hints(self.method)["return"]
+
+
+def stage(
+    title: str,
+    seconds: float | Callable[[Any], float] = 0.1,
+    *,
+    over: Over | None = None,
+    wanted: Callable[[Any], bool] = lambda study: True,
+    kept: bool = True,
+    failing: str = "",
+    revision: int = 1,
+) -> Callable[[Any], Any]:
+    """A method that makes one result, or one for each member of a set.
+
+    title: of its progress, with a set's names in braces; members of one title are one stage to a user.
+    seconds: expected on two cores, of the study; of a set, for all members of one title. wanted: False of a
+    study that does without it. kept: in the cache, which needs a result of arrays, numbers, texts and attrs
+    classes of these; one that is not is made when it is needed, such as a model in memory. failing: words
+    for a warning; an error of the stage then does not end the run, and what needs it is left out. revision:
+    raise it when a change of the code changes the result.
+    """
+
+    def mark(method: Any) -> Any:
+        in_time = seconds if callable(seconds) else lambda study: seconds
+        setattr(
+            method,
+            _STAGE,
+            Stage(method.__name__, method, title, in_time, revision, over, wanted, kept, failing),
+        )
+        return method
+
+    return mark
+
+
+def derived(method: Any) -> Any:
+    """A method that gives a part of an input, in milliseconds: a stage that takes it depends on that part."""
+    setattr(method, _DERIVED, True)
+    return method
+
+
+@attrs.frozen
+class Section:
+    """A section of what a study shows. needed: parameters without which it is left out."""
+
+    key: str
+    title: str
+    method: Callable[..., Iterator[Any]]
+
+    @property
+    def parameters(self) -> dict[str, bool]:
+        """Names of what it shows, and whether it cannot do without."""
+        return {
+            name: p.default is inspect.Parameter.empty
+            for name, p in inspect.signature(self.method).parameters.items()
+            if name != "self"
+        }
+
+
+def section(key: str = "", title: str = "") -> Callable[[Any], Any]:
+    """A method that yields parts; its parameters name what it shows, None by default where it may lack.
+
+    key, title: of the report's section; without, it leads. It is called whenever one of them is new, so it
+    takes milliseconds.
+    """
+
+    def mark(method: Any) -> Any:
+        setattr(method, _SECTION, Section(key, title, method))
+        return method
+
+    return mark
+
+
+@attrs.frozen
+class Node:
+    """The node of a study: menu, text, outputs as (name, type, text); remark: on a finished run's summary."""
+
+    category: str
+    text: str
+    outputs: tuple[tuple[str, str, str], ...]
+    remark: Callable[[Mapping[str, Any]], str]
+
+
+@attrs.frozen
+class Tell:
+    """How a stage reports its progress: call it with the share done, 0 to 1."""
+
+    progress: Progress
+
+    def __call__(self, share: float, detail: str = "") -> None:
+        """Report the share done, and a few words on the last step."""
+        self.progress.update(share, detail)
+
+    def made(self, size: str) -> None:
+        """Report the size of the result, such as "6210 nodes", at the stage's end."""
+        self.progress.made(size)
+
+
+class Dropped(Exception):
+    """Raised by a stage: this member of a set has no result, without fault. What needs it is left out."""
+
+
+class Members(dict[Any, Any]):
+    """Results of a set by member; complete: none is missing."""
+
+    complete = True
+
+
+class Study:
+    """Base of all studies; see the module.
+
+    name: of its command; its inputs are in `name`.toml. files: content of each file of the run's folder, by
+    name or pattern. example: a command line. node: None of a study that is no node.
+    """
+
+    name: ClassVar[str]
+    files: ClassVar[Mapping[str, str]]
+    example: ClassVar[str] = ""
+    node: ClassVar[Node | None] = None
+
+    def title(self) -> str:
+        """The report's title."""
+        raise NotImplementedError
+
+    def subtitle(self) -> str:
+        """The line below the title."""
+        return ""
+
+    # What the declaration says, for the faces.
+
+    @classmethod
+    def inputs(cls) -> dict[str, Input]:
+        """Its inputs by name."""
+        return {f.name: f.metadata[_INPUT] for f in attrs.fields(cls) if _INPUT in f.metadata}  # type: ignore[arg-type]
+
+    @classmethod
+    def stages(cls) -> dict[str, Stage]:
+        """Its stages by name, each after those that it needs."""
+        return _marked(cls, _STAGE)
+
+    @classmethod
+    def sections(cls) -> list[Section]:
+        """Its sections in order."""
+        return list(_marked(cls, _SECTION).values())
+
+    @classmethod
+    def derived(cls) -> dict[str, Any]:
+        """Methods of derived values by name."""
+        return _marked(cls, _DERIVED, bare=True)
+
+    @classmethod
+    def layout(cls) -> FolderLayout:
+        """The files of its folder."""
+        return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", (*cls.files, "report.html"))
+
+    # Inputs as files.
+
+    def texts(self) -> dict[str, str]:
+        """Text of every file of inputs, by name."""
+        from ..toml_writer import toml_text
+
+        layout = self.layout()
+        run: dict[str, Any] = {}
+        values: dict[str, Any] = {"format": FORMAT}
+        files: dict[str, str] = {}
+        for name, one in self.inputs().items():
+            keys, texts = one.write(name, getattr(self, name))
+            (values if one.decides else run).update(keys)
+            files |= texts
+        return {layout.inputs: toml_text(values | ({RUN: run} if run else {}), layout.header), **files}
+
+    @classmethod
+    def read(cls, folder: Path) -> Self:
+        """The study whose inputs are in a folder; raises InputError."""
+        path = folder / cls.layout().inputs
+        document, run = read_inputs(path)
+        special = {
+            name: one.read(name, document if one.decides else run, folder)
+            for name, one in cls.inputs().items()
+            if one.kind != "setting"
+        }
+        plain = {n: v for n, v in run.items() if n in cls.inputs()}
+        return structured(cls, document | plain, str(path), **special)
+
+
+def _marked(cls: Any, mark: str, bare: bool = False) -> dict[str, Any]:
+    found = {}
+    for part in reversed(cls.__mro__):
+        for name, method in vars(part).items():
+            if hasattr(method, mark):
+                found[name] = method if bare else getattr(method, mark)
+    return found
+
+
+@cache
+def parameters_of(method: Any) -> tuple[str, ...]:
+    """Names of a method's parameters."""
+    return tuple(name for name in inspect.signature(method).parameters if name != "self")

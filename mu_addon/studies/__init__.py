@@ -1,0 +1,18 @@
+"""Every job, declared once: a file each, and a line in `STUDIES`."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+
+from ..run.study import Study
+
+STUDIES = {"homogenize": "Homogenize"}
+"""Class by command; its module has the command's name."""
+
+
+@cache
+def study(name: str) -> type[Study]:
+    """The study of a command."""
+    found: type[Study] = getattr(import_module(f".{name.replace('-', '_')}", __name__), STUDIES[name])
+    return found

@@ -1,0 +1,39 @@
+"""A study as a use case of runs: how its command, a node and `resume` start it."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from ..run.context import RunContext
+from ..run.execution import Execution
+from ..run.progress_estimate import Plan
+from ..run.study import Study
+from ..run.usecase import UseCase
+from . import study
+
+REPORT_S = 5.0
+"""Expected seconds of a report on two cores."""
+
+
+@cache
+def use_case(name: str) -> UseCase[Study]:
+    """The use case of a study's command."""
+    kind = study(name)
+    return UseCase(name, kind.layout(), kind.read, run, console_summary=lambda summary: [], plan_in=plan)
+
+
+def run(job: Study, folder: Path, context: RunContext) -> Execution:
+    """Make every result of a study in its folder, and report those that there are."""
+    from ..report.study_page import write_page
+
+    work = Execution(job, folder, context)
+    context.report = lambda stopped: write_page(work, stopped)
+    context.console_summary = lambda summary: work.lines
+    work.run()
+    return work
+
+
+def plan(job: Study, folder: Path, context: RunContext) -> Plan:
+    """Stages with the seconds that are left of each."""
+    return [*Execution(job, folder, context).plan(), ("report", REPORT_S)]

@@ -1,0 +1,283 @@
+"""The base of all studies: what a result depends on, what a killed or failed run keeps, what is shown."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import MappingProxyType
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given as for_all
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from mu_addon.design.quantity import described
+from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.run.context import RunContext
+from mu_addon.run.execution import Execution
+from mu_addon.run.parts import Fact, Sentence, csv
+from mu_addon.run.progress import Progress
+from mu_addon.run.stored import content, packed, unpacked
+from mu_addon.run.study import Dropped, Over, Study, derived, section, setting, stage
+from mu_addon.studies import STUDIES, study
+
+CALLS = []
+
+
+@attrs.frozen(eq=False)
+class State:
+    load: float
+    moved: np.ndarray
+    note: str = ""
+    before: tuple[float, ...] = ()
+    peak: float | None = None
+
+
+@attrs.frozen(kw_only=True)
+class Spring(Study):
+    """Hang loads on a spring, one after the other."""
+
+    name = "spring"
+    files = MappingProxyType({"curve.csv": "length against load"})
+    stiffness: float = setting(described("stiffness", 2.0, "its stiffness", unit="N/mm", low=0.1, high=10.0))
+    loads: int = setting(described("loads", 3, "number of loads", low=1, high=9))
+    breaks: float = setting(described("breaks", 99.0, "load at which it breaks", low=0.0, high=99.0))
+    label: str = setting(described("label", "", "a word"))
+    workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
+
+    def title(self):
+        return "A spring"
+
+    @derived
+    def rounded(self, stiffness):
+        return round(stiffness)
+
+    @stage("rest")
+    def rest(self, rounded: int) -> State:
+        CALLS.append("rest")
+        return State(0.0, np.zeros(rounded))
+
+    @stage("model", kept=False)
+    def model(self, stiffness: float) -> float:
+        CALLS.append("model")
+        return stiffness
+
+    @stage(
+        "loads",
+        over=Over(
+            ("load",),
+            lambda s: [float(k + 1) for k in range(s.loads)],
+            lambda s, load: {"states": [k for k in map(float, range(1, 10)) if k < load and k <= s.loads]},
+        ),
+        failing="Load {load:g} N is left out",
+    )
+    def states(self, load: float, breaks: float, model: float, rest: State, states: dict) -> State:
+        CALLS.append(f"load {load:g}")
+        if load == 7.0:
+            raise Dropped
+        if load > breaks:
+            raise ConvergenceError("it broke")
+        if load > 1.0 and load - 1.0 not in states:
+            raise Dropped
+        return State(load, np.array([load / model]), before=tuple(states))
+
+    @stage("energy")
+    def energy(self, states: dict, stiffness: float) -> float:
+        CALLS.append("energy")
+        return float(sum(s.moved[0] ** 2 for s in states.values()) * stiffness / 2)
+
+    @section()
+    def answer(self, label, energy=None):
+        if energy is not None:
+            yield Fact("energy", energy, f"{energy:g} mJ", "energy_mJ")
+        yield Sentence(f"{label or 'unnamed'} was loaded", terminal=True)
+
+    @section("curve", "Curve")
+    def curve(self, states):
+        yield csv("curve.csv", ["load_N", "moved_mm"], [(s.load, s.moved[0]) for s in states.values()])
+        yield Fact("points", len(states), key="points.done")
+        yield Fact("complete", states.complete, key="points.complete")
+
+
+def run(folder, **given):
+    CALLS.clear()
+    context = RunContext(Progress())
+    work = Execution(Spring(**given), folder, context)
+    work.run()
+    return work, context.summary
+
+
+def test_every_stage_runs_once_and_its_results_are_shown(tmp_path):
+    work, summary = run(tmp_path)
+    assert CALLS == ["rest", "model", "load 1", "load 2", "load 3", "energy"]
+    # 1, 2 and 3 N on 2 N/mm.
+    assert summary["energy_mJ"] == pytest.approx((0.25 + 1.0 + 2.25) * 2 / 2)
+    assert summary["points"] == {"done": 3, "complete": True}
+    assert work.lines == ["unnamed was loaded"]
+    assert (tmp_path / "curve.csv").read_text() == "load_N,moved_mm\n1.0,0.5\n2.0,1.0\n3.0,1.5\n"
+    assert work.value(("states", 3.0)).before == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "made"),
+    [
+        ({}, []),
+        ({"label": "a", "workers": 2}, []),
+        ({"loads": 4}, ["model", "load 4", "energy"]),
+        ({"loads": 2}, ["energy"]),
+        # The part of the input that `rest` takes is the same.
+        ({"stiffness": 2.25}, ["model", "load 1", "load 2", "load 3", "energy"]),
+        ({"stiffness": 3.0}, ["rest", "model", "load 1", "load 2", "load 3", "energy"]),
+    ],
+)
+def test_only_what_depends_on_a_change_is_made_again(tmp_path, given, made):
+    run(tmp_path)
+    _, summary = run(tmp_path, **given)
+    assert made == CALLS
+    fresh = run(tmp_path / "fresh", **given)[1]
+    assert summary == fresh
+
+
+def test_what_depends_on_a_result_depends_on_its_content(tmp_path):
+    """The limit is in the keys of the states; as these come out equal, what follows is not made again."""
+    run(tmp_path)
+    run(tmp_path, breaks=50.0)
+    assert CALLS == ["model", "load 1", "load 2", "load 3"]
+
+
+def test_a_failed_member_is_told_and_drops_what_needs_it(tmp_path):
+    work, summary = run(tmp_path, breaks=1.5)
+    assert summary["warnings"] == ["Load 2 N is left out: it broke.", "Load 3 N is left out: it broke."]
+    assert summary["points"] == {"done": 1, "complete": False}
+    assert summary["energy_mJ"] == pytest.approx(0.25)
+    with pytest.raises(Dropped):
+        work.value(("states", 2.0))
+
+
+def test_a_dropped_member_is_no_fault(tmp_path):
+    _, summary = run(tmp_path, loads=8)
+    assert "warnings" not in summary
+    assert summary["points"] == {"done": 6, "complete": False}
+
+
+def test_a_killed_run_goes_on_at_the_first_member_that_is_missing(tmp_path, monkeypatch):
+    class Killed(BaseException):
+        pass
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Execution, "_make", make_until(3.0, Killed))
+        with pytest.raises(Killed):
+            run(tmp_path)
+    context = RunContext(Progress())
+    assert json.dumps(Execution(Spring(), tmp_path, context).plan())
+    run(tmp_path)
+    assert CALLS == ["model", "load 3", "energy"]
+
+
+def make_until(load, stop):
+    whole = Execution._make
+
+    def make(self, task, name):
+        if task == ("states", load):
+            raise stop
+        whole(self, task, name)
+
+    return make
+
+
+def test_the_plan_leaves_out_what_is_there(tmp_path):
+    context = RunContext(Progress())
+    before = dict(Execution(Spring(), tmp_path, context).plan())
+    assert list(before) == ["rest", "loads", "energy"]
+    run(tmp_path, loads=2)
+    after = dict(Execution(Spring(), tmp_path, context).plan())
+    assert after["rest"] < before["rest"]
+    assert after["loads"] == pytest.approx(before["loads"] / 3)
+
+
+def test_a_damaged_result_is_made_again(tmp_path):
+    run(tmp_path)
+    for path in (tmp_path / "cache").glob("rest-*.npz"):
+        path.write_bytes(path.read_bytes()[:-30])
+    run(tmp_path)
+    assert CALLS == ["rest"]
+
+
+def test_inputs_go_through_their_files(tmp_path):
+    one = Spring(stiffness=1 / 3, loads=5, label='a "word"', workers=3)
+    for name, text in one.texts().items():
+        (tmp_path / name).write_text(text)
+    assert Spring.read(tmp_path) == one
+    assert "[run]\nworkers = 3" in one.texts()["spring.toml"]
+    text = one.texts()["spring.toml"].replace("loads = 5", "loads = 50")
+    (tmp_path / "spring.toml").write_text(text)
+    with pytest.raises(InputError, match="loads = 50 is out of bounds"):
+        Spring.read(tmp_path)
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_declaration_is_sound(name):
+    kind = study(name)
+    known = {*kind.inputs(), *kind.derived()}
+    for one in kind.stages().values():
+        later = set(one.needs) - known - {one.name}
+        assert not later, f"{one.name} needs {later}, which is not above it"
+        known.add(one.name)
+    for one in kind.sections():
+        assert set(one.parameters) <= known
+    for name_, one in kind.inputs().items():
+        assert one.description is None or one.description.name == name_
+
+
+def test_declarations_load_neither_solver_nor_numpy():
+    code = (
+        "import sys\nfrom mu_addon.studies import STUDIES, study\n"
+        "[study(name).inputs() for name in STUDIES]\n"
+        "print([m for m in ('numpy', 'scipy', 'warp', 'matplotlib') if m in sys.modules])"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# Results as arrays.
+
+floats = arrays.arrays(np.float64, arrays.array_shapes(max_dims=2, max_side=4))
+states = st.builds(
+    State,
+    st.floats(allow_nan=False),
+    floats,
+    st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=5),
+    st.lists(st.floats(allow_nan=False), max_size=3).map(tuple),
+    st.none() | st.floats(allow_nan=False),
+)
+
+
+@for_all(states)
+def test_a_result_comes_back_as_it_was(state):
+    again = unpacked(State, packed(state))
+    assert content(again) == content(state)
+    assert (again.load, again.note, again.before, again.peak) == (
+        state.load,
+        state.note,
+        state.before,
+        state.peak,
+    )
+
+
+@for_all(st.dictionaries(st.text("ab.#@", min_size=1, max_size=3), st.integers(-9, 9), max_size=3))
+def test_tables_come_back_whatever_their_names(table):
+    assert unpacked(dict[str, int], packed(table)) == table
+
+
+@pytest.mark.parametrize("kind", [float, State, tuple[float, float], dict[str, float], bytes, np.ndarray])
+def test_another_type_is_refused(kind):
+    with pytest.raises(ValueError, match="value"):
+        unpacked(kind, packed("a text" if kind is not np.ndarray else None))
+
+
+def test_what_has_no_content_is_refused():
+    with pytest.raises(TypeError, match="content"):
+        content(object())
