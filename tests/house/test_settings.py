@@ -43,14 +43,12 @@ OTHERWISE = {
     "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
     "evidence/unit_fem.py": {"self_contact"},
     "homogenize/cell_mesh.py": {"order"},  # of a cell's mesh
-    "measured/experiment.py": {"specimen", "orientation_deg"},
+    "measured/experiment.py": {"orientation_deg"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "usecases/chain/job.py": {"orientation_deg"},  # of a chain's base
-    "usecases/graph/bench_nodes.py": {"specimen"},
     "usecases/graph/chain_nodes.py": {"protocol", "orientation_deg"},
-    "usecases/sensor/measured_motion.py": {"specimen"},
 }
 
 
