@@ -59,10 +59,10 @@ class Command(NamedTuple):
 def _command(name: str) -> Command:
     from ..studies import STUDIES
 
-    if name in STUDIES:
+    if name.replace("_", "-") in STUDIES:
         from .studies import command_of
 
-        return Command(*command_of(name))
+        return Command(*command_of(name.replace("_", "-")))
     module = import_module(f".{_MODULES.get(name, name)}", __name__)
     add, run = (getattr(module, f"{what}_{name}", None) or getattr(module, what) for what in ("add", "run"))
     return Command(add, run)

@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
 
 
-def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str | None = None) -> None:
+def add_setting(
+    command: argparse.ArgumentParser, d: Description, metavar: str | None = None, many: bool = False
+) -> None:
     """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
 
-    Its name is the setting's without the unit. Bounds are checked by the job. A text that is empty by default
-    is None without the option.
+    Its name is the setting's without the unit; many: it takes several words. Bounds are checked by the job. A
+    text that is empty by default is None without the option.
     """
     unit = d.unit.replace("/", "_per_")
     option = (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
@@ -37,6 +39,7 @@ def add_setting(command: argparse.ArgumentParser, d: Description, metavar: str |
             choices=d.choices or None,
             default=d.default if d.default != "" else None,
             metavar=metavar,
+            nargs="+" if many else None,
             help=help_of(d),
         )
 

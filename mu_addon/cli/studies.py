@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..studies import study
-from .options import add_model, add_report, add_setting, add_unit, modelled_unit
+from .options import (
+    add_measured_folder,
+    add_model,
+    add_report,
+    add_results,
+    add_setting,
+    add_unit,
+    modelled_unit,
+    require_out,
+)
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
@@ -22,7 +31,19 @@ def _add_unit(command: argparse.ArgumentParser) -> None:
     add_model(command)
 
 
-OBJECTS = {"unit": (_add_unit, modelled_unit)}
+def _add_measured(command: argparse.ArgumentParser) -> None:
+    add_measured_folder(command)
+    add_results(command)
+
+
+def _measured(options: argparse.Namespace, context: RunContext) -> Any:
+    from ..measured import read_folder
+
+    require_out(options)
+    return read_folder(Path(options.folder))
+
+
+OBJECTS = {"unit": (_add_unit, modelled_unit), "measured": (_add_measured, _measured)}
 """By kind of an input that is no plain value: its options are added, its value made of them."""
 
 
@@ -37,7 +58,7 @@ def _add(commands: Commands[Any], kind: type[Study]) -> None:
     command = commands.add_parser(kind.name, help=words, epilog=f"example: run.py {kind.example}")
     for one in kind.inputs().values():
         if one.description is not None:
-            add_setting(command, one.description, one.metavar)
+            add_setting(command, one.description, one.metavar, one.many)
         else:
             OBJECTS[one.kind][0](command)
     add_report(command)

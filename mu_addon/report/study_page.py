@@ -59,7 +59,7 @@ def _one(work: Execution, part: Part) -> str:
         return f'<p class="answer">{words}</p>' if part.answer else f"<p>{words}</p>"
     if isinstance(part, Table):
         rows = [([*map(number, cells)], i in part.best) for i, cells in enumerate(part.rows)]
-        return table(part.caption, part.head, rows)
+        return table(part.caption, part.head, rows, part.groups)
     # A run that was asked to stop leaves out what takes long to draw.
     if work.context.hurried:
         return ""
@@ -72,7 +72,8 @@ def _one(work: Execution, part: Part) -> str:
         shown = "".join(picture_figure(picture) for _, picture in found)
         return f'<div class="{"pair" if len(found) < 3 else "triple"}">{shown}</div>'
     if isinstance(part, Beside):
-        columns = "".join(f"<div>{_one(work, inner)}</div>" for inner in part.parts)
+        stacks = [one if isinstance(one, list) else [one] for one in part.parts]
+        columns = "".join(f"<div>{_html(work, stack)}</div>" for stack in stacks)
         return f'<div class="pair">{columns}</div>'
     return ""
 

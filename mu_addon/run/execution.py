@@ -50,8 +50,8 @@ class Execution:
 
     @property
     def tasks(self) -> list[Task]:
-        """Every kept result that the study wants, in order."""
-        return [(n, m) for n, members in self._members.items() if self._stages[n].kept for m in members]
+        """Every result that the study wants, in order, without those that are made when they are taken."""
+        return [(n, m) for n, members in self._members.items() if self._stages[n].title for m in members]
 
     def _titled(self) -> Iterator[tuple[str, list[Task]]]:
         """Tasks by the title of their progress."""
@@ -63,9 +63,12 @@ class Execution:
         found = []
         for title, tasks in self._titled():
             seconds = self._stages[tasks[0][0]].seconds(self.study)
-            missing = sum(self.digest(task) is None for task in tasks) / len(tasks)
+            missing = sum(not self._is_kept(task) for task in tasks) / len(tasks)
             found.append((title, max(missing * seconds, min(LOADED * seconds, LOADED_S))))
         return found
+
+    def _is_kept(self, task: Task) -> bool:
+        return self._stages[task[0]].kept and self.digest(task) is not None
 
     # Values and what identifies them.
 
@@ -192,7 +195,7 @@ class Execution:
     def _finish(self, task: Task) -> None:
         stage = self._stages[task[0]]
         try:
-            if self.digest(task) is None:
+            if self.digest(task) is None or not stage.kept:
                 self.value(task)
         except Dropped:
             self.failed[task] = ""
@@ -216,7 +219,8 @@ class Execution:
             needed |= names
             names = {n for name in needed for n in self._stages[name].needs if n in self._stages}
         for task in [*self._values]:
-            if task[0] not in needed:
+            stage = self._stages[task[0]]
+            if task[0] not in needed and (stage.kept or not stage.title):
                 del self._values[task]
 
     def warn(self, text: str) -> None:
@@ -247,7 +251,8 @@ class Execution:
         state = []
         for parameter in one.parameters:
             if parameter in self._stages:
-                state.append(key(*(self.digest(task) or "" for task in self._of(parameter))))
+                there = [task for task in self._of(parameter) if self._is_there(task)]
+                state.append(key(*(part for task in there for part in (content(task[1]), self.digest(task)))))
         if name in self._parts and self._parts[name][0] == key(*state):
             return self._parts[name][1]
         parts: list[Part] = []
@@ -268,11 +273,26 @@ class Execution:
     def _of(self, name: str) -> list[Task]:
         return [(name, member) for member in self._members.get(name, [])]
 
+    def _is_there(self, task: Task) -> bool:
+        """Return True if a result can be shown without the work of a stage of the run."""
+        stage = self._stages[task[0]]
+        if stage.kept:
+            return self.digest(task) is not None
+        if stage.title:
+            return task in self._values
+        for name in stage.needs:
+            if name in self._stages:
+                wanted = self._wanted_of(task, name)
+                tasks = [(name, one) for one in (wanted if isinstance(wanted, list) else [wanted])]
+                if not all(self._is_out(one) or self._is_there(one) for one in tasks):
+                    return False
+        return self.digest(task) is not None
+
     def _for_show(self, name: str) -> Any:
         """An input, or the results so far; None without any."""
         if name not in self._stages:
             return self.given(name)
-        there = [task for task in self._of(name) if self.digest(task) is not None]
+        there = [task for task in self._of(name) if self._is_there(task)]
         found = self._several(name, [member for _, member in there])
         found.complete = len(found) == len(self._of(name))
         if self._stages[name].over:

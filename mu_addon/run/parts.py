@@ -50,12 +50,17 @@ class Sentence:
 
 @attrs.frozen
 class Table:
-    """A table of texts. head: title and "n" for numbers, of each column; best: rows to mark."""
+    """A table of texts.
+
+    head: title of each column, with "n" for numbers, "text" for long texts, "line" for texts of one line;
+    best: rows to mark; groups: titles over so many columns each.
+    """
 
     caption: str
     head: Sequence[tuple[str, str]]
     rows: Sequence[Sequence[Any]]
     best: Sequence[int] = ()
+    groups: Sequence[tuple[str, int]] = ()
 
 
 @attrs.frozen
@@ -90,7 +95,7 @@ class Pictures:
 
 @attrs.frozen
 class Beside:
-    """Parts side by side."""
+    """Columns side by side, each a part or a list of parts."""
 
     parts: Sequence[Any]
 
@@ -109,5 +114,10 @@ def flat(parts: Sequence[Part]) -> list[Part]:
     """The parts, those side by side included, in order."""
     found: list[Part] = []
     for part in parts:
-        found += flat(part.parts) if isinstance(part, Beside) else [part]
+        found += flat(columns(part)) if isinstance(part, Beside) else [part]
     return found
+
+
+def columns(beside: Beside) -> list[Part]:
+    """The parts of all columns in order."""
+    return [part for one in beside.parts for part in (one if isinstance(one, list) else [one])]

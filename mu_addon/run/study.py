@@ -43,30 +43,43 @@ TELL = "tell"
 
 
 @attrs.frozen
+class Written:
+    """An input in files: keys that decide results, keys of the table [run], texts of other files by name."""
+
+    keys: Mapping[str, Any] = attrs.field(factory=dict)
+    run: Mapping[str, Any] = attrs.field(factory=dict)
+    files: Mapping[str, str] = attrs.field(factory=dict)
+
+
+@attrs.frozen
 class Input:
     """One input of a study. kind: how faces ask for it; "setting" for a plain value.
 
     description: of the plain value that it is, or is made of (`design.quantity.Description`), else None.
     decides: False for one that decides no figure, such as a number of processes: it is in no key, and in the
-    table [run] of the inputs' file. metavar: stands for the value in a command's help. An input of another
-    kind overrides `made`, `write` and `read`.
+    table [run] of the inputs' file. metavar: stands for the value in a command's help; many: it takes several
+    words there. An input of another kind overrides `made`, `write` and `read`.
     """
 
     kind: str
     description: Any = None
     decides: bool = True
     metavar: str | None = None
+    many: bool = False
 
     def made(self, value: Any, given: Mapping[str, Any]) -> Any:
         """The input of a plain value of its description; given: the inputs before it. Raises InputError."""
         return value
 
-    def write(self, name: str, value: Any) -> tuple[dict[str, Any], dict[str, str]]:
-        """Keys of the inputs' file, and texts of further files by name."""
-        return {name: value}, {}
+    def write(self, name: str, value: Any) -> Written:
+        """The value in the inputs' files."""
+        return Written({name: value}) if self.decides else Written(run={name: value})
 
-    def read(self, name: str, document: dict[str, Any], folder: Path) -> Any:
-        """The value, its keys taken out of the file's document; raises InputError."""
+    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> Any:
+        """The value, its keys taken out of the inputs' file; raises InputError.
+
+        document: of the file at `path`; run: its table [run].
+        """
         raise NotImplementedError
 
 
@@ -146,9 +159,9 @@ def stage(
     title: of its progress, with a set's names in braces; members of one title are one stage to a user.
     seconds: expected on two cores, of the study; of a set, for all members of one title. wanted: False of a
     study that does without it. kept: in the cache, which needs a result of arrays, numbers, texts and attrs
-    classes of these; one that is not is made when it is needed, such as a model in memory. failing: words
-    for a warning; an error of the stage then does not end the run, and what needs it is left out. revision:
-    raise it when a change of the code changes the result.
+    classes of these; else it is made in each run, without a title only when something takes it. failing:
+    words for a warning; an error of the stage then does not end the run, and what needs it is left out.
+    revision: raise it when a change of the code changes the result.
     """
 
     def mark(method: Any) -> Any:
@@ -261,7 +274,8 @@ class Study:
     @classmethod
     def inputs(cls) -> dict[str, Input]:
         """Its inputs by name."""
-        return {f.name: f.metadata[_INPUT] for f in attrs.fields(cls) if _INPUT in f.metadata}  # type: ignore[arg-type]
+        fields = attrs.fields(cls)  # type: ignore[arg-type]
+        return {f.name: f.metadata[_INPUT] for f in fields if _INPUT in f.metadata}
 
     @classmethod
     def stages(cls) -> dict[str, Stage]:
@@ -294,9 +308,10 @@ class Study:
         values: dict[str, Any] = {"format": FORMAT}
         files: dict[str, str] = {}
         for name, one in self.inputs().items():
-            keys, texts = one.write(name, getattr(self, name))
-            (values if one.decides else run).update(keys)
-            files |= texts
+            written = one.write(name, getattr(self, name))
+            values |= written.keys
+            run |= written.run
+            files |= written.files
         return {layout.inputs: toml_text(values | ({RUN: run} if run else {}), layout.header), **files}
 
     @classmethod
@@ -305,11 +320,11 @@ class Study:
         path = folder / cls.layout().inputs
         document, run = read_inputs(path)
         special = {
-            name: one.read(name, document if one.decides else run, folder)
+            name: one.read(name, document, run, path)
             for name, one in cls.inputs().items()
             if one.kind != "setting"
         }
-        plain = {n: v for n, v in run.items() if n in cls.inputs()}
+        plain = {n: v for n, v in run.items() if n in cls.inputs() and n not in special}
         return structured(cls, document | plain, str(path), **special)
 
 

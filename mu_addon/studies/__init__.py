@@ -7,7 +7,7 @@ from importlib import import_module
 
 from ..run.study import Study
 
-STUDIES = {"homogenize": "Homogenize"}
+STUDIES = {"fit-material": "FitMaterial", "homogenize": "Homogenize"}
 """Class by command; its module has the command's name."""
 
 

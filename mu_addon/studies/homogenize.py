@@ -165,12 +165,12 @@ class Homogenize(Study):
         tell.made(f"{len(mesh.nodes)} nodes and {len(mesh.tets)} elements")
         return mesh
 
-    @stage("cell", kept=False)
+    @stage("", kept=False)
     def mesh(self, octant: meshing.Mesh, cell: design.StrutCell) -> meshing.Mesh:
         """The eighth at the cell's size."""
         return attrs.evolve(octant, nodes=octant.nodes * cell.half_mm)
 
-    @stage("materials", kept=False)
+    @stage("", kept=False)
     def filled(
         self, mesh: meshing.Mesh, cell: design.StrutCell, stiffness: tuple[float, float]
     ) -> fem.Materials:
@@ -234,7 +234,7 @@ class Homogenize(Study):
         """An eighth of the block's cell, at a size of 2 mm."""
         return homogenize.mesh_cell(shape, coarse)
 
-    @stage("specimen", kept=False, wanted=lambda study: study.frictions)
+    @stage("", kept=False, wanted=lambda study: study.frictions)
     def specimen(
         self, block_octant: meshing.Mesh, cell: design.StrutCell, cells: int, stiffness: tuple[float, float]
     ) -> homogenize.Specimen:
@@ -242,7 +242,7 @@ class Homogenize(Study):
         mesh = attrs.evolve(block_octant, nodes=block_octant.nodes * cell.half_mm)
         return homogenize.block_specimen(mesh, cells, homogenize.cell_materials(cell, mesh, *stiffness))
 
-    @stage("plates", kept=False, over=Over(("contact",), lambda study: study.frictions))
+    @stage("", kept=False, over=Over(("contact",), lambda study: study.frictions))
     def plates(self, contact: homogenize.Friction, specimen: homogenize.Specimen) -> homogenize.Plates:
         """The plates and the block's equations."""
         return homogenize.Plates(specimen, contact)
@@ -287,7 +287,7 @@ class Homogenize(Study):
         return homogenize.limits_of(specimen, contact, list(states.values()))
 
     @stage(
-        "test",
+        "",
         kept=False,
         over=Over(
             ("contact",),

@@ -29,7 +29,6 @@ MODULES = {
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
     "protocols.toml": ".diagnose.design_experiments",
-    "fit.toml": ".fit_material.run",
     "calibrate.toml": ".sensor.calibrate",
     "record.toml": ".sensor.record",
     "motion.toml": ".sensor.measured_motion",

@@ -59,7 +59,7 @@ class Spring(Study):
         CALLS.append("rest")
         return State(0.0, np.zeros(rounded))
 
-    @stage("model", kept=False)
+    @stage("", kept=False)
     def model(self, stiffness: float) -> float:
         CALLS.append("model")
         return stiffness

@@ -15,26 +15,34 @@ from mu_addon.materials.library import read_material
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.fit_material.job import Job
-from mu_addon.usecases.fit_material.run import USE_CASE, console_summary
+from mu_addon.studies.fit_material import FitMaterial
+from mu_addon.studies.use_case import use_case
 
 DATA = Path(__file__).parent.parent / "data"
+
+
+def job(folder, laws=(), hold_out=(), weights="absolute"):
+    return FitMaterial(data=read_folder(folder), laws=laws, hold_out=hold_out, weights=weights)
+
+
+def start(study, out):
+    use_case("fit-material").start(study, out, RunContext(Progress()))
 
 
 def run(folder, out, *arguments, **options):
     messages = []
     progress = Progress([messages.append])
     with run_to_end(progress) as context:
-        USE_CASE.start(Job(read_folder(folder), *arguments, **options), out, context)
+        use_case("fit-material").start(job(folder, *arguments, **options), out, context)
     return context, messages
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     out = tmp_path_factory.mktemp("fit")
-    context, messages = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
+    context, _ = run(DATA / "treloar", out, ("neo-hooke", "yeoh", "ogden-1"), ("equibiaxial",))
     assert context.status == 0
-    return out, context.summary, messages
+    return out, context.summary, context.console_summary({})
 
 
 def test_a_fit_leaves_a_material_that_gives_the_stresses_of_its_table(fitted):
@@ -71,7 +79,7 @@ def test_the_tables_say_what_the_summary_says(fitted):
 
 
 def test_the_terminal_is_told_in_a_few_lines(fitted):
-    lines = console_summary(fitted[1])
+    lines = fitted[2]
     assert lines[0].startswith("law: yeoh, c1_MPa 0.")
     assert "in equibiaxial" in lines[1]
     assert lines[2] == "error on equibiaxial exceeds 10%"
@@ -125,7 +133,7 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     assert set(context.summary["untested"]) == {"equibiaxial", "pure_shear"}
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "Equibiaxial was not tested. There, laws that fit the other modes differ by a factor of" in html
-    assert "relative" in (tmp_path / "out" / "fit.toml").read_text()
+    assert "relative" in (tmp_path / "out" / "fit-material.toml").read_text()
 
 
 @pytest.mark.parametrize(
@@ -140,7 +148,6 @@ def test_one_mode_alone_brings_a_warning_of_the_others(tmp_path):
     ],
 )
 def test_what_cannot_be_fitted_is_refused_before_anything_is_written(tmp_path, folder, arguments, what):
-    progress = Progress()
     with pytest.raises(InputError, match=re.escape(what)):
-        USE_CASE.start(Job(read_folder(DATA / folder), *arguments), tmp_path / "out", RunContext(progress))
+        start(job(DATA / folder, *arguments), tmp_path / "out")
     assert not (tmp_path / "out").exists()

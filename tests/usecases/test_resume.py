@@ -21,6 +21,7 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.studies import STUDIES
+from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases import prepare
@@ -30,7 +31,6 @@ from mu_addon.usecases.diagnose import design_experiments
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.export import job as export
 from mu_addon.usecases.export import specimens
-from mu_addon.usecases.fit_material import job as fit
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
@@ -99,7 +99,7 @@ def jobs(folder):
     yield diagnose.Job(paper)
     yield diagnose.Job(paper, load_preset("mu-1.5x"))
     yield design_experiments.Job(paper, noise={**design_experiments.NOISE, "angle": 1 / 3})
-    yield fit.Job(measured, ("yeoh", "neo-hooke"), ("uniaxial",), "relative")
+    yield FitMaterial(data=measured, laws=("yeoh", "neo-hooke"), hold_out=("uniaxial",), weights="relative")
     yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
     yield chain.read_chain(asset_root() / "examples/trunk/chain.toml")
     yield optimize.job_from(asset_root() / "examples/graded-finger/design.toml")
@@ -143,7 +143,7 @@ def without_table(text, name):
 
 def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
     data = shutil.copytree(DATA / "treloar", tmp_path / "data")
-    keep_inputs(tmp_path / "out", fit.Job(read_folder(data)).texts())
+    keep_inputs(tmp_path / "out", FitMaterial(data=read_folder(data)).texts())
     context = RunContext(Progress())
     moved = data.rename(tmp_path / "elsewhere")
     with pytest.raises(InputError, match="the folder of measured data is not where it was") as caught:
@@ -156,7 +156,7 @@ def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
         resume(tmp_path / "out", context)
     assert caught.value.where == str(data)
     # The same data somewhere else are the same inputs.
-    assert same_inputs(tmp_path / "out", fit.Job(read_folder(moved)).texts())
+    assert same_inputs(tmp_path / "out", FitMaterial(data=read_folder(moved)).texts())
 
 
 def test_an_older_diagnosis_says_how_to_go_on(tmp_path):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...materials.coupon import Coupon, binned
-from ...materials.fit import Fit
-from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
+from ..materials.coupon import Coupon, binned
+from ..materials.fit import Fit
+from .plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 
 # Told apart without colour by dashes, and drawn in this order.
 STYLES: tuple[tuple[str, Any], ...] = (
