@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import closing
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,8 @@ from ..files import write_bytes
 from .cache import Cache, key
 from .context import RunContext
 from .parts import Fact, File, Part, Sentence, Warn, flat
+from .pool import Pool
+from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
 from .stored import content, packed, unpacked
 from .study import TELL, Dropped, Members, Section, Stage, Study, Tell, parameters_of
@@ -186,15 +191,87 @@ class Execution:
         self.show()
         for title, tasks in self._titled():
             with self.context.progress.stage(title):
-                for number, task in enumerate(tasks, 1):
-                    self._finish(task)
-                    self.context.progress.update(number / len(tasks))
+                self._make_all(tasks)
             self.show()
             self._forget()
 
-    def _finish(self, task: Task) -> None:
+    def _make_all(self, tasks: list[Task]) -> None:
+        """Make the results of tasks, each after those that it takes, in this process or in several."""
+        waiting, running, found = list(tasks), dict[Future[None], Task](), 0
+        workers = self.study.workers if any(self._stages[name].parallel for name, _ in tasks) else 1
+        with closing(Pool(workers, tasks[0][0], _begin, (self.study, self.folder))) as pool:
+            while waiting or running:
+                for task in self._worth(waiting):
+                    if workers == 1 or not self._stages[task[0]].parallel or self._is_kept(task):
+                        self._finish(task)
+                        self._settle(task, waiting)
+                        break
+                    if len(running) == workers:
+                        break
+                    running[pool.submit(_in_process, task, self.failed, self._members)] = task
+                    waiting.remove(task)
+                else:
+                    if not running:
+                        # Never chosen, or without what they take.
+                        self.failed |= dict.fromkeys(waiting, "")
+                        self._done.update(waiting)
+                        break
+                if running and (len(running) == workers or not self._worth(waiting)):
+                    for future in wait(running, return_when=FIRST_COMPLETED).done:
+                        task = running.pop(future)
+                        self._finish(task, partial(pool.result, future))
+                        self._settle(task, waiting)
+                found = sum(task in self._done for task in tasks)
+                self.context.progress.update(found / max(len(tasks), found + len(waiting) + len(running)))
+
+    def _settle(self, task: Task, waiting: list[Task]) -> None:
+        """Take a finished task from those that wait, and add the members that grow from it."""
+        if task in waiting:
+            waiting.remove(task)
+        over = self._stages[task[0]].over
+        if over and over.grows:
+            known = self._members[task[0]]
+            new = [m for m in over.grows(self.study, self._results(task[0])) if m not in known]
+            known += new
+            waiting += [(task[0], member) for member in new]
+
+    def _worth(self, waiting: Sequence[Task]) -> list[Task]:
+        """The tasks that can be made now, and are worth it, in order."""
+        ready = [task for task in waiting if self._is_ready(task)]
+        found: list[Task] = []
+        for name, group in groupby(ready, lambda task: task[0]):
+            members = [member for _, member in group]
+            over = self._stages[name].over
+            if over and over.choose:
+                members = [m for m in over.choose(self.study, members, self._results(name)) if m in members]
+            found += [(name, member) for member in members]
+        return found
+
+    def _results(self, name: str) -> Members:
+        return self._several(name, [member for member in self._members[name] if (name, member) in self._done])
+
+    def _is_ready(self, task: Task) -> bool:
+        """Return True if all that a task takes is made, or will not be."""
+        for name in self._stages[task[0]].needs:
+            for one in self._takes(task, name):
+                made = one in self._done if self._stages[name].title else self._is_ready(one)
+                if not made and name in self._members:
+                    return False
+        return True
+
+    def _takes(self, task: Task, name: str) -> list[Task]:
+        """The tasks of which a task takes the results, of one of its parameters."""
+        if name not in self._stages:
+            return []
+        wanted = self._wanted_of(task, name)
+        return [(name, one) for one in (wanted if isinstance(wanted, list) else [wanted])]
+
+    def _finish(self, task: Task, work: Callable[[], Any] | None = None) -> None:
+        """Make a task's result, by `work` if that is given; a failure that may be becomes a warning."""
         stage = self._stages[task[0]]
         try:
+            if work is not None:
+                work()
             if self.digest(task) is None or not stage.kept:
                 self.value(task)
         except Dropped:
@@ -280,13 +357,9 @@ class Execution:
             return self.digest(task) is not None
         if stage.title:
             return task in self._values
-        for name in stage.needs:
-            if name in self._stages:
-                wanted = self._wanted_of(task, name)
-                tasks = [(name, one) for one in (wanted if isinstance(wanted, list) else [wanted])]
-                if not all(self._is_out(one) or self._is_there(one) for one in tasks):
-                    return False
-        return self.digest(task) is not None
+        taken = [one for name in stage.needs for one in self._takes(task, name)]
+        there = all(self._is_out(one) or self._is_there(one) for one in taken)
+        return there and self.digest(task) is not None
 
     def _for_show(self, name: str) -> Any:
         """An input, or the results so far; None without any."""
@@ -303,6 +376,24 @@ class Execution:
         made = file.make(self.folder / file.name)
         if made is not None:
             write_bytes(self.folder / file.name, made.encode() if isinstance(made, str) else made)
+
+
+# The study of a process of the pool, which remembers what it made.
+_HERE: list[Execution] = []
+
+
+def _begin(study: Study, folder: Path) -> None:
+    _HERE[:] = [Execution(study, folder, RunContext(Progress()))]
+
+
+def _in_process(task: Task, failed: dict[Task, str], members: dict[str, list[Any]]) -> None:
+    """Make a result in a process of the pool, which leaves it in the cache; raises the stage's errors.
+
+    failed, members: those of the process that submits it.
+    """
+    (work,) = _HERE
+    work.failed, work._members = failed, members
+    work.value(task)
 
 
 def _put(table: dict[str, Any], path: Sequence[str], value: Any) -> None:

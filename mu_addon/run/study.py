@@ -103,11 +103,15 @@ class Over:
     names: of the stage's parameters that a member gives, one or several; members: the members of a study, in
     order. needs: of a member, by parameter, the one member or the list of members of a stage's set that it
     takes; a parameter that is not there takes the whole set. A stage that names itself takes earlier members.
+    grows: further members, from the results so far. choose: of the members that could be made now, those that
+    are worth it, the first one first, from the results so far; what is never chosen has no result.
     """
 
     names: tuple[str, ...]
     members: Callable[[Any], Sequence[Any]]
     needs: Callable[[Any, Any], Mapping[str, Any]] = lambda study, member: {}
+    grows: Callable[[Any, Members], Sequence[Any]] | None = None
+    choose: Callable[[Any, Sequence[Any], Members], Sequence[Any]] | None = None
 
     def values(self, member: Any) -> dict[str, Any]:
         """The parameters that a member gives."""
@@ -127,6 +131,7 @@ class Stage:
     wanted: Callable[[Any], bool]
     kept: bool
     failing: str
+    parallel: bool
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -153,6 +158,7 @@ def stage(
     kept: bool = True,
     failing: str = "",
     revision: int = 1,
+    parallel: bool = False,
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set.
 
@@ -161,7 +167,8 @@ def stage(
     study that does without it. kept: in the cache, which needs a result of arrays, numbers, texts and attrs
     classes of these; else it is made in each run, without a title only when something takes it. failing:
     words for a warning; an error of the stage then does not end the run, and what needs it is left out.
-    revision: raise it when a change of the code changes the result.
+    revision: raise it when a change of the code changes the result. parallel: members may be made in
+    processes of their own, the study's `workers`, side by side with other parallel stages of the same title.
     """
 
     def mark(method: Any) -> Any:
@@ -169,7 +176,7 @@ def stage(
         setattr(
             method,
             _STAGE,
-            Stage(method.__name__, method, title, in_time, revision, over, wanted, kept, failing),
+            Stage(method.__name__, method, title, in_time, revision, over, wanted, kept, failing, parallel),
         )
         return method
 
@@ -260,6 +267,7 @@ class Study:
     files: ClassVar[Mapping[str, str]]
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
+    workers: Any = 1
 
     def title(self) -> str:
         """The report's title."""

@@ -1,6 +1,7 @@
 """The base of all studies: what a result depends on, what a killed or failed run keeps, what is shown."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -240,6 +241,99 @@ def test_declarations_load_neither_solver_nor_numpy():
     root = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# Sets in several processes, that grow, and that are left before their end.
+
+
+@attrs.frozen(kw_only=True)
+class Race(Study):
+    """Run laps; a runner who can no longer win runs no further."""
+
+    name = "race"
+    files = MappingProxyType({})
+    paces: str = setting(described("paces", "3 2 5", "seconds a lap of each runner"))
+    laps: int = setting(described("laps", 4, "number of laps", low=1, high=9))
+    sprints: bool = setting(described("sprints", False, "the winner runs on"))
+    workers: int = setting(described("workers", 1, "processes", low=1, high=8), decides=False)
+
+    def title(self):
+        return "A race"
+
+    @derived
+    def pace(self, paces):
+        return tuple(float(pace) for pace in paces.split())
+
+    @stage("", kept=False)
+    def ground(self, pace: tuple) -> int:
+        return os.getpid()
+
+    @stage("race", over=Over(("start",), lambda s: ["left", "right"]), parallel=True)
+    def shoes(self, start: str) -> str:
+        return start
+
+    @stage(
+        "race",
+        over=Over(
+            ("runner", "lap"),
+            lambda s: [(r, lap) for r in range(len(s.paces.split())) for lap in range(s.laps)],
+            lambda s, m: {"laps_run": [(m[0], lap) for lap in range(m[1])], "shoes": "left"},
+            grows=lambda s, done: [(1, s.laps)] if s.sprints and (1, s.laps - 1) in done else [],
+            choose=lambda s, ready, done: [m for m in ready if s.can_win(m[0], done)],
+        ),
+        parallel=True,
+    )
+    def laps_run(self, runner: int, lap: int, pace: tuple, ground: int, shoes: str, laps_run: dict) -> State:
+        assert list(laps_run) == [(runner, before) for before in range(lap)]
+        if pace[runner] > 9:
+            raise ConvergenceError("out of breath")
+        return State(sum(s.moved[0] for s in laps_run.values()) + pace[runner], np.array([pace[runner]]))
+
+    def can_win(self, runner, done):
+        """Sums of times only grow: one beyond a finished runner's is lost."""
+        ended = [s.load for (_, lap), s in done.items() if lap == self.laps - 1]
+        own = [s.load for (r, _), s in done.items() if r == runner]
+        return not ended or not own or max(own) <= min(ended)
+
+    @section()
+    def result(self, laps_run):
+        for (runner, lap), state in sorted(laps_run.items()):
+            yield Fact("time", state.load, key=f"times.{runner}.{lap}")
+        yield Fact("all", laps_run.complete, key="complete")
+
+
+def raced(folder, **given):
+    context = RunContext(Progress())
+    Execution(Race(**given), folder, context).run()
+    return context.summary
+
+
+def test_what_cannot_win_is_left_and_the_winner_is_that_of_all(tmp_path):
+    found = raced(tmp_path)
+    assert found["times"]["1"]["3"] == 8.0
+    assert found["complete"] is False
+    # Two laps of 5 s are beyond the 8 s of the winner: the third is not run.
+    assert list(found["times"]["2"]) == ["0", "1"]
+
+
+def test_the_number_of_processes_changes_no_result(tmp_path):
+    alone = raced(tmp_path / "1", paces="3 2", laps=2)
+    found = raced(tmp_path / "3", paces="3 2", laps=2, workers=3)
+    both = found["times"]["0"], alone["times"]["0"]
+    assert found["times"]["1"] == alone["times"]["1"] == {"0": 2.0, "1": 4.0}
+    # What was left may differ, what was run may not.
+    assert all(both[0][lap] == both[1][lap] for lap in {*both[0]} & {*both[1]})
+
+
+def test_a_set_grows_from_its_results_and_a_resumed_one_alike(tmp_path):
+    first = raced(tmp_path, sprints=True)
+    assert first["times"]["1"]["4"] == 10.0
+    assert raced(tmp_path, sprints=True) == first
+
+
+def test_an_error_in_a_process_is_that_of_the_stage(tmp_path):
+    with pytest.raises(ConvergenceError, match="out of breath"):
+        raced(tmp_path, paces="10 2", workers=2)
 
 
 # Results as arrays.
