@@ -65,9 +65,9 @@ def add_export(commands: Commands[Any]) -> None:
 
 def run_export(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
+    from ..design.printing.sheets import compensation_offsets
     from ..usecases.export.job import Job, path_of, resin_of
     from ..usecases.export.run import USE_CASE
-    from ..usecases.export.sheets import compensation_offsets
 
     unit = modelled_unit(options, context)
     path, name = path_of(unit, options.path, options.path_row)

@@ -17,7 +17,7 @@ Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse g
 
 
 def add_setting(
-    command: argparse.ArgumentParser, d: Description, metavar: str | None = None, many: bool = False
+    command: argparse.ArgumentParser, d: Description, metavar: Any = None, many: bool = False
 ) -> None:
     """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
 

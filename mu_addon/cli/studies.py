@@ -18,20 +18,26 @@ from .options import (
     add_unit,
     modelled_unit,
     require_out,
+    unit_if_named,
 )
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
-    from ..run.study import Study
+    from ..run.study import Input, Study
     from .options import Commands
 
 
-def _add_unit(command: argparse.ArgumentParser) -> None:
-    add_unit(command)
-    add_model(command)
+def _add_unit(command: argparse.ArgumentParser, one: Any) -> None:
+    add_unit(command, one.needed)
+    if one.needed:
+        add_model(command)
 
 
-def _add_measured(command: argparse.ArgumentParser) -> None:
+def _unit(options: argparse.Namespace, context: RunContext) -> Any:
+    return modelled_unit(options, context) if hasattr(options, "model") else unit_if_named(options)
+
+
+def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
     add_measured_folder(command)
     add_results(command)
 
@@ -43,7 +49,7 @@ def _measured(options: argparse.Namespace, context: RunContext) -> Any:
     return read_folder(Path(options.folder))
 
 
-OBJECTS = {"unit": (_add_unit, modelled_unit), "measured": (_add_measured, _measured)}
+OBJECTS = {"unit": (_add_unit, _unit), "measured": (_add_measured, _measured)}
 """By kind of an input that is no plain value: its options are added, its value made of them."""
 
 
@@ -57,11 +63,29 @@ def _add(commands: Commands[Any], kind: type[Study]) -> None:
     words = " ".join(inspect.getdoc(kind).split("\n\n")[0].split())  # type: ignore[union-attr]
     command = commands.add_parser(kind.name, help=words, epilog=f"example: run.py {kind.example}")
     for one in kind.inputs().values():
-        if one.description is not None:
-            add_setting(command, one.description, one.metavar, one.many)
+        if one.descriptions:
+            _add_values(command, one)
         else:
-            OBJECTS[one.kind][0](command)
+            OBJECTS[one.kind][0](command, one)
     add_report(command)
+
+
+def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
+    """The option of an input's plain values."""
+    first = one.descriptions[0]
+    if len(one.descriptions) == 1:
+        add_setting(command, first, one.metavar, one.many)
+        return
+    defaults = [d.default for d in one.descriptions]
+    shown = " ".join(f"{value:g}" for value in defaults)
+    command.add_argument(
+        f"--{one.option}",
+        nargs=len(defaults),
+        type=first.type,
+        default=defaults,
+        metavar=one.metavar,
+        help=f"{first.text[:1].upper()}{first.text[1:]} (default: {shown}).",
+    )
 
 
 def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) -> None:
@@ -69,8 +93,9 @@ def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) ->
 
     values: dict[str, Any] = {}
     for name, one in kind.inputs().items():
-        if one.description is not None:
-            values[name] = one.made(getattr(options, name), values)
+        if one.descriptions:
+            given = getattr(options, one.option or one.descriptions[0].name)
+            values[name] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
         else:
             values[name] = OBJECTS[one.kind][1](options, context)
     use_case(kind.name).start(kind(**values), Path(options.out), context)

@@ -36,6 +36,18 @@ if TYPE_CHECKING:
     from .parameters import read_unit as read_unit
     from .parameters import to_toml as to_toml
     from .parameters import write_unit as write_unit
+    from .printing.check import PrintCheck as PrintCheck
+    from .printing.check import check as check
+    from .printing.orientation import direction_name as direction_name
+    from .printing.printer import MEANING as MEANING
+    from .printing.printer import Printer as Printer
+    from .printing.printer import load_printer as load_printer
+    from .printing.printer import printer_text as printer_text
+    from .printing.printer import read_printer as read_printer
+    from .printing.repair import Repair as Repair
+    from .printing.repair import repaired as repaired
+    from .printing.slices import even_heights as even_heights
+    from .printing.slices import slices as slices
     from .profile import cavity_radius as cavity_radius
     from .profile import cavity_volume as cavity_volume
     from .profile import membrane_volume as membrane_volume
@@ -45,9 +57,11 @@ if TYPE_CHECKING:
     from .rigid_body import RigidBody as RigidBody
     from .solid import Solid as Solid
     from .solid import build_solid as build_solid
+    from .solid import chamber as chamber
     from .stl_and_nodes import write_nodes as write_nodes
     from .stl_and_nodes import write_stl as write_stl
     from .strut_cell import StrutCell as StrutCell
+    from .surface import stl_bytes as stl_bytes
     from .threemf import write_3mf as write_3mf
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

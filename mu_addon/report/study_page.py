@@ -8,7 +8,7 @@ from typing import Any
 
 from ..files import write_bytes, write_text
 from ..run.execution import Execution
-from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table
+from ..run.parts import Beside, Chart, Fact, Part, Pictures, Sentence, Table, flat
 from ..run.versions import package_versions
 from .html import cards, facts_table, figure, note, number, page, picture_figure, table
 from .plots import signed
@@ -33,8 +33,11 @@ def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> 
         ("files", "Files of this run", facts_table("file", "content", _files(work))),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
-    warnings = work.context.summary.get("warnings", [])
-    return page(study.title(), signed(study.subtitle()), note(warnings, stopped), lead, sections)
+    said = [
+        part for _, parts in work.shown for part in flat(parts) if isinstance(part, Sentence) and part.note
+    ]
+    notes = [*work.context.summary.get("warnings", []), *(part.text for part in said)]
+    return page(study.title(), signed(study.subtitle()), note(notes, stopped), lead, sections)
 
 
 def _html(work: Execution, parts: Sequence[Part]) -> str:
@@ -52,7 +55,7 @@ def _html(work: Execution, parts: Sequence[Part]) -> str:
 
 
 def _one(work: Execution, part: Part) -> str:
-    if isinstance(part, Sentence) and part.page:
+    if isinstance(part, Sentence) and part.page and not part.note:
         words = signed(escape(part.text))
         strong = signed(escape(part.strong))
         words = words.replace(strong, f"<strong>{strong}</strong>", 1) if strong else words

@@ -17,7 +17,7 @@ from ..errors import InputError, MuError
 from ..files import write_bytes
 from .cache import Cache, key
 from .context import RunContext
-from .parts import Fact, File, Part, Sentence, Warn, flat
+from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
 from .pool import Pool
 from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
@@ -33,13 +33,15 @@ _CONTENT = "content"
 class Execution:
     """A study at work in a folder; `run` it once.
 
-    lines: sentences for the end of a command. Results are read from the folder's cache when they are needed.
+    lines: sentences for the end of a command; fault: an error that is the result. Results are read from the
+    folder's cache when they are needed.
     """
 
     def __init__(self, study: Study, folder: Path, context: RunContext) -> None:
         self.study, self.folder, self.context = study, folder, context
         self.cache = Cache(folder / "cache")
         self.lines: list[str] = []
+        self.fault: MuError | None = None
         self.shown: list[tuple[Section, list[Part]]] = []
         self.failed: dict[Task, str] = {}
         self._stages = study.stages()
@@ -198,7 +200,7 @@ class Execution:
     def _make_all(self, tasks: list[Task]) -> None:
         """Make the results of tasks, each after those that it takes, in this process or in several."""
         waiting, running, found = list(tasks), dict[Future[None], Task](), 0
-        workers = self.study.workers if any(self._stages[name].parallel for name, _ in tasks) else 1
+        workers = self.study.processes if any(self._stages[name].parallel for name, _ in tasks) else 1
         with closing(Pool(workers, tasks[0][0], _begin, (self.study, self.folder))) as pool:
             while waiting or running:
                 for task in self._worth(waiting):
@@ -343,8 +345,12 @@ class Execution:
         for part in flat(parts):
             if isinstance(part, File):
                 self._write(part)
-            elif isinstance(part, Warn):
+            elif isinstance(part, Warn) and part.repeated:
                 self.warn(part.text)
+            elif isinstance(part, Warn):
+                self.context.progress.warning(part.text, part.where, part.remedy)
+            elif isinstance(part, Fault):
+                self.fault = part.error
         return parts
 
     def _of(self, name: str) -> list[Task]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import attrs
 
+from ..errors import MuError
 from ..files import csv_text
 
 
@@ -38,13 +39,14 @@ def recorded(key: str, value: Any) -> Fact:
 class Sentence:
     """A sentence; answer: it answers the study's question; terminal: it is printed at the end of a command.
 
-    page: it stands in the report; strong: words of it to be set off there.
+    page: it stands in the report, with `note` in the box at its head; strong: words of it to be set off.
     """
 
     text: str
     answer: bool = False
     terminal: bool = False
     page: bool = True
+    note: bool = False
     strong: str = ""
 
 
@@ -102,12 +104,25 @@ class Beside:
 
 @attrs.frozen
 class Warn:
-    """A warning, told when it is found and repeated in the report."""
+    """A warning, told when it is found; repeated in the report, unless that shows it otherwise.
+
+    where, remedy: as those of an error.
+    """
 
     text: str
+    where: str = ""
+    remedy: str = ""
+    repeated: bool = True
 
 
-Part = Fact | Sentence | Table | File | Chart | Pictures | Beside | Warn
+@attrs.frozen
+class Fault:
+    """An error that is a study's result: it ends the run once all is shown."""
+
+    error: MuError
+
+
+Part = Fact | Sentence | Table | File | Chart | Pictures | Beside | Warn | Fault
 
 
 def flat(parts: Sequence[Part]) -> list[Part]:

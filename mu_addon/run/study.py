@@ -55,37 +55,46 @@ class Written:
 class Input:
     """One input of a study. kind: how faces ask for it; "setting" for a plain value.
 
-    description: of the plain value that it is, or is made of (`design.quantity.Description`), else None.
-    decides: False for one that decides no figure, such as a number of processes: it is in no key, and in the
-    table [run] of the inputs' file. metavar: stands for the value in a command's help; many: it takes several
-    words there. An input of another kind overrides `made`, `write` and `read`.
+    descriptions: of the plain values that it is, or is made of (`design.quantity.Description`); none where
+    faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
+    processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
+    it is not that of the description; metavar: stands for its value there; many: it takes several words. An
+    input of another kind overrides `made`, `write` and `read`.
     """
 
     kind: str
-    description: Any = None
+    descriptions: tuple[Any, ...] = ()
     decides: bool = True
-    metavar: str | None = None
+    option: str = ""
+    metavar: str | tuple[str, ...] | None = None
     many: bool = False
 
-    def made(self, value: Any, given: Mapping[str, Any]) -> Any:
-        """The input of a plain value of its description; given: the inputs before it. Raises InputError."""
-        return value
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
+        """The input of its plain values; given: the inputs before it. Raises InputError."""
+        return values[0]
 
     def write(self, name: str, value: Any) -> Written:
         """The value in the inputs' files."""
         return Written({name: value}) if self.decides else Written(run={name: value})
 
-    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> Any:
-        """The value, its keys taken out of the inputs' file; raises InputError.
-
-        document: of the file at `path`; run: its table [run].
-        """
+    def read(self, name: str, found: Found) -> Any:
+        """The value, its keys taken out of what was found; raises InputError."""
         raise NotImplementedError
+
+
+@attrs.frozen
+class Found:
+    """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far."""
+
+    path: Path
+    keys: dict[str, Any]
+    run: dict[str, Any]
+    given: dict[str, Any]
 
 
 def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
     """attrs field of an input that is a plain value, of the description's name, default and bounds."""
-    given = Input("setting", description, decides, metavar)
+    given = Input("setting", (description,), decides, metavar=metavar)
     return attrs.field(
         default=description.default, converter=description.checked, metadata={_INPUT: given}, kw_only=True
     )
@@ -223,12 +232,21 @@ def section(key: str = "", title: str = "") -> Callable[[Any], Any]:
 
 @attrs.frozen
 class Node:
-    """The node of a study: menu, text, outputs as (name, type, text); remark: on a finished run's summary."""
+    """The node of a study: menu, text, outputs as (name, type, text); remark: on a finished run's summary.
+
+    label: in menus, if not the name of the class; answers: a verdict in the summary is a result, even if the
+    run ends with an error because of it; hidden: inputs that the node leaves at their defaults; no_body:
+    names the study in the error of a unit with a body of its own, which it does not take.
+    """
 
     category: str
     text: str
     outputs: tuple[tuple[str, str, str], ...]
     remark: Callable[[Mapping[str, Any]], str]
+    label: str = ""
+    answers: bool = False
+    hidden: tuple[str, ...] = ()
+    no_body: str = ""
 
 
 @attrs.frozen
@@ -267,7 +285,11 @@ class Study:
     files: ClassVar[Mapping[str, str]]
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
-    workers: Any = 1
+
+    @property
+    def processes(self) -> int:
+        """Number of processes for its parallel stages: its input `workers`, if it has one."""
+        return int(getattr(self, "workers", 1))
 
     def title(self) -> str:
         """The report's title."""
@@ -326,14 +348,14 @@ class Study:
     def read(cls, folder: Path) -> Self:
         """The study whose inputs are in a folder; raises InputError."""
         path = folder / cls.layout().inputs
-        document, run = read_inputs(path)
-        special = {
-            name: one.read(name, document, run, path)
-            for name, one in cls.inputs().items()
-            if one.kind != "setting"
-        }
-        plain = {n: v for n, v in run.items() if n in cls.inputs() and n not in special}
-        return structured(cls, document | plain, str(path), **special)
+        keys, run = read_inputs(path)
+        found = Found(path, keys, run, {})
+        for name, one in cls.inputs().items():
+            if one.kind != "setting":
+                found.given[name] = one.read(name, found)
+            elif not one.decides and name in run:
+                keys[name] = run[name]
+        return structured(cls, keys, str(path), **found.given)
 
 
 def _marked(cls: Any, mark: str, bare: bool = False) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from importlib import import_module
 
 from ..run.study import Study
 
-STUDIES = {"fit-material": "FitMaterial", "homogenize": "Homogenize"}
+STUDIES = {"check": "Check", "fit-material": "FitMaterial", "homogenize": "Homogenize"}
 """Class by command; its module has the command's name."""
 
 

@@ -64,18 +64,22 @@ class FitMaterial(Study):
     data: measured.Measured = given(MeasuredInput(data=_identity))
     laws: tuple[str, ...] = given(
         WordsInput(
-            description=described("laws", "", "laws to fit, such as neo-hooke, yeoh or ogden-2; empty: all"),
+            descriptions=(
+                described("laws", "", "laws to fit, such as neo-hooke, yeoh or ogden-2; empty: all"),
+            ),
             metavar="LAW",
         ),
         default=(),
     )
     hold_out: tuple[str, ...] = given(
         WordsInput(
-            description=described(
-                "hold_out",
-                "",
-                "test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear; empty: "
-                "none",
+            descriptions=(
+                described(
+                    "hold_out",
+                    "",
+                    "test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear; "
+                    "empty: none",
+                ),
             ),
             metavar="MODE",
         ),

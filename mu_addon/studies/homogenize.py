@@ -65,11 +65,13 @@ class Homogenize(Study):
     unit: design.Unit = given(UnitInput())
     resin: Resin = given(
         ResinInput(
-            description=described(
-                "resin",
-                "",
-                "material of the struts: one of the library or a TOML file; empty: that of the unit's "
-                "membrane",
+            descriptions=(
+                described(
+                    "resin",
+                    "",
+                    "material of the struts: one of the library or a TOML file; empty: that of the unit's "
+                    "membrane",
+                ),
             ),
             metavar="NAME|FILE",
         )

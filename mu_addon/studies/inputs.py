@@ -1,8 +1,8 @@
-"""Inputs that several studies have and that are no plain values: a unit, a resin."""
+"""Inputs that several studies have and that are no plain values: a unit, a resin, a printer, a path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +13,29 @@ from ..design.quantity import in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
 from ..run.inputs import named_path, structured
-from ..run.study import Input, Written
+from ..run.study import Found, Input, Written
 
 UNIT = "unit.toml"
 
 
 @attrs.frozen
 class UnitInput(Input):
-    """A unit, in a file of its own."""
+    """A unit, in a file of its own; needed: there is always one."""
 
     kind: str = "unit"
+    needed: bool = True
 
-    def write(self, name: str, value: design.Unit) -> Written:
+    def write(self, name: str, value: design.Unit | None) -> Written:
         """The file's name, and its text."""
+        if value is None:
+            return Written()
         return Written({name: UNIT}, files={UNIT: design.to_toml(value)})
 
-    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> design.Unit:
+    def read(self, name: str, found: Found) -> design.Unit | None:
         """The unit of the folder; raises InputError."""
-        document.pop(name, None)
-        return design.read_unit(path.parent / UNIT)
+        if found.keys.pop(name, None) is None and not self.needed:
+            return None
+        return design.read_unit(found.path.parent / UNIT)
 
 
 @attrs.frozen
@@ -41,16 +45,19 @@ class WordsInput(Input):
     kind: str = "words"
     many: bool = True
 
-    def made(self, value: str | Sequence[str] | None, given: Mapping[str, Any]) -> tuple[str, ...]:
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> tuple[str, ...]:
         """The words of a text, or a list of them."""
+        (value,) = values
         return tuple(value.split() if isinstance(value, str) else value or ())
 
-    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> tuple[str, ...]:
+    def read(self, name: str, found: Found) -> tuple[str, ...]:
         """The words of the file; raises InputError."""
-        found = document.pop(name, [])
-        if not isinstance(found, list) or not all(isinstance(word, str) for word in found):
-            raise InputError(f"{found!r} does not fit", f"{path}, {name}", "give a list of texts in quotes")
-        return tuple(found)
+        words = found.keys.pop(name, [])
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            raise InputError(
+                f"{words!r} does not fit", f"{found.path}, {name}", "give a list of texts in quotes"
+            )
+        return tuple(words)
 
 
 @attrs.frozen
@@ -66,14 +73,14 @@ class MeasuredInput(Input):
         """Its place, and what decides."""
         return Written({"data": self.data(value)}, {"data": str(value.folder.resolve())})
 
-    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> measured.Measured:
+    def read(self, name: str, found: Found) -> measured.Measured:
         """The folder's content; raises InputError where it is gone or another."""
-        before = document.pop("data", None)
-        found = measured.read_folder(named_path(path, run, "data", "folder of measured data"))
+        before = found.keys.pop("data", None)
+        data = measured.read_folder(named_path(found.path, found.run, "data", "folder of measured data"))
         from ..measured.folder import require_same_data
 
-        require_same_data(found, before, self.data(found))
-        return found
+        require_same_data(data, before, self.data(data))
+        return data
 
 
 @attrs.frozen
@@ -92,12 +99,13 @@ class ResinInput(Input):
 
     kind: str = "resin"
 
-    def made(self, value: str | None, given: Mapping[str, Any]) -> Resin:
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Resin:
         """The resin of a name, of a file, or of the unit: its struts are printed with its membrane."""
+        (value,) = values
         if not value:
             own, known = given["unit"].material, materials.load_material(USUAL_RESIN)
-            values = own.membrane_modulus_MPa, own.membrane_poisson, known.density_g_per_ml
-            return Resin("that of the unit's membrane", *values)
+            moduli = own.membrane_modulus_MPa, own.membrane_poisson, known.density_g_per_ml
+            return Resin("that of the unit's membrane", *moduli)
         path = Path(value)
         known = materials.read_material(path) if path.suffix == ".toml" else materials.load_material(value)
         return Resin(known.name, known.modulus_MPa, known.poisson, known.density_g_per_ml)
@@ -108,9 +116,99 @@ class ResinInput(Input):
         modulus = in_kPa(values.pop("modulus_MPa"))
         return Written({name: {"name": values.pop("name"), "modulus_kPa": modulus, **values}})
 
-    def read(self, name: str, document: dict[str, Any], run: dict[str, Any], path: Path) -> Resin:
+    def read(self, name: str, found: Found) -> Resin:
         """The resin of its table; raises InputError."""
-        table = document.pop(name, None)
+        table = found.keys.pop(name, None)
         if isinstance(table, dict) and isinstance(table.get("modulus_kPa"), int | float):
             table["modulus_MPa"] = in_MPa(table.pop("modulus_kPa"))
-        return structured(Resin, table, f"{path}, [{name}]")
+        return structured(Resin, table, f"{found.path}, [{name}]")
+
+
+@attrs.frozen
+class WindowInput(Input):
+    """The path of the unit's waveguide, by its name."""
+
+    kind: str = "window"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Window | None:
+        """The path of a name; raises InputError, also without a unit."""
+        (name,) = values
+        if not name:
+            return None
+        if given["unit"] is None:
+            raise InputError("--path needs a unit", "--path", "give --preset or --unit as well")
+        return design.window(given["unit"], name)
+
+    def write(self, name: str, value: design.Window | None) -> Written:
+        """Its name."""
+        return Written() if value is None else Written({name: value.name})
+
+    def read(self, name: str, found: Found) -> design.Window | None:
+        """The path that the file names."""
+        return self.made((found.keys.pop(name, ""),), found.given)
+
+
+@attrs.frozen
+class PrinterInput(Input):
+    """A printer with its resin, and limits measured on it in place of the printer's; its values are kept."""
+
+    kind: str = "printer"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Printer:
+        """The printer of a name or a file, with the limits of a filled sheet; raises InputError."""
+        from ..design.printing.sheets import measured_limits
+
+        printer, limits = design.load_printer(values[0]), given.get("limits")
+        return printer.with_limits(measured_limits(Path(limits))) if limits else printer
+
+    def write(self, name: str, value: design.Printer) -> Written:
+        """Its file."""
+        return Written({name: f"{name}.toml"}, files={f"{name}.toml": design.printer_text(value)})
+
+    def read(self, name: str, found: Found) -> design.Printer:
+        """The printer of the folder; raises InputError."""
+        return design.read_printer(found.path.parent / str(found.keys.pop(name, "")))
+
+
+@attrs.frozen
+class OnceInput(Input):
+    """A plain value that other inputs are made of, and that no run keeps."""
+
+    kind: str = "once"
+
+    def write(self, name: str, value: Any) -> Written:
+        """Nothing."""
+        return Written()
+
+    def read(self, name: str, found: Found) -> Any:
+        """The default."""
+        return self.descriptions[0].default
+
+
+@attrs.frozen
+class NumbersInput(Input):
+    """Several numbers."""
+
+    kind: str = "numbers"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> tuple[float, ...]:
+        """The numbers of a text, or a list of them; raises InputError."""
+        if len(self.descriptions) > 1:
+            return tuple(float(value) for value in values)
+        words = values[0].split() if isinstance(values[0], str) else values[0] or ()
+        try:
+            return tuple(float(word) for word in words)
+        except ValueError:
+            where = f"--{self.descriptions[0].name}"
+            raise InputError(f"{values[0]!r} are not numbers", where, "give numbers") from None
+
+    def write(self, name: str, value: tuple[float, ...]) -> Written:
+        """The numbers, if there are any."""
+        return Written({name: value} if value else {})
+
+    def read(self, name: str, found: Found) -> tuple[float, ...]:
+        """The numbers of the file; raises InputError."""
+        numbers = found.keys.pop(name, [])
+        if not isinstance(numbers, list) or not all(type(n) in (int, float) for n in numbers):
+            raise InputError(f"{numbers!r} does not fit", f"{found.path}, {name}", "give a list of numbers")
+        return tuple(map(float, numbers))

@@ -31,6 +31,11 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
     context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()
+    if work.fault is not None:
+        # It is the result, and no reason to leave early: the report is written first.
+        context.write_report()
+        context.report = None
+        raise work.fault
     return work
 
 

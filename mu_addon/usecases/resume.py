@@ -22,7 +22,6 @@ MODULES = {
     "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
-    "check.toml": ".check_print.run",
     "export.toml": ".export.run",
     "specimens.toml": ".export.specimens",
     "grip.toml": ".grip.run",

@@ -61,8 +61,9 @@ def settings_of(file):
 @cache
 def every():
     """Names of all settings."""
-    given = (one.description for name in declared.STUDIES for one in declared.study(name).inputs().values())
-    return {d.name for d in (*(d for file in STATED for d in settings_of(file)), *filter(None, given))}
+    inputs = (one for name in declared.STUDIES for one in declared.study(name).inputs().values())
+    given = (d for one in inputs if one.kind == "setting" for d in one.descriptions)
+    return {d.name for d in (*(d for file in STATED for d in settings_of(file)), *given)}
 
 
 def restated(source, names):

@@ -23,6 +23,7 @@ from mu_addon.design.gripper import load_gripper, read_gripper
 from mu_addon.design.gripper import to_toml as gripper_text
 from mu_addon.design.parameters import Unit, read_unit, to_toml
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
+from mu_addon.design.printing.sheets import read_sheet
 from mu_addon.errors import InputError
 from mu_addon.evidence.extended import load_model
 from mu_addon.fem.protocol import read_protocol
@@ -39,7 +40,6 @@ from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
 from mu_addon.usecases.chain.job import read_chain, read_pressures
 from mu_addon.usecases.export.job import path_of
-from mu_addon.usecases.export.sheets import read_sheet
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
 from mu_addon.usecases.track_video.run import read_bench, read_pressure

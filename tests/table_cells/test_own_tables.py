@@ -5,12 +5,12 @@ import codecs
 import numpy as np
 import pytest
 
+from mu_addon.design.printing.sheets import measured_limits
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
 from mu_addon.table_cells.own_tables import own_lines, own_rows, own_text
-from mu_addon.usecases.export.sheets import measured_limits
 from mu_addon.usecases.sensor.calibrate import _joined_angles
 from mu_addon.usecases.track_video.tracked_table import read_pixels
 

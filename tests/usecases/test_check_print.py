@@ -10,13 +10,12 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.design import shapes
 from mu_addon.design.parameters import Chambers, Unit
+from mu_addon.design.printing.orientation import direction_name
 from mu_addon.design.printing.printer import MEANING, load_printer, printer_text, read_printer
 from mu_addon.design.solid import build_solid, printable
 from mu_addon.design.surface import bad_edges, genus, stl_bytes, stl_surface, volume
 from mu_addon.errors import InputError
-from mu_addon.usecases.check_print.job import Job, part_in
-from mu_addon.usecases.check_print.report import direction_name
-from mu_addon.usecases.check_print.run import console_summary, nominal_of
+from mu_addon.studies.check import Check, PartFile, part_in
 
 
 def bottle(bore):
@@ -28,12 +27,12 @@ def bottle(bore):
 def run(tmp_path, surface, *options):
     (tmp_path / "part.stl").write_bytes(stl_bytes(*surface))
     out = tmp_path / "out"
-    status = main(["check", "--stl", str(tmp_path / "part.stl"), "--out", str(out), "--json", *options])
+    status = main(["check", "--stl", str(tmp_path / "part.stl"), "--out", str(out), *options])
     return status, out
 
 
 def test_a_part_that_can_be_printed(tmp_path, capsys):
-    status, out = run(tmp_path, bottle(4.0))
+    status, out = run(tmp_path, bottle(4.0), "--json")
     assert status == 0
     found = json.loads((out / "check.json").read_text())
     by_name = {f["check"]: f for f in found["findings"]}
@@ -52,7 +51,7 @@ def test_a_part_that_can_be_printed(tmp_path, capsys):
     assert '"type": "result"' in capsys.readouterr().out.splitlines()[-1].replace('"type":"', '"type": "')
 
 
-def test_a_limit_that_was_measured_decides(tmp_path):
+def test_a_limit_that_was_measured_decides(tmp_path, capsys):
     sheet = tmp_path / "limits.csv"
     sheet.write_text("limit,sizes,measured\ndrain_diameter_mm,2 5,4.5\n")
     status, out = run(tmp_path, bottle(4.0), "--limits", str(sheet))
@@ -66,7 +65,7 @@ def test_a_limit_that_was_measured_decides(tmp_path):
         limits = json.loads((out / name).read_text())["limits"]
         assert limits["measured"] == ["drain_diameter_mm"]
         assert sum(map(len, limits.values())) == len(MEANING)
-    words = console_summary(json.loads((out / "summary.json").read_text()))
+    words = capsys.readouterr().out
     assert "measured limits: drain_diameter_mm" in words
     # Terminal and report count the same.
     share = f"{len(limits['assumed'])} of {len(MEANING)}"
@@ -109,7 +108,7 @@ def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
 def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
     status, _ = run(tmp_path, bottle(4.0), *options)
     assert status == 2
-    assert words in capsys.readouterr().out
+    assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("extent", "turned"), [((30, 150, 20), True), ((150, 30, 20), False)])
@@ -152,7 +151,7 @@ def test_what_is_no_stl_is_refused(content):
 
 @pytest.mark.parametrize("text", [False, True])
 def test_more_triangles_than_can_be_checked_are_refused_before_they_are_read(text, monkeypatch):
-    monkeypatch.setattr("mu_addon.usecases.check_print.job.MOST_TRIANGLES", 3)
+    monkeypatch.setattr("mu_addon.studies.check.MOST_TRIANGLES", 3)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
     content = stl_bytes(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
     if text:
@@ -209,12 +208,18 @@ def test_directions_are_named_as_they_are_spoken_of():
 
 
 def test_a_file_is_compared_with_its_unit(tmp_path):
-    unit = Unit(chambers=Chambers(count=3))
+    unit, printer = Unit(chambers=Chambers(count=3)), load_printer()
     solid = build_solid(unit)
-    job = Job(load_printer(), unit, stl=stl_bytes(solid.vertices, solid.triangles))
-    assert genus(*nominal_of(job)) == genus(solid.vertices, solid.triangles)
-    assert nominal_of(Job(load_printer(), unit)) is None
-    assert nominal_of(Job(load_printer(), stl=job.stl)) is None
+    stl = PartFile(tmp_path / "part.stl", stl_bytes(solid.vertices, solid.triangles))
+
+    def nominal(**given):
+        one = Check(printer=printer, **given)
+        return one.nominal(one.unit, one.stl, one.path, one.quality)
+
+    found = nominal(unit=unit, stl=stl)
+    assert genus(found.vertices, found.triangles) == genus(solid.vertices, solid.triangles)
+    assert nominal(unit=unit) is None
+    assert nominal(stl=stl) is None
 
 
 def test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how(tmp_path, capsys):
@@ -230,7 +235,7 @@ def test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how(tm
     assert {f["severity"] for f in found["findings"] if "faces" in f["check"]} == {"pass"}
     assert bad_edges(stl_surface((out / "part.stl").read_bytes())[1]) == 0
     assert "doubled triangles were removed" in (out / "report.html").read_text()
-    assert "repaired: " in capsys.readouterr().out
+    assert "repaired: " in capsys.readouterr().err
     # A hole may be closed in several ways: nothing is written, and what remains is said.
     status, out = run(tmp_path / "out", (vertices, triangles[30:]), "--repair")
     assert status == 6

@@ -17,6 +17,7 @@ from mu_addon.design.beams import lattice_beams
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import Chambers, Unit
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
+from mu_addon.design.printing.sheets import compensation_offsets, gauge_sheet, measured_limits, read_sheet
 from mu_addon.design.solid import build_solid
 from mu_addon.design.threemf import Beams, Part, read_3mf, write_3mf
 from mu_addon.design.waveguide import waveguide
@@ -31,7 +32,6 @@ from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
 from mu_addon.usecases.export.job import read_job as read_export
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
-from mu_addon.usecases.export.sheets import compensation_offsets, gauge_sheet, measured_limits, read_sheet
 from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))

@@ -17,8 +17,8 @@ from mu_addon.errors import MuError
 from mu_addon.materials.library import load_material
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
-from mu_addon.usecases.check_print import run as checking
-from mu_addon.usecases.check_print.job import Job as CheckJob
+from mu_addon.studies.check import Check, PartFile
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.export import run as exporting
 from mu_addon.usecases.export.job import Job as ExportJob
 from mu_addon.usecases.parameter_study import run as sweeping
@@ -91,10 +91,10 @@ def test_export(tmp_path: Path, step: int) -> None:
 def test_check(tmp_path: Path) -> None:
     body = shapes.box([-7, -7, 0], [7, 7, 14]) - shapes.box([-5, -5, 2], [5, 5, 12])
     part = printable(body - shapes.cylinder(2.0, -1.0, 3.0, 32))
-    job = CheckJob(load_printer(), stl=stl_bytes(*part), stl_file=Path("part.stl"))
+    job = Check(printer=load_printer(), stl=PartFile(Path("part.stl"), stl_bytes(*part)))
 
     def run(folder: Path, context: RunContext) -> None:
-        checking.USE_CASE.start(job, folder, context)
+        use_case("check").start(job, folder, context)
 
     assert inject_each(run, tmp_path, layer, MuError.status, step=127) == []
 

@@ -4,7 +4,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-import tomlkit
 import trimesh
 
 from mu_addon.design.anchors import window
@@ -21,12 +20,12 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.studies import STUDIES
+from mu_addon.studies.check import Check, read_part
 from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
-from mu_addon.usecases.check_print import job as check
 from mu_addon.usecases.diagnose import design_experiments
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.export import job as export
@@ -49,7 +48,7 @@ UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))
 
 
 def lattice(unit, resin, **more):
-    return Homogenize(unit=unit, resin=ResinInput().made(resin, {"unit": unit}), **more)
+    return Homogenize(unit=unit, resin=ResinInput().made((resin,), {"unit": unit}), **more)
 
 
 def jobs(folder):
@@ -79,8 +78,14 @@ def jobs(folder):
     measured = read_folder(DATA / "treloar")
     paper = read_folder(asset_root() / "examples" / "paper-moduli")
     yield study.Job(UNIT, protocol, times=3, stages=("design", "simulate"), path="alpha4")
-    yield check.Job(load_printer(), UNIT, window(UNIT, "alpha4"), "export", direction=(0.1, 0.0, 1 / 3))
-    yield check.Job(load_printer(), stl=part.read_bytes(), stl_file=part)
+    yield Check(
+        printer=load_printer(),
+        unit=UNIT,
+        path=window(UNIT, "alpha4"),
+        quality="export",
+        direction=(0.1, 0.0, 1 / 3),
+    )
+    yield Check(printer=load_printer(), stl=read_part(part), layers=(1.0,), repair=True)
     yield export.Job(
         UNIT, resin, window(UNIT, "alpha2"), "alpha2", ("stl", "txt"), "interactive", (0.1, 1 / 3), "calipers"
     )
@@ -127,18 +132,7 @@ def test_a_folder_of_an_older_version_says_the_same(tmp_path, name):
     found = use_case_of(folder)
     job = found.read(folder)
     texts = job.texts_in(folder)[0] if hasattr(job, "texts_in") else job.texts()
-    if name == "check":
-        # Limits that came since are written with their defaults: what was found without them is set aside.
-        for limit in ("support_mm", "layer_s"):
-            texts["printer.toml"] = without_table(texts["printer.toml"], limit)
     assert same_inputs(folder, {k: v for k, v in texts.items() if k != "resin.toml"})
-
-
-def without_table(text, name):
-    """TOML text without one of its tables."""
-    document = tomlkit.parse(text)
-    del document[name]
-    return tomlkit.dumps(document)
 
 
 def test_measured_data_that_are_gone_or_others_are_named(tmp_path):

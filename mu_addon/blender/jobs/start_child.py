@@ -48,7 +48,7 @@ WRITERS = (
     "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",
     "mu_addon.usecases.export.specimens",
-    "mu_addon.usecases.check_print.job",
+    "mu_addon.studies.check",
     "pyparsing",
     "PIL.Image",
     "PIL.PngImagePlugin",

@@ -18,6 +18,7 @@ from mathutils import Vector
 from ...design.anchors import window
 from ...design.parameters import Unit, read_unit
 from ...design.printing.printer import Limit, Printer, load_printer, printer_text
+from ...design.printing.sheets import measured_limits
 from ...design.solid import Solid
 from ...design.steps import require_whole
 from ...design.surface import stl_bytes
@@ -25,7 +26,6 @@ from ...errors import InputError, MuError
 from ...files import write_bytes, write_json
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.folder import FolderLayout, write_run
-from ...usecases.export.sheets import measured_limits
 from ..jobs import prepared
 from ..jobs.start_child import OWN_FOLDER, JobKind, lacking
 from ..shared.blender_property import exact
@@ -191,37 +191,36 @@ def write_inputs(root: Any, command: str, folder: Path) -> None:
 
 def _check(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     """Check of the unit; one in a user-defined body is checked by its STL, which is built first."""
-    from ...usecases.check_print.job import LAYOUT, Job
+    from ...studies.check import Check, read_part
 
     up = tuple(exact(x) for x in root.mu_print.up)
     if own_body(root):
-        stl = _own_stl(root, unit, folder / OWN_FOLDER)
-        return LAYOUT, Job(printer_of(root), stl=stl.read_bytes(), stl_file=stl, direction=up)
+        stl = read_part(_own_stl(root, unit, folder / OWN_FOLDER))
+        return Check.layout(), Check(printer=printer_of(root), stl=stl, direction=up)
     path = path_of(root, unit)
-    return LAYOUT, Job(printer_of(root), unit, window(unit, path) if path else None, direction=up)
+    along = window(unit, path) if path else None
+    return Check.layout(), Check(printer=printer_of(root), unit=unit, path=along, direction=up)
 
 
 def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     """Check of an STL file, repaired first if asked, and compared with the unit."""
-    from ...usecases.check_print.job import LAYOUT, Job, read_stl
+    from ...studies.check import Check, read_part
 
     settings = root.mu_print
-    stl = Path(bpy.path.abspath(settings.stl_file))
     path = path_of(root, unit) if settings.against_unit else ""
-    return LAYOUT, Job(
-        printer_of(root),
-        unit if settings.against_unit else None,
-        window(unit, path) if path else None,
-        stl=read_stl(stl),
-        stl_file=stl,
+    return Check.layout(), Check(
+        printer=printer_of(root),
+        unit=unit if settings.against_unit else None,
+        path=window(unit, path) if path else None,
+        stl=read_part(Path(bpy.path.abspath(settings.stl_file))),
         direction=tuple(exact(x) for x in settings.up),
         repair=settings.repair,
     )
 
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
+    from ...design.printing.sheets import compensation_offsets
     from ...usecases.export.job import LAYOUT, Job
-    from ...usecases.export.sheets import compensation_offsets
 
     settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]

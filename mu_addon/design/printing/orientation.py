@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -150,3 +150,22 @@ def orientations(
     add(first)
     add(tilted(np.array(ranked(found)[0].direction), 20.0))
     return ranked(found)
+
+
+def direction_name(direction: Sequence[float]) -> str:
+    """A direction as text: +z, +x−y, or `20° from +z toward −x`."""
+    way = np.asarray(direction, float) / np.linalg.norm(direction)
+    every = directions()
+    k = int((every @ way).argmax())
+    if every[k] @ way > np.cos(np.radians(1.0)):
+        return _signs(every[k])
+    axis = every[int((every[:6] @ way).argmax())]
+    aside = way - (way @ axis) * axis
+    toward = every[int((every @ aside).argmax())]
+    return f"{np.degrees(np.arccos(way @ axis)):.0f}° from {_signs(axis)} toward {_signs(toward)}"
+
+
+def _signs(way: Array) -> str:
+    return "".join(
+        f"{'+' if s > 0 else '−'}{a}" for a, s in zip("xyz", way.tolist(), strict=True) if abs(s) > 1e-9
+    )

@@ -16,6 +16,7 @@ from ...design import coupons
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.printing.limit_parts import LimitPart, limit_parts
 from ...design.printing.printer import Printer, load_printer, printer_text, read_printer
+from ...design.printing.sheets import gauge_sheet, limit_sheet
 from ...design.settings import USUAL_RESIN
 from ...design.strut_cell import specimen_solid, strut_cell
 from ...design.surface import Triangles, Vertices, bad_edges, stl_bytes, stl_surface, volume
@@ -30,7 +31,6 @@ from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
 from ...toml_writer import toml_text, toml_value
 from .job import UNIT, read_resin, resin_of, resin_text
-from .sheets import gauge_sheet, limit_sheet
 
 if TYPE_CHECKING:
     from ...materials.library import Material

@@ -9,17 +9,12 @@ from typing import Any
 import attrs
 
 from ...design.anchors import window
-from ...design.gates import GateError
-from ...design.printing.printer import load_printer
 from ...design.rigid_body import require_beside
-from ...design.settings import PRINTER
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...measured import Measured
 from ...meshing.settings import MeshSettings, fidelity_of
-from ..check_print.job import Job as CheckJob
-from ..check_print.run import USE_CASE as CHECK
 from ..diagnose.job import Job as DiagnoseJob
 from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..export.job import Job as ExportJob
@@ -138,23 +133,6 @@ def _window(design: Design) -> Any:
     return window(design.unit, design.path) if design.path else None
 
 
-def check_order(call: Call) -> Order:
-    """Run of the print check of a unit."""
-    s, design = call.settings, call.inputs["unit"]
-    direction = (s["up_x"], s["up_y"], s["up_z"])
-    if not 1e-6 < sum(x * x for x in direction) < 1e12:
-        raise InputError(f"{direction} is not a direction", "up_x, up_y, up_z", "give one, such as 0, 0, 1")
-    refuse_body(design, "the print check")
-    job = CheckJob(
-        printer=load_printer(s["printer"] or PRINTER.default),
-        unit=design.unit,
-        window=_window(design),
-        quality=s["quality"],
-        direction=direction,
-    )
-    return Order(CHECK, job, answers=True)
-
-
 def export_order(call: Call) -> Order:
     """Run that exports a unit's files."""
     s, design = call.settings, call.inputs["unit"]
@@ -214,11 +192,3 @@ def diagnose_order(call: Call) -> Order:
     assert isinstance(measured, Measured)
     unit = None if design is None else design.unit
     return Order(DIAGNOSE, DiagnoseJob(measured, unit, self_contact=call.settings["self_contact"]))
-
-
-def check_of(call: Call, done: Finished) -> Outputs:
-    """The findings of a print check; GateError where the part must not be printed."""
-    if done.summary.get("verdict") == "error":
-        faults = done.summary.get("faults") or ["see its report"]
-        raise GateError(f"not printable: {faults[0]}", str(done.folder), "see report.html in that folder")
-    return {"check": done}

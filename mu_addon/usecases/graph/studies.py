@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ...graph.definition import Call, Definition, Input, Output, Setting
+from ...design.gates import GateError
+from ...graph.definition import Call, Definition, Input, Output, Outputs, Setting
 from ...studies import study
+from .parts import refuse_body
 
 if TYPE_CHECKING:
-    from ...graph.evaluation import Order
+    from ...graph.evaluation import Finished, Order
     from ...run.study import Study
 
-OBJECTS = {"unit": (Input("unit", ("unit",), "link a unit"), lambda linked: linked.unit)}
-"""By kind of an input that is no plain value: its socket, and its value from what is linked there."""
+SOCKETS = {"unit": Input("unit", ("unit",), "link a unit")}
+"""By kind of an input that is no plain value."""
 MUTED = "this node and those that need it are not computed"
 
 
@@ -21,17 +23,24 @@ def node_of(name: str) -> Definition:
     kind = study(name)
     node = kind.node
     assert node is not None
-    inputs = kind.inputs()
+    inputs = {name: one for name, one in kind.inputs().items() if name not in node.hidden}
+
+    def read(call: Call, done: Finished) -> Outputs:
+        if node.answers and done.summary.get("verdict") == "error":
+            faults = done.summary.get("faults") or ["see its report"]
+            raise GateError(f"not printable: {faults[0]}", str(done.folder), "see report.html in that folder")
+        return {output: done for output, *_ in node.outputs}
+
     return Definition(
         kind.name,
-        kind.__name__,
+        node.label or kind.__name__,
         node.category,
         node.text,
-        tuple(OBJECTS[one.kind][0] for one in inputs.values() if one.description is None),
+        tuple(SOCKETS[one.kind] for one in inputs.values() if not one.descriptions),
         tuple(Output(*one) for one in node.outputs),
-        tuple(Setting(one.description) for one in inputs.values() if one.description is not None),
+        tuple(Setting(d) for one in inputs.values() if one.kind != "window" for d in one.descriptions),
         order=lambda call: _order(kind, call),
-        read=lambda call, done: {output: done for output, *_ in node.outputs},
+        read=read,
         muting=MUTED,
         remark=lambda outputs: node.remark(next(iter(outputs.values())).summary),
     )
@@ -41,11 +50,16 @@ def _order(kind: type[Study], call: Call) -> Order:
     from ...graph.evaluation import Order
     from ...studies.use_case import use_case
 
+    assert kind.node is not None
+    linked: Any = call.inputs.get("unit")
+    if linked is not None and kind.node.no_body:
+        refuse_body(linked, kind.node.no_body)
     values: dict[str, Any] = {}
     for name, one in kind.inputs().items():
-        if one.description is not None:
-            values[name] = one.made(call.settings[one.description.name], values)
-        else:
-            socket, value_of = OBJECTS[one.kind]
-            values[name] = value_of(call.inputs[socket.name])
-    return Order(use_case(kind.name), kind(**values))
+        if one.kind == "unit":
+            values[name] = linked.unit
+        elif one.kind == "window":
+            values[name] = one.made((linked.path,), values)
+        elif name not in kind.node.hidden:
+            values[name] = one.made(tuple(call.settings[d.name] for d in one.descriptions), values)
+    return Order(use_case(kind.name), kind(**values), answers=kind.node.answers)

@@ -6,7 +6,7 @@ from ...design.body import read_body
 from ...design.gripper import Fingers, Gripper, Plate
 from ...design.quantity import describe
 from ...design.rigid_body import RigidBody
-from ...design.settings import FRICTION, PRINTER, QUALITY, UP
+from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
 from ..export import settings as export
@@ -154,26 +154,7 @@ def study_nodes() -> tuple[Definition, ...]:
             remark=lambda outputs: f"{outputs['number']:.6g}",
         ),
         node_of("homogenize"),
-        Definition(
-            "check",
-            "Check Print",
-            PRINT,
-            "printability of the unit, and its best build direction",
-            (_TAKES_UNIT,),
-            (Output("check", "print check", "findings"),),
-            (
-                Setting(PRINTER),
-                *(
-                    setting(f"up_{axis}", part, "build direction, away from the platform", low=-1e3, high=1e3)
-                    for axis, part in zip("xyz", UP, strict=True)
-                ),
-                Setting(QUALITY),
-            ),
-            order=of_orders("check_order"),
-            read=of_orders("check_of"),
-            muting=MUTED,
-            remark=lambda outputs: "verdict: {verdict}".format(**outputs["check"].summary),
-        ),
+        node_of("check"),
         Definition(
             "export",
             "Export",

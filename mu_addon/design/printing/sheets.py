@@ -11,13 +11,13 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ...design.coupons import FEATURES, offsets
-from ...design.parameters import Unit
-from ...design.printing.limit_parts import LimitPart
-from ...design.printing.printer import MEANING, Limit
 from ...errors import InputError
 from ...reading import unreadable
 from ...table_cells.own_tables import own_lines, own_rows, own_text
+from ..coupons import FEATURES, offsets
+from ..parameters import Unit
+from .limit_parts import LimitPart
+from .printer import MEANING, Limit
 
 GAUGE_COLUMNS = ("feature", "kind", "axis", "nominal_mm", "measured_mm")
 LIMIT_COLUMNS = ("limit", "meaning", "best", "sizes", "measured")
