@@ -9,13 +9,13 @@ that the judge's simulations serve them all. Needs `pip install -e '.[benchmarks
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 
 import attrs
 import numpy as np
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.files import write_text
 from mu_addon.meshing.homogenised_unit import mesh_unit
@@ -216,7 +216,7 @@ def _stuck(angle: Array) -> Array:
 
 def main() -> None:
     """Make every set, have it diagnosed, and print a row each."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[2])
+    parser = options_of(__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--only", default=",".join(SETS))
     parser.add_argument("--refine", type=float, default=0.5, help="of pytetwild's mesh")
@@ -225,7 +225,7 @@ def main() -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     described = given.out / "unit.toml"
     write_text(described, to_toml(small_unit()))
-    print("| set | hidden | verdict | causes | s |\n| --- | --- | --- | --- | --- |", flush=True)
+    print_head("set", "hidden", "verdict", "causes", "s")
     for name in given.only.split(","):
         angles = response(small_unit(THICKER if name == "walls" else 1.0), given.refine, given.out)
         folder = given.out / f"{name}-{given.seed}"
@@ -237,7 +237,7 @@ def main() -> None:
         causes = ", ".join(c["effect"] for c in found["causes"])
         hidden = ", ".join(SETS[name]) or ("a mount that sticks" if name == "sticks" else "nothing")
         row = (name, hidden, str(found["verdict"]), causes, f"{time.time() - began:.0f}")
-        print("| " + " | ".join(row) + " |", flush=True)
+        print_row(*row)
 
 
 if __name__ == "__main__":
