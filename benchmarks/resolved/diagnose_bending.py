@@ -63,21 +63,13 @@ def main() -> None:
 def print_shapes(found: dict) -> None:
     """Rows of the shapes, the best first."""
     names = list(found["fitted"][0]["values"])
-    print_head(*["shape", *names, "modulus factor", "at a bound", "-20 kPa", "50 kPa", "misfit"])
+    print_head("shape", *names, "modulus factor", "at a bound", "-20 kPa", "50 kPa", "misfit")
     for of in ("fitted", "simulated"):
         for s in found[of]:
             low, high = (f"{angle - s['zero']:.1f}" for angle in list(s["predicted"].values())[:2])
-            print_row(
-                [
-                    of,
-                    *(f"{v:.3g}" for v in s["values"].values()),
-                    f"{s['modulus']:.2f}",
-                    " ".join(s["ends"]),
-                    low,
-                    high,
-                    f"{s['misfit']:.0f}",
-                ]
-            )
+            values = (f"{v:.3g}" for v in s["values"].values())
+            found_at = f"{s['modulus']:.2f}", " ".join(s["ends"]), low, high, f"{s['misfit']:.0f}"
+            print_row(of, *values, *found_at)
 
 
 if __name__ == "__main__":

@@ -52,13 +52,13 @@ def main() -> None:
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
     columns = ["mesh", "order and analysis", "tangent", "factorisation", "solution", "load step"]
-    print_head(*["model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB"])
+    print_head("model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB")
     for name in options.models:
         for cells in options.cells:
             try:
-                print_row(*[name, cells, *costs(unit_of(cells), name, options.refine)])
+                print_row(name, cells, *costs(unit_of(cells), name, options.refine))
             except MuError as why:
-                print_row(*[name, cells, why])
+                print_row(name, cells, why)
 
 
 def costs(unit: Unit, fidelity: str, refine: float) -> list[str]:

@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--refine", type=float, default=0.5)
     options = parser.parse_args()
     sides = [[p for p in options.pressures if p * sign > 0] for sign in (1, -1)]
-    print_head(*["preset", "shape", "model", "kPa", "deg", "s"])
+    print_head("preset", "shape", "model", "kPa", "deg", "s")
     for name in options.presets:
         for shape in options.shapes:
             for model in options.models:
@@ -82,10 +82,10 @@ def main() -> None:
                         )
                         angle = angles_deg(run_study(job, options.folder / folder)[1])
                     except MuError as why:
-                        print_row(*[*row, why.what, "", f"{time.process_time() - began:.0f}"])
+                        print_row(*row, why.what, "", f"{time.process_time() - began:.0f}")
                         continue
                     shown = [f"{p:g}" for p in side], [f"{angle[p]:.2f}" for p in side]
-                    print_row(*[*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}"])
+                    print_row(*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}")
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def main() -> None:
     protocol = outward(options.pressure)
     pressures = [float(p) for p in protocol.pressure_kPa]
     angles = [f"{p:g} kPa, deg" for p in pressures if p]
-    print_head(*["preset", "refine", "unknowns", *angles, "J_hat mm", "s"])
+    print_head("preset", "refine", "unknowns", *angles, "J_hat mm", "s")
     for name in options.presets:
         preset = load_preset(name)
         unit = attrs.evolve(preset, chambers=attrs.evolve(preset.chambers, count=options.chambers))
@@ -51,7 +51,7 @@ def main() -> None:
             try:
                 study, summary = run_study(job, folder)
             except MuError as why:
-                print_row(*[name, f"{refine:g}", why])
+                print_row(name, f"{refine:g}", why)
                 continue
             angle = angles_deg(summary)
             J = summary["J_hat_mm"]
@@ -59,7 +59,7 @@ def main() -> None:
             row += [f"{angle[p]:.3f}" for p in pressures if p]
             row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]
             row += [f"{time.process_time() - began:.0f}"]
-            print_row(row)
+            print_row(*row)
 
 
 if __name__ == "__main__":
