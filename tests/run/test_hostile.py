@@ -121,25 +121,27 @@ def test_names_that_climb_out_are_only_names(tmp_path):
     assert [p.name for p in tmp_path.rglob("*")] == ["a", "b", "a.npz"]
 
 
-def test_every_flipped_bit_is_found_out_or_harmless(tmp_path):
-    """Every bit of a whole file of the cache, one by one: a sum over each array tells."""
+def test_every_flipped_bit_and_every_cut_is_found_out_or_harmless(tmp_path):
+    """Every bit of a whole file of the cache, one by one, and every length: a sum over each array tells."""
     cache = Cache(tmp_path)
     expected = {"u": np.random.default_rng(0).standard_normal(6), "pressure_MPa": np.array(0.02)}
     cache.put("state", "a", expected)
     path = cache.path("state", "a")
-    whole = path.read_bytes()
-    missing = 0
+    whole, missing = path.read_bytes(), 0
+
+    def read(damaged):
+        path.write_bytes(damaged)
+        found = cache.get("state", "a")
+        for name, values in (found or {}).items():
+            np.testing.assert_array_equal(values, expected[name])
+        return found
+
     for place in range(len(whole)):
+        assert read(whole[:place]) is None
         for bit in range(8):
             damaged = bytearray(whole)
             damaged[place] ^= 1 << bit
-            path.write_bytes(damaged)
-            found = cache.get("state", "a")
-            if found is None:
-                missing += 1
-                continue
-            for name, values in found.items():
-                np.testing.assert_array_equal(values, expected[name])
+            missing += read(damaged) is None
     assert missing > 0.6 * 8 * len(whole)
 
 
