@@ -15,13 +15,13 @@ import resource
 import time
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from benchmarks.evidence.second_code.judging import verdict_on
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
-from benchmarks.evidence.second_code.whole_unit import small_unit
 from benchmarks.table import circumstances, options_of, print_row
-from mu_addon.design.parameters import to_toml
+from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
@@ -46,6 +46,12 @@ SETS: dict[str, tuple[str, float]] = {
     "gravity": ("gravity", 1150.0),
     "obstacle": (FLAT_OBSTACLE.name, -1.0),
 }
+
+
+def small_unit() -> Unit:
+    """The 1.0x preset with three chambers, for short runs of the judge."""
+    unit = load_preset("mu-1.0x")
+    return attrs.evolve(unit, name="mu-three-chambers", chambers=attrs.evolve(unit.chambers, count=3))
 
 
 def angles(name: str, refine: float, folder: Path) -> np.ndarray:
