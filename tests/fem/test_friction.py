@@ -81,6 +81,20 @@ def test_a_dragged_block_resists_with_mu_times_the_normal_force():
     assert last.lost_mJ - drawn.lost_mJ == pytest.approx(lost, rel=1e-3)
 
 
+def test_a_stored_memory_gives_the_forces_back():
+    """Of points that stick as of those that slide: a run that was killed goes on from it."""
+    mesh = box((3, 3, 3), clamp=True)
+    path = along([0, 1, 2], [(0, 0, 0), (0, 0, -0.05), (0.05, 0, -0.05)])
+    drawn, again = (Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path) for _ in range(2))
+    states, contacts = simulated_in_time(touching(mesh, drawn), np.linspace(0, 2, 5))
+    assert 0.0 < contacts[-1].sticking < 1.0
+    again.move(2.0)
+    again.restore(states[-1].u, drawn.kept())
+    np.testing.assert_allclose(
+        again.contact(states[-1].u).tangential_N, contacts[-1].tangential_N, rtol=1e-12, atol=1e-15
+    )
+
+
 def test_a_turned_lid_is_held_by_the_moment_of_its_pressure():
     """About its middle: mu N times the mean distance of a square's points from its centre, 0.3826 sides."""
     mesh = box((4, 4, 2), (1, 1, 0.5), clamp=True)
