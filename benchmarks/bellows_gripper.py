@@ -10,7 +10,6 @@ pressure, friction (0.7) and inertia (a motion of 1.1 s). 60 kPa in the bellows.
 of linear tetrahedra, or with --order 2 of quadratic ones with straight edges.
 """
 
-import argparse
 import shutil
 import subprocess
 import tempfile
@@ -21,6 +20,7 @@ import attrs
 import numpy as np
 
 from benchmarks.peers.with_calculix import CONTROLS, faces_of, read_displacements
+from benchmarks.table import options_of
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.laws import MooneyRivlin
@@ -178,7 +178,7 @@ def write_input(given, contact, pressure_kPa, path, tight):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options_of(__doc__)
     parser.add_argument("folder", type=Path, help="gripper_bellows of the peer's repository")
     parser.add_argument("--order", type=int, choices=(1, 2), default=1)
     parser.add_argument("--no-cylinder", action="store_true", help="nothing to touch")

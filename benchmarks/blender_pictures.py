@@ -1,6 +1,6 @@
 """The pictures that the pages on Blender show, taken of the extension as it is.
 
-    python benchmarks/blender_pictures.py            what takes minutes, without a window: FOLDER/*.blend
+    python -m benchmarks.blender_pictures            what takes minutes, without a window: FOLDER/*.blend
     MU_BLENDER_UI... benchmarks/blender_pictures.py last.png SECONDS        FOLDER/blender-*.png
 
 with FOLDER as MU_PICTURES (MU_BLENDER_UI as of tests/blender/test_installed.py, MU_TEST_FOLDER=FOLDER; it

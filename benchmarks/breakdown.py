@@ -1,94 +1,106 @@
-"""Where each second of Model A goes: the default protocol of a unit, seconds by part.
+"""Where each second of a printed unit's Model A goes with self-contact: processor seconds by part.
 
-    python benchmarks/breakdown.py [--preset mu-1.0x] [--refine 1.0]
+    python -m benchmarks.contact_breakdown [--chambers 6] [--refine 0.5] [--pressures -10 -20]
 
-Not called profile.py: run from this folder, that name would hide the standard library's.
+Each part without the parts that it calls; one process and thread.
 """
 
-from __future__ import annotations
-
-import argparse
-import itertools
 import time
 
 import attrs
-from circumstances import circumstances
 
+from benchmarks.table import circumstances, options_of, print_head
 from mu_addon.design.parameters import load_preset
+from mu_addon.fem import factor, model, self_contact
+from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.model import Model
-from mu_addon.fem.trajectory import simulate
-from mu_addon.fem.unit_materials import materials_of
-from mu_addon.meshing.homogenised_unit import mesh_unit
+from mu_addon.fem.newton_settings import RESOLVED_CONTACT_NEWTON
+from mu_addon.fem.state import rest
+from mu_addon.fem.unit_materials import materials_of, self_contact_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.job import Job, grasp
+from mu_addon.resolved import mesh_printed
+
+BARRIER = "pairs, distances and the barrier's derivatives"
+PATTERNS = "new patterns, their order and analysis"
+STEPS, CANDIDATES = "collision-free steps", "contact candidates"
+ASSEMBLY = "assembly of energy, forces and tangent"
+PARTS = {
+    "factorisations": [(factor.Cholesky, "factor")],
+    "triangular solves": [(factor.Cholesky, "solve")],
+    PATTERNS: [(factor.Cholesky, "__init__"), (model, "with_entries"), (model.Model, "_room")],
+    CANDIDATES: [(self_contact.SelfContact, "_candidates")],
+    BARRIER: [
+        (self_contact.SelfContact, "_near"),
+        (self_contact.SelfContact, "energy_mJ"),
+        (self_contact.SelfContact, "forces"),
+        (self_contact.SelfContact, "stiffness"),
+        (model.Model, "_uncarried"),
+        (model.Model, "_with_self_contact"),
+    ],
+    STEPS: [(self_contact.SelfContact, "free_share")],
+    ASSEMBLY: [
+        (model.Model, "tangent"),
+        (model.Model, "residual"),
+        (model.Model, "potential"),
+        (model.Model, "force_scale"),
+    ],
+}
 
 
-@attrs.define
 class Clock:
-    """Seconds and calls of some methods of an object, which are timed from `watch` on."""
+    """Processor seconds and calls by part, each without those of the parts inside it."""
 
-    seconds: dict = attrs.field(factory=dict)
-    calls: dict = attrs.field(factory=dict)
+    def __init__(self):
+        self.seconds, self.calls, self._inside = dict.fromkeys(PARTS, 0.0), dict.fromkeys(PARTS, 0), []
+        for part, methods in PARTS.items():
+            for owner, name in methods:
+                setattr(owner, name, self._timed(getattr(owner, name), part))
 
-    def watch(self, thing, method, name):
-        plain = getattr(thing, method)
-        self.seconds[name], self.calls[name] = 0.0, 0
-
+    def _timed(self, plain, part):
         def timed(*arguments, **options):
-            start = time.perf_counter()
+            start = time.process_time()
+            self._inside.append(0.0)
             try:
                 return plain(*arguments, **options)
             finally:
-                self.seconds[name] += time.perf_counter() - start
-                self.calls[name] += 1
+                took = time.process_time() - start
+                self.seconds[part] += took - self._inside.pop()
+                self.calls[part] += 1
+                if self._inside:
+                    self._inside[-1] += took
 
-        setattr(thing, method, timed)
+        return timed
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--preset", default="mu-1.0x")
-    options.add_argument("--refine", type=float, default=1.0)
+    options = options_of(__doc__)
+    options.add_argument("--chambers", type=int, default=6)
+    options.add_argument("--refine", type=float, default=0.5)
+    options.add_argument("--pressures", type=float, nargs="+", default=[-10.0, -20.0], help="in kPa")
     given = options.parse_args()
-    job = Job(load_preset(given.preset), grasp(), mesh=MeshSettings(refine=given.refine))
-    mesh = mesh_unit(job.unit, job.mesh)
-    clock = Clock()
-    marks = [time.perf_counter()]
-    model = Model(mesh)
-    marks.append(time.perf_counter())
-    factor = model.factor
-    marks.append(time.perf_counter())
-    equilibrium = Equilibrium(model, materials_of(job.unit, mesh))
-    for call in (model.potential, model.residual, model.tangent):
-        call(mesh.nodes * 0, 0.0, equilibrium.parameters)
-    for thing, method, name in (
-        (factor, "factor", "factorisation"),
-        (factor, "solve", "triangular solves"),
-        (model, "tangent", "tangent"),
-        (model, "residual", "residual"),
-        (model, "force_scale", "scale of the forces"),
-        (model, "potential", "energy"),
-    ):
-        clock.watch(thing, method, name)
-    start = time.perf_counter()
-    trajectory = simulate(equilibrium, *job.protocol.sample(job.times))
-    total = time.perf_counter() - start
-    iterations, factors = (
-        sum(getattr(s, name) for s in trajectory.solved) for name in ("iterations", "factorisations")
-    )
-    print(
-        f"{circumstances()}\n\n{given.preset}, refine {given.refine:g}: {len(model.free)} unknowns, ", end=""
-    )
-    print(f"{len(trajectory.solved)} states, {iterations} iterations, {factors} factorisations kept\n")
-    print("| part | calls | s | % |\n| --- | --- | --- | --- |")
+    unit = load_preset("mu-1.0x")
+    unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=given.chambers))
+    mesh = mesh_printed(unit, MeshSettings(refine=given.refine))
+    body = model.Model(mesh, threads=1)
+    body.self_contact = self_contact_of(unit, mesh)
+    equilibrium = Equilibrium(body, materials_of(unit, mesh), RESOLVED_CONTACT_NEWTON)
+    print(f"{circumstances()}\n\n{len(body.free)} unknowns, {len(body.self_contact.facets)} facets\n")
+    # Kernels are compiled, or read, at their first use.
+    body.potential(0.0 * mesh.nodes, 0.0, equilibrium.parameters)
+    body.factor.factor(equilibrium.rest_tangent)
+    clock, history = Clock(), [rest(mesh)]
+    start = time.process_time()
+    for pressure in given.pressures:
+        history.append(equilibrium.reach(pressure / 1000.0, history))
+        angle = bending_angle_deg(mesh, history[-1].u)
+        print(f"{pressure:g} kPa: {angle:.6f} degrees", flush=True)
+    total = time.process_time() - start
     clock.seconds["rest"] = total - sum(clock.seconds.values())
-    for name, seconds in clock.seconds.items():
-        calls = clock.calls.get(name, "")
-        print(f"| {name} | {calls} | {seconds:.2f} | {100 * seconds / total:.0f} |")
-    print(f"| all | | {total:.2f} | 100 |\n")
-    pattern, analysis = (b - a for a, b in itertools.pairwise(marks))
-    print(f"Once a mesh: {pattern:.2f} s for patterns and order, {analysis:.2f} s for symbolic analysis.")
+    print()
+    print_head("part", "calls", "s", "%")
+    for part, seconds in clock.seconds.items():
+        print(f"| {part} | {clock.calls.get(part, '')} | {seconds:.2f} | {100 * seconds / total:.0f} |")
+    print(f"| all | | {total:.2f} | 100 |")
 
 
 if __name__ == "__main__":

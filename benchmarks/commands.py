@@ -1,8 +1,8 @@
 """Every documented command once: exit status, seconds, memory, and what its progress said beside what came.
 
-    python benchmarks/commands.py                       # all of them
-    python benchmarks/commands.py homogenize grip       # some
-    python benchmarks/commands.py --logs FOLDER sweep   # keeps each line that a command wrote, with its time
+    python -m benchmarks.commands                       # all of them
+    python -m benchmarks.commands homogenize grip       # some
+    python -m benchmarks.commands --logs FOLDER sweep   # keeps each line that a command wrote, with its time
 
 A command whose full run takes over two minutes runs coarse, as its row shows. "Told" is the time that the
 command gave at its start beside other work, "first" the factor between that and what it took, "silent" the
@@ -14,7 +14,6 @@ faults.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import shlex
@@ -27,11 +26,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-from interrupts import CHAIN, CHAIN_PROTOCOL, DESIGN, SWEEP  # noqa: E402
+from benchmarks.interrupts import CHAIN, CHAIN_PROTOCOL, DESIGN, SWEEP
+from benchmarks.table import ROOT, circumstances, options_of
 
 LEAST_S = 10.0
 QUICK = "--refine 0.4 --times 3"
@@ -151,7 +147,7 @@ def prepare(work: Path) -> None:
 
 def main() -> None:
     """Run the commands and print their table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("commands", nargs="*", help="names of commands (default: all)")
     parser.add_argument("--logs", type=Path, help="folder for the words of each command")
     given = parser.parse_args()

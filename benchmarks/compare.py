@@ -1,6 +1,6 @@
 """Same as others: displacement fields of a coarse real unit from this package, CalculiX and felupe.
 
-    python benchmarks/compare.py [--refine 0.5] [--order 1 2] [--pressure 5 20] [--keep DIR]
+    python -m benchmarks.compare [--refine 0.5] [--order 1 2] [--pressure 5 20] [--keep DIR]
 
 The half unit with its mirror plane, both regions' moduli, pressed inside. Fails where two fields differ by
 more than 1e-4 of their norm. CalculiX takes the pressure of a quadratic face at three points, which do not
@@ -10,20 +10,20 @@ and the CalculiX input files in a folder.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from circumstances import circumstances
-from peers.problem import Problem
-from peers.process import run
 
+from benchmarks.table import circumstances, options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
+
+from .peers.problem import Problem
+from .peers.process import run
 
 AGREEMENT = 1e-4
 STEP_KPA = 2.5
@@ -59,14 +59,15 @@ def difference(a, b):
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options = options_of(__doc__)
     options.add_argument("--refine", type=float, default=0.5)
     options.add_argument("--order", nargs="+", type=int, choices=(1, 2), default=[1, 2])
     options.add_argument("--pressure", nargs="+", type=float, default=[5.0, 20.0], help="kPa")
     options.add_argument("--keep", type=Path)
     given = options.parse_args()
     print(circumstances())
-    print("\n| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|", flush=True)
+    print()
+    print_head(*HEAD)
     worst = 0.0
     with tempfile.TemporaryDirectory() as scratch:
         for order in given.order:
@@ -84,7 +85,7 @@ def main():
                     cells += [f"{apart:.1e}", f"{difference(calculix.u, ours.u):.1e}"]
                 else:
                     cells += ["not run"] * 2
-                print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+                print_row(*cells)
     if worst > AGREEMENT:
         sys.exit(f"a field differs by {worst:.1e}, more than {AGREEMENT:g}")
 

@@ -1,7 +1,7 @@
 """Damaged files given to whole commands: each is computed with, or refused in words; nothing else may happen.
 
-    python benchmarks/damaged_commands.py                        # 200 files of each kind, 5 by real processes
-    python benchmarks/damaged_commands.py --files 50 --seed 7 chain graph
+    python -m benchmarks.damaged_commands                        # 200 files of each kind, 5 by real processes
+    python -m benchmarks.damaged_commands --files 50 --seed 7 chain graph
 
 A file costs some milliseconds: each command runs in a fork of this process, which has loaded what commands
 need, and is ended after some seconds of the processor's, still at work. What a real process does is tried
@@ -14,7 +14,6 @@ computed from: they are computed in every run and no file holds them.
 
 from __future__ import annotations
 
-import argparse
 import io
 import json
 import os
@@ -33,25 +32,21 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-
-from mu_addon.cli import main as command_line  # noqa: E402
-from mu_addon.design.parameters import load_preset, to_toml  # noqa: E402
-from mu_addon.design.surface import stl_bytes  # noqa: E402
-from mu_addon.usecases.resume import MODULES  # noqa: E402
-from mu_addon.usecases.simulate_and_place import light  # noqa: E402
-from mu_addon.usecases.simulate_and_place import run as placing  # noqa: E402
-from mu_addon.usecases.simulate_and_place import study as placed_study  # noqa: E402
-from tests.design.printing import parts  # noqa: E402
-from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated  # noqa: E402
-from tests.run.test_reading import MODEL  # noqa: E402
-from tests.usecases.fault_injection import PLACEMENT, ran, results  # noqa: E402
+from benchmarks.table import ROOT, circumstances, options_of, print_head
+from mu_addon.cli import main as command_line
+from mu_addon.design.parameters import load_preset, to_toml
+from mu_addon.design.surface import stl_bytes
+from mu_addon.usecases.resume import MODULES
+from mu_addon.usecases.simulate_and_place import light
+from mu_addon.usecases.simulate_and_place import run as placing
+from mu_addon.usecases.simulate_and_place import study as placed_study
+from tests.design.printing import parts
+from tests.run.test_mutated_files import CORPUS, INDEX, RECORDING, mutated
+from tests.run.test_reading import MODEL
+from tests.usecases.fault_injection import PLACEMENT, ran, results
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
-COARSE = ["--refine", "0.3", "--order", "1", "--times", "3", "--no-report"]
+COARSE = ["--refine", "0.3", "--times", "3", "--no-report"]
 SECONDS = [2.0]
 """Of the processor that a command may take: refusals take less."""
 HUNG_S = 120.0
@@ -299,7 +294,7 @@ def same_angles(study, work, count, seed):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("kinds", nargs="*")
     parser.add_argument("--files", type=int, default=200)
     parser.add_argument("--processes", type=int, default=5)
@@ -311,8 +306,7 @@ def main():
     for module in MODULES.values():
         import_module(module, "mu_addon.usecases")
     print(circumstances(), f"Seed {given.seed}.\n")
-    print("| kind | computed | refused | at work | in processes | MB at most | wrong |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print_head("kind", "computed", "refused", "at work", "in processes", "MB at most", "wrong")
     every = []
     with tempfile.TemporaryDirectory() as name:
         work = given.keep or Path(name)

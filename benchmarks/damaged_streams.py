@@ -1,6 +1,6 @@
 """A serial line that is damaged in every way, and ten minutes of one with a bad line in ten.
 
-    python benchmarks/damaged_streams.py [--seed 1] [--streams 3000] [--minutes 10] [--rate 5000]
+    python -m benchmarks.damaged_streams [--seed 1] [--streams 3000] [--minutes 10] [--rate 5000]
 
 Simulated time: bytes come as fast as they are taken. Of each stream every byte has to be counted once, every
 whole sample recorded and every rejected byte kept; see tests/sensing/mutations.py.
@@ -8,24 +8,18 @@ whole sample recorded and every rejected byte kept; see tests/sensing/mutations.
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-
-from mu_addon.sensing.recording import read_recording  # noqa: E402
-from mu_addon.sensing.session import run_session  # noqa: E402
-from mu_addon.sensing.sources import EndOfStream  # noqa: E402
-from tests.sensing.mutations import FORMATS, decoded, sound  # noqa: E402
+from benchmarks.table import circumstances, options_of
+from mu_addon.sensing.recording import read_recording
+from mu_addon.sensing.session import run_session
+from mu_addon.sensing.sources import EndOfStream
+from tests.sensing.mutations import FORMATS, decoded, sound
 
 CHANNELS = ("light", "dark", "warm", "blue")
 # What is done to a bad line: nothing of it may pass for a sample.
@@ -106,7 +100,7 @@ def long_recording(seed, lines, a_piece):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--streams", type=int, default=3000)
     parser.add_argument("--minutes", type=float, default=10.0)

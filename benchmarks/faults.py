@@ -1,11 +1,11 @@
 """Faults done to a study, to its process, its disk and its files, and the digits that it finds after them.
 
-    python benchmarks/faults.py                 # all, 50 kills
-    python benchmarks/faults.py --kills 5 disk  # some of them
-    python benchmarks/faults.py --every 4 calls # a quarter of the calls that can fail
-    python benchmarks/faults.py --every 4 --first 2 blocks # the second quarter of blocks of memory
-    python benchmarks/faults.py --seed 7 kills  # at other moments
-    python benchmarks/faults.py --small kills   # to three chambers at two pressures
+    python -m benchmarks.faults                 # all, 50 kills
+    python -m benchmarks.faults --kills 5 disk  # some of them
+    python -m benchmarks.faults --every 4 calls # a quarter of the calls that can fail
+    python -m benchmarks.faults --every 4 --first 2 blocks # the second quarter of blocks of memory
+    python -m benchmarks.faults --seed 7 kills  # at other moments
+    python -m benchmarks.faults --small kills   # to three chambers at two pressures
 
 The study is the main job on a coarse mesh. Whatever is done to it, the same command must then find the same
 deviations, to the last digit, as a run that nothing happened to.
@@ -13,10 +13,8 @@ deviations, to the last digit, as a run that nothing happened to.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -30,21 +28,17 @@ import attrs
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-
-from mu_addon.errors import MuError, OutputError  # noqa: E402
-from mu_addon.run.context import run_to_end  # noqa: E402
-from mu_addon.run.folder import keep_inputs  # noqa: E402
-from mu_addon.run.progress import Progress  # noqa: E402
-from mu_addon.usecases.simulate_and_place.run import run_stages  # noqa: E402
-from mu_addon.usecases.simulate_and_place.study import Study  # noqa: E402
-from tests.headless.test_resume import JOB as COARSE  # noqa: E402
-from tests.run.failing_files import failing  # noqa: E402
-from tests.run.failing_memory import short_of_memory  # noqa: E402
-from tests.usecases.fault_injection import PARTIAL, PLACEMENT, inject_each, placement  # noqa: E402
+from benchmarks.table import ROOT, circumstances, options_of, print_head
+from mu_addon.errors import MuError, OutputError
+from mu_addon.run.context import run_to_end
+from mu_addon.run.folder import keep_inputs
+from mu_addon.run.progress import Progress
+from mu_addon.usecases.simulate_and_place.run import run_stages
+from mu_addon.usecases.simulate_and_place.study import Study
+from tests.headless.test_resume import JOB as COARSE
+from tests.run.failing_files import failing
+from tests.run.failing_memory import short_of_memory
+from tests.usecases.fault_injection import PARTIAL, PLACEMENT, inject_each, placement
 
 JOBS = {
     False: COARSE,
@@ -327,66 +321,6 @@ def fill(path, left=0):
         stream.truncate(max(path.stat().st_size - left, 0))
 
 
-def small_files(work, reference):
-    """A limit on the size of a file, below what the solid needs."""
-    folder = new(work / "small")
-    limit = 1_000_000
-    status, message = finish(
-        folder, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-    )
-    yield "no file may exceed 1 MB", f'exit {status}, "{message["what"]}"; then {mended(folder, reference)}'
-
-
-def damage(work, reference):
-    """Every file of a finished study's cache cut short, or with one bit flipped."""
-    rng = np.random.default_rng(SEED)
-    for what in ("cut short", "one bit flipped"):
-        folder = shutil.copytree(work / "reference", work / what.replace(" ", "-"))
-        files = list((folder / "cache").glob("*.npz"))
-        for path in files:
-            whole = bytearray(path.read_bytes())
-            if what == "cut short":
-                del whole[int(rng.integers(len(whole))) :]
-            else:
-                whole[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
-            path.write_bytes(whole)
-        yield f"all {len(files)} files of the cache {what}", mended(folder, reference)
-
-
-BACKWARDS = """
-import time
-real, begun = time.time, time.monotonic()
-time.time = lambda: real() - (86400 if time.monotonic() - begun > 3 else 0)
-"""
-
-
-def clock(work, reference):
-    """The clock a day back 3 s into the run, and files from the future."""
-    folder = new(work / "clock")
-    (work / "backwards").mkdir()
-    (work / "backwards" / "sitecustomize.py").write_text(BACKWARDS)
-    process = start(folder, path=[str(work / "backwards")])
-    wait_for(process, folder, "cache/sweep-*")
-    process.kill()
-    process.communicate()
-    future = time.time() + 3e7
-    for path in folder.rglob("*"):
-        os.utime(path, (future, future))
-    yield "the clock set back a day, files from next year, and a kill", mended(folder, reference)
-
-
-def two_at_once(work, reference):
-    folder = new(work / "two")
-    first = start(folder)
-    wait_for(first, folder, "cache/mesh-*")
-    status, message = finish(folder)
-    first.communicate()
-    yield (
-        "a second run in the same folder",
-        f'exit {status}, "{message["what"].split(":")[0]}"; the first: {mended(folder, reference)}',
-    )
-
-
 def calls(work, reference, every, first):
     """Each call that changes a file of a `place` of three chambers fails, by turns once and for good."""
     yield place_with(work / "calls", "calls that change a file", failing, OutputError.status, every, first)
@@ -428,15 +362,11 @@ FAULTS = {
     "crashes": crashes,
     "disk": disk,
     "full_disks": full_disks,
-    "small_files": small_files,
-    "damage": damage,
-    "clock": clock,
-    "two_at_once": two_at_once,
 }
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("faults", nargs="*", choices=[*FAULTS, []], help=", ".join(FAULTS))
     parser.add_argument("--small", action="store_true", help="the study has three chambers and two pressures")
     parser.add_argument("--kills", type=int, default=50)
@@ -464,7 +394,7 @@ def main():
         else:
             shutil.copytree(given.reference, work / "reference")
         reference = digits(work / "reference")
-        print("| fault | what came of it |\n| --- | --- |")
+        print_head("fault", "what came of it")
         for fault in given.faults or FAULTS:
             for what, outcome in FAULTS[fault](work, reference, *counts.get(fault, ())):
                 print(f"| {what} | {outcome} |", flush=True)

@@ -1,7 +1,7 @@
 """Figures of the documentation: CSV files that benchmarks write, and the tables of the pages made from them.
 
-    python benchmarks/figures.py record NAME COMMAND ...   run a benchmark, keep its tables as NAME.csv
-    python benchmarks/figures.py fill                      write every table of the pages anew
+    python -m benchmarks.figures record NAME COMMAND ...   run a benchmark, keep its tables as NAME.csv
+    python -m benchmarks.figures fill                      write every table of the pages anew
 
 A page marks the place of a table with `<!-- figures/NAME.csv -->`; `<!-- figures/NAME.csv last -->` keeps the
 last of the rows that agree in their first two cells, such as the finest mesh of each element. Of

@@ -1,6 +1,6 @@
 """The picture at the top of the README: a unit cut open at five pressures, with its bending angles.
 
-    python benchmarks/film_strip.py out/mu-1.0x docs/pictures/film-strip.png --path alpha4
+    python -m benchmarks.film_strip out/mu-1.0x docs/pictures/film-strip.png --path alpha4
 
 Takes the folder of a finished `simulate` or `place`. The printable solid is carried by the simulated motion
 of Model A; a sensor path, by default the one that `place` chose, is drawn in orange.
@@ -8,7 +8,6 @@ of Model A; a sensor path, by default the one that `place` chose, is drawn in or
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
 import tempfile
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from benchmarks.table import options_of
 from mu_addon.design.anchors import anchor_points, window
 from mu_addon.design.parameters import read_unit
 from mu_addon.design.surface import stl_surface
@@ -34,7 +34,7 @@ INK, FAINT, ACCENT = (28, 33, 43), (120, 128, 140), tuple(round(255 * c) for c i
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("run", type=Path, help="Folder of a finished `simulate` or `place`.")
     parser.add_argument("out", type=Path, help="PNG file to write.")
     parser.add_argument("--path", help="Name of the sensor path; by default the one that `place` chose.")

@@ -1,9 +1,9 @@
 """Every reader on files and streams that a coverage-guided fuzzer makes of sound ones (atheris, libFuzzer).
 
     pip install -e '.[fuzz]'                             # Linux
-    python benchmarks/fuzz.py                            # 20 s a reader
-    python benchmarks/fuzz.py --seconds 600 PLY stream   # some of them, longer
-    python benchmarks/fuzz.py --keep                     # what reaches other code goes to tests/data/fuzz.zip
+    python -m benchmarks.fuzz                            # 20 s a reader
+    python -m benchmarks.fuzz --seconds 600 PLY stream   # some of them, longer
+    python -m benchmarks.fuzz --keep                     # what reaches other code goes to tests/data/fuzz.zip
 
 A file has to be read, or refused with its three words; of a stream each byte has to be counted once. Whatever
 else happens, and what takes more than 20 s or 2 GB, is kept in --found and told.
@@ -11,7 +11,6 @@ else happens, and what takes more than 20 s or 2 GB, is kept in --found and told
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import os
@@ -22,13 +21,13 @@ import tempfile
 import zipfile
 from pathlib import Path
 
+from benchmarks.table import options_of
+
 try:
     import atheris
 except ImportError:
     sys.exit("atheris is missing: pip install -e '.[fuzz]' (it has wheels for Linux)")
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 STREAM = "stream"
 # Of what is kept for the tests: so many for a reader, none longer than this in bytes.
@@ -133,7 +132,7 @@ def keep(found, archived):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("readers", nargs="*", help="names as in tests/run/test_mutated_files.py, or stream")
     parser.add_argument("--seconds", type=int, default=20, help="for each reader")
     parser.add_argument("--seed", type=int, default=1)

@@ -8,11 +8,10 @@ the fit on a finer mesh.
 
 from __future__ import annotations
 
-import argparse
-
 import attrs
 import numpy as np
 
+from benchmarks.table import options_of
 from mu_addon.design import load_preset
 from mu_addon.fem.graded_lattice import RANGE, design_matrix
 from mu_addon.fem.materials import Materials
@@ -37,7 +36,7 @@ def cell(junction: float, midspan: float, rings: int, layers: int) -> tuple[floa
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--rings", type=int, default=3)
     parser.add_argument("--layers", type=int, default=18)
     options = parser.parse_args()

@@ -1,6 +1,6 @@
 """How long Blender's window stands still at each of some seventy gestures, drawing included.
 
-    MU_BLENDER_UI... python benchmarks/heartbeat.py
+    MU_BLENDER_UI... python -m benchmarks.heartbeat
 
 (MU_BLENDER_UI as of tests/blender/test_installed.py: a Blender with a window, where the built extension is
 installed.) A timer beats in the window while tests/blender/gestures_in_window.py goes through its gestures. A
@@ -8,7 +8,6 @@ row tells of the longest time between two beats, by the clock and by the main th
 a graphics card the processor draws, too: the row "a frame and nothing else" is what that alone takes.
 """
 
-import argparse
 import json
 import os
 import shlex
@@ -16,7 +15,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from circumstances import circumstances
+from benchmarks.table import circumstances, options_of, print_head
 
 GESTURES = Path(__file__).resolve().parents[1] / "tests" / "blender" / "gestures_in_window.py"
 SECONDS = 1800
@@ -34,14 +33,13 @@ def measured(folder):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = options_of(__doc__)
     parser.add_argument("--above", type=float, default=0.0, help="least processor time in ms of a row")
     above = parser.parse_args().above
     with tempfile.TemporaryDirectory() as scratch:
         outcome, gestures, longest = measured(Path(scratch))
     print(circumstances(), end="\n\n")
-    print("| gesture | clock (ms) | processor (ms) |")
-    print("| --- | --- | --- |")
+    print_head("gesture", "clock (ms)", "processor (ms)")
     for name in gestures:
         clock, processor = (1000.0 * s for s in longest.get(name, (0.0, 0.0)))
         if processor >= above:

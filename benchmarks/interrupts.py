@@ -1,8 +1,8 @@
 """Ctrl-C at random moments of every long command, and what their folders go on to.
 
-    python benchmarks/interrupts.py                            # all of them, 12 times each
-    python benchmarks/interrupts.py --times 30 --seed 7 sweep
-    python benchmarks/interrupts.py --kill "place, resolved"   # kill -9 instead
+    python -m benchmarks.interrupts                            # all of them, 12 times each
+    python -m benchmarks.interrupts --times 30 --seed 7 sweep
+    python -m benchmarks.interrupts --kill "place, resolved"   # kill -9 instead
 
 The moments are spread over the run, one in each of its equal parts. Half of the signals go to the whole
 process group, as a terminal sends them, half to the command alone; every third comes twice, and every fourth
@@ -14,7 +14,6 @@ does so, too.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import shutil
@@ -29,12 +28,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-
-from mu_addon.design.parameters import load_preset, to_toml  # noqa: E402
+from benchmarks.table import ROOT, circumstances, options_of, print_head
+from mu_addon.design.parameters import load_preset, to_toml
 
 SWEEP = """
 format = 1
@@ -250,14 +245,14 @@ def one(work, name, times, seed, kind):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("commands", nargs="*", choices=[*COMMANDS, []], help=", ".join(COMMANDS))
     parser.add_argument("--times", type=int, default=12)
     parser.add_argument("--seed", type=int, default=20)
     parser.add_argument("--kill", action="store_true", help="kill -9 instead of Ctrl-C")
     given = parser.parse_args()
     print(circumstances(), f"Seed {given.seed}.\n")
-    print("| command | takes | ended with status | at most after | wrong |\n| --- | --- | --- | --- | --- |")
+    print_head("command", "takes", "ended with status", "at most after", "wrong")
     faults = []
     for name in given.commands or COMMANDS:
         with tempfile.TemporaryDirectory() as folder:

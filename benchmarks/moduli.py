@@ -1,6 +1,6 @@
 """The paper's lattice moduli at three scales from struts and resin: nominal, and with one print offset.
 
-    python benchmarks/moduli.py [--out DIR]
+    python -m benchmarks.moduli [--out DIR]
 
 Scales 0.75, 1.0 and 1.5 are one lattice but for the offset (mu_addon/homogenize/offset_response.py), so every
 test is run once for each of some offsets. The offset and the resin are fitted to 0.75x and 1.5x; 1.0x is held
@@ -9,17 +9,16 @@ out. DIR keeps meshes, moduli.json and moduli.svg.
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 
 import attrs
 import numpy as np
-from circumstances import circumstances
-from offset_fit import fit_offset
 
+from benchmarks.offset_fit import fit_offset
+from benchmarks.table import circumstances, options_of
 from mu_addon.design.parameters import load_preset
-from mu_addon.design.strut_cell import mass_g, relative_density, strut_cell
+from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.errors import InputError
 from mu_addon.files import write_json, write_text
 from mu_addon.homogenize.cell_mesh import CellMeshSettings, cell_materials, mesh_cell
@@ -28,7 +27,6 @@ from mu_addon.homogenize.elasticity import effective_tensor
 from mu_addon.homogenize.offset_response import OffsetResponse
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.homogenize.stress_strain_curve import modulus
-from mu_addon.materials.library import load_material
 from mu_addon.report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas
 
 SCALES = (0.75, 1.0, 1.5)
@@ -47,8 +45,6 @@ TESTS = {
     "stick 2": "2 x 2 x 2 cells, plates hold",
 }
 COLORS = (BY_LENGTH[1], BY_LENGTH[3], BY_LENGTH[0], CHOSEN)
-# Cells a side of the specimen whose mass is told: the paper prints neither.
-CELLS = 3
 
 
 def moduli_of(cell, cache):
@@ -122,29 +118,21 @@ def chart(tables):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/moduli"))
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     cell = strut_cell(load_preset("mu-1.0x"))
-    density = load_material("elastic-50a-v1").density_g_per_ml
     found = responses(cell, options.out / "cache")
     tables = {}
     for name, response in found.items():
         print(f"\n{TESTS[name]}")
         tables[name] = table(response)
         for hypothesis, resin, offset, E in tables[name]:
-            volume = [(CELLS * s * cell.size_mm / 10) ** 3 for s in SCALES]
-            mass = [
-                density * float(response.relative_density(s, offset)) * v
-                for s, v in zip(SCALES, volume, strict=True)
-            ]
             values = "  ".join(f"{1e3 * e:6.2f}" for e in E)
-            grams = "  ".join(f"{m:6.2f}" for m in mass)
             print(f"  {hypothesis:28s} resin {resin:5.2f} MPa  offset {offset:6.3f} mm", end="  ")
-            print(f"E {values} kPa  mass {grams} g")
-    nominal = mass_g(cell, density, CELLS)
-    print(f"\nmeasured: {MEASURED_kPa} +- {SPREAD_kPa} kPa; nominal mass at 1.0x {nominal:.3g} g")
+            print(f"E {values} kPa")
+    print(f"\nmeasured: {MEASURED_kPa} +- {SPREAD_kPa} kPa")
     kept = {
         "circumstances": circumstances(),
         "offsets_mm": OFFSETS_mm,

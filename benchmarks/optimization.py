@@ -1,19 +1,18 @@
 """Model A's that a search needs until a unit meets all that is asked: ours, random search and NSGA-II.
 
-    python benchmarks/optimization.py --method ours --budget 60 --seed 1
+    python -m benchmarks.optimization --method ours --budget 60 --seed 1
 
-On a coarse mesh. NSGA-II needs pymoo, and TPE optuna, which mu_addon does not depend on. A gradient counts as
-half a Model A.
+On a coarse mesh. NSGA-II needs pymoo, which mu_addon does not depend on. A gradient counts as half a Model A.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import Any
 
 import numpy as np
 
+from benchmarks.table import options_of
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.optimization.design_file import parse_design
@@ -132,27 +131,12 @@ def nsga2(counted: Counted, budget: int, seed: int) -> None:
     minimize(Problem(), NSGA2(pop_size=12), ("n_eval", budget), seed=seed, verbose=False)
 
 
-def tpe(counted: Counted, budget: int, seed: int) -> None:
-    """Optuna's TPE on the sum of squared misfits."""
-    import optuna
-
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    n = len(counted.design.freedoms)
-    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
-    for _ in range(budget):
-        trial = study.ask()
-        x = np.array([trial.suggest_float(str(i), 0.0, 1.0) for i in range(n)])
-        study.tell(trial, float(np.square(counted.misfit(x)).sum()))
-        if counted.met_at is not None:
-            return
-
-
-METHODS = {"ours": ours, "random": random, "nsga2": nsga2, "tpe": tpe}
+METHODS = {"ours": ours, "random": random, "nsga2": nsga2}
 
 
 def main() -> None:
     """Run one method once and print what it took."""
-    options = argparse.ArgumentParser(description=__doc__)
+    options = options_of(__doc__)
     options.add_argument("--method", choices=METHODS, required=True)
     options.add_argument("--budget", type=int, default=60)
     options.add_argument("--seed", type=int, default=0)

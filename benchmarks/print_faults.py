@@ -1,6 +1,6 @@
 """Faults put into a real unit at random places and of random sizes: which of them the print check finds.
 
-    python benchmarks/print_faults.py [--seed 1] [--each 4] [kind ...]
+    python -m benchmarks.print_faults [--seed 1] [--each 4] [kind ...]
 
 The unit has three chambers. A fault is found if the check names it and, where it lies at one place, within
 2 mm of it.
@@ -8,23 +8,15 @@ The unit has three chambers. A fault is found if the check names it and, where i
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
-
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
-from circumstances import circumstances  # noqa: E402
-
-from mu_addon.design import shapes  # noqa: E402
-from mu_addon.design.lattice import lattice_of  # noqa: E402
-from mu_addon.design.printing.check import check  # noqa: E402
-from mu_addon.design.printing.printer import load_printer  # noqa: E402
-from mu_addon.design.solid import printable  # noqa: E402
-from tests.design.printing import parts  # noqa: E402
+from benchmarks.table import circumstances, options_of
+from mu_addon.design import shapes
+from mu_addon.design.lattice import lattice_of
+from mu_addon.design.printing.check import check
+from mu_addon.design.printing.printer import load_printer
+from mu_addon.design.solid import printable
+from tests.design.printing import parts
 
 NEAR_MM = 2.0
 
@@ -116,7 +108,7 @@ def examined(kind, seed):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = options_of(__doc__)
     parser.add_argument("kinds", nargs="*", choices=[*KINDS, []], help=", ".join(KINDS))
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--each", type=int, default=4)

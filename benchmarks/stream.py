@@ -9,7 +9,6 @@ What was sent before the port was open is no loss.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -21,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.table import options_of
 from mu_addon.errors import InputError
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.ring_buffer import Ring
@@ -120,7 +120,7 @@ def run(seconds: float, rate: float, cuts: int, stall_s: float) -> dict[str, obj
 
 def main() -> None:
     """Print one JSON line a run."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--minutes", type=float, default=10)
     parser.add_argument("--rate", type=float, default=5000)
     parser.add_argument("--cuts", type=int, default=20)

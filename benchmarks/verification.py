@@ -1,19 +1,18 @@
 """Every answer that is known, on several meshes of each element: docs/engineering/verification.md.
 
-    python benchmarks/verification.py [--cases cook beam ...] [--meshes 2]
+    python -m benchmarks.verification [--cases cook beam ...] [--meshes 2]
 
 The cases are those of tests/fem, which hold each of them to a bound on small meshes.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
-from circumstances import circumstances
 
+from benchmarks.table import circumstances, options_of, print_head, print_row
 from mu_addon.errors import ConvergenceError
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -28,9 +27,9 @@ ELEMENTS = {
 
 def table(head, rows):
     """Print a Markdown table row by row, as the rows come."""
-    print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
+    print_head(*head)
     for row in rows:
-        print("| " + " | ".join(row) + " |", flush=True)
+        print_row(*row)
     print()
 
 
@@ -85,7 +84,7 @@ def orders(field, elements, meshes):
 
 def main():
     known = cases.cases()
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options = options_of(__doc__)
     options.add_argument("--cases", nargs="+", default=[*known, "manufactured", "kappa"])
     options.add_argument("--elements", nargs="+", choices=ELEMENTS, default=list(ELEMENTS))
     options.add_argument("--meshes", type=int, default=4, help="how many of a case's meshes, coarse to fine")

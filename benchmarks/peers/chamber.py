@@ -19,19 +19,15 @@ CAVITY_RADIUS, CAVITY_LOW, CAVITY_HIGH = 7.5, 3.0, 21.0
 PATCH, PATCH_RADIUS, SKIN = np.array([0.0, 8.75, 12.0]), 4.5, 1.25
 PRESSURES_MPA = np.linspace(0.0, 5e-3, 11)[1:]
 
-# Element size in mm that gives about so many unknowns, by order.
-SIZES = {
-    ("21k", 1): 0.9,
-    ("64k", 1): 0.59,
-    ("21k", 2): 1.85,
-    ("64k", 2): 1.24,
-}
+# Element size in mm, by order, of about 21 000 unknowns.
+SIZE_MM = {1: 0.9, 2: 1.85}
 
 
-def chamber(size_mm, order, uniform_MPa=None):
-    """The problem at an element size in mm, of three stiffnesses or one; deterministic."""
+def chamber(order):
+    """The problem with linear or quadratic elements; deterministic."""
+    size_mm = SIZE_MM[order]
     mesh = _mesh(size_mm, order)
-    modulus = _modulus(mesh) if uniform_MPa is None else np.full(len(mesh.tets), uniform_MPa)
+    modulus = _modulus(mesh)
     name = f"chamber, {size_mm:g} mm, order {order}"
     return Problem(name, mesh, modulus, np.full(len(modulus), 0.45), PRESSURES_MPA)
 

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from benchmarks.table import ROOT
+
 from .problem import Problem, Result
 
 _ABSENT = 77
@@ -29,15 +31,14 @@ def run(code, problem, folder: Path, threads=2):
     given = folder / "problem.npz"
     problem.save(given)
     environment = {**os.environ, **dict.fromkeys(_THREAD_VARIABLES, str(threads))}
-    benchmarks = Path(__file__).resolve().parents[1]
-    paths = (str(benchmarks), os.environ.get("PYTHONPATH", ""), str(benchmarks.parent))
+    paths = (str(ROOT), os.environ.get("PYTHONPATH", ""))
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     # FEniCSx comes with a Python of its own, and wants one process a rank.
     elsewhere = os.environ.get("MU_FENICSX") if code == "with_fenicsx" else None
     start = shlex.split(elsewhere) if elsewhere else [sys.executable]
     if elsewhere:
         environment.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
-    command = [*start, "-m", f"peers.{code}", str(given.resolve()), str(folder.resolve()), code]
+    command = [*start, "-m", f"benchmarks.peers.{code}", str(given.resolve()), str(folder.resolve()), code]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode == _ABSENT:
         print(f"*** NOT RUN: {code}: {done.stderr.strip()} ***", file=sys.stderr, flush=True)

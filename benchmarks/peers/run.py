@@ -1,6 +1,6 @@
 """This package and its peers on the same mesh, law, load steps and tolerance: one table.
 
-    python benchmarks/peers/run.py [--size 21k 64k] [--order 1 2] [--codes ours with_calculix] [--keep DIR]
+    python -m benchmarks.peers.run [--order 1 2] [--codes ours with_calculix] [--keep DIR]
 
 Every code runs alone in its own process. Needs `pip install -e '.[benchmarks]'` for felupe, Debian's
 calculix-ccx for CalculiX, and dolfinx for FEniCSx; one that is missing is left out, loudly.
@@ -8,20 +8,16 @@ calculix-ccx for CalculiX, and dolfinx for FEniCSx; one that is missing is left 
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-# Run as a script, this folder's parent is where the package `peers` lies.
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from benchmarks.table import circumstances, options_of, print_head, print_row
 
-from circumstances import circumstances
-from peers.chamber import SIZES, chamber
-from peers.ours import imbalance
-from peers.process import run
+from .chamber import chamber
+from .ours import imbalance
+from .process import run
 
 CODES = (
     "ours",
@@ -49,7 +45,7 @@ def table(problem, codes, folder, threads):
         end="",
     )
     print(f"{len(problem.pressures_MPa)} steps to {problem.pressures_MPa[-1] * 1e3:g} kPa\n")
-    print("| " + " | ".join(HEAD) + " |\n" + "| --- " * len(HEAD) + "|", flush=True)
+    print_head(*HEAD)
     ours = None
     for code in codes:
         found = run(code, problem, folder, threads)
@@ -67,13 +63,12 @@ def table(problem, codes, folder, threads):
             f"{difference:.0e}",
             f"{imbalance(problem, found.u):.0e}",
         )
-        print("| " + " | ".join(map(str, row)) + " |", flush=True)
+        print_row(*row)
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--size", nargs="+", choices=("21k", "64k"), default=["21k", "64k"])
-    options.add_argument("--order", nargs="+", type=int, choices=(1, 2), default=[1])
+    options = options_of(__doc__)
+    options.add_argument("--order", nargs="+", type=int, choices=(1, 2), default=[1, 2])
     options.add_argument("--codes", nargs="+", choices=CODES, default=CODES)
     options.add_argument("--threads", type=int, default=2)
     options.add_argument("--keep", type=Path, help="folder for input files and fields")
@@ -82,9 +77,8 @@ def main():
     print("SOFA is not run: neither pip nor Debian has it.")
     with tempfile.TemporaryDirectory() as scratch:
         for order in given.order:
-            for size in given.size:
-                folder = (given.keep or Path(scratch)) / f"{size}_{order}"
-                table(chamber(SIZES[size, order], order), given.codes, folder, given.threads)
+            folder = (given.keep or Path(scratch)) / f"order{order}"
+            table(chamber(order), given.codes, folder, given.threads)
 
 
 if __name__ == "__main__":

@@ -10,13 +10,13 @@ crosses itself (two of five settings). --resolved: the same unit and resin as `m
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import attrs
 import numpy as np
 from manifold3d import Manifold, OpType
 
+from benchmarks.table import options_of
 from mu_addon.design import shapes
 from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.lattice import lattice_of
@@ -163,7 +163,7 @@ def curved(nodes, tets, d: Dimensions, reference: Reference, planes=()) -> Mesh:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--preset", default="mu-1.0x")
     parser.add_argument("--chambers", type=int, default=3)
     parser.add_argument("--edge", type=float, default=1.0, help="Edge length in mm.")

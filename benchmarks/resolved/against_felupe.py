@@ -9,7 +9,6 @@ Fails where the fields differ by more than 1e-4 of their norm.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 
@@ -17,6 +16,7 @@ import attrs
 import numpy as np
 from scipy import sparse
 
+from benchmarks.table import options_of, print_head
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
@@ -118,7 +118,7 @@ def _cavity_region(mesh: Mesh):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--chambers", type=int, default=3)
     parser.add_argument("--refine", type=float, default=0.6)
     parser.add_argument("--pressure", type=float, nargs="*", default=[-5.0, 5.0], metavar="kPa")
@@ -138,8 +138,7 @@ def main() -> None:
     mu, kappa = law.layers[0].parameters[0]
     model = Model(mesh, threads=1, mean_dilatation=False)
     solver = Equilibrium(model, law)
-    print("| kPa | ours deg | felupe deg | largest u mm | difference | Newton | felupe s |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print_head("kPa", "ours deg", "felupe deg", "largest u mm", "difference", "Newton", "felupe s")
     worst = 0.0
     for kPa in options.pressure:
         steps = max(1, int(np.ceil(abs(kPa) / STEP_KPA)))

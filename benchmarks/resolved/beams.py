@@ -8,13 +8,12 @@ how far its tip moves, with beams or with solid struts on a finer mesh, unknowns
 
 from __future__ import annotations
 
-import argparse
-import subprocess
 import time
 
 import attrs
 import numpy as np
 
+from benchmarks.table import circumstances, options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.bending_angle import TipSection
@@ -81,17 +80,13 @@ def motion(unit, settings):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--body", nargs="*", default=list(bodies()), choices=list(bodies()))
     parser.add_argument("--refine", type=float, default=1.0)
     parser.add_argument("--solid-refine", type=float, default=1.4)
     options = parser.parse_args()
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True
-    ).stdout.strip()
-    print(f"{time.strftime('%Y-%m-%d')}, commit {commit}: angle in degrees, off by / tip's way off by")
-    print("| body | struts | unknowns | s | " + " | ".join(f"{p:g} kPa" for p in PRESSURES_KPA) + " |")
-    print("| --- | --- | --- | --- |" + " --- |" * len(PRESSURES_KPA))
+    print(f"{circumstances()}: angle in degrees, off by / tip's way off by\n")
+    print_head("body", "struts", "unknowns", "s", *(f"{p:g} kPa" for p in PRESSURES_KPA))
     for name in options.body:
         unit, reference = bodies()[name], {}
         for fidelity, refine in ((SOLID, options.solid_refine), (RESOLVED, options.refine)):
@@ -109,9 +104,7 @@ def main() -> None:
                     words += f" {off[0]:+.1f} / {off[1]:+.1f} %"
                 cells.append(words)
             label = f"{fidelity}, refine {refine:g}"
-            print(
-                f"| {name} | {label} | {unknowns} | {seconds:.0f} | " + " | ".join(cells) + " |", flush=True
-            )
+            print_row(name, label, unknowns, f"{seconds:.0f}", *cells)
 
 
 if __name__ == "__main__":

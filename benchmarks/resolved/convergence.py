@@ -9,12 +9,12 @@ this depth in mm below the wall's outside on.
 
 from __future__ import annotations
 
-import argparse
 import time
 
 import attrs
 import numpy as np
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
@@ -60,7 +60,7 @@ def angles(mesh, d, pressures_kPa, materials, parts=("cap",), threads=1):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     default = attrs.astuple(Sizes())
     parser.add_argument("--sizes", type=float, nargs=5, action="append", metavar="SIZE", default=None)
     parser.add_argument("--refine", type=float, nargs="*", default=[1.0])
@@ -72,7 +72,7 @@ def main() -> None:
     d = attrs.evolve(load_preset("mu-1.0x").printed, count=options.chambers)
     names = "meridian", "hoop", "through", "rings", "layers", "unknowns", "mesh s"
     columns = [*names, *(f"{p:g} kPa" for p in options.pressure), "loads s"]
-    print("| " + " | ".join(columns) + " |\n" + "| --- " * len(columns) + "|", flush=True)
+    print_head(*columns)
     for given in options.sizes or [default]:
         for refine in options.refine:
             sizes = Sizes(*given[:2], *map(int, given[2:])).refined(refine)
@@ -86,7 +86,7 @@ def main() -> None:
             cells += [f"{3 * (len(mesh.nodes) - len(mesh.tied))}", f"{meshed:.1f}"]
             cells += [f"{found[p]['cap']:.3f}" if p in found else "-" for p in options.pressure]
             cells.append(f"{sum(v['s'] for v in found.values()):.0f}")
-            print("| " + " | ".join(cells) + " |", flush=True)
+            print_row(*cells)
 
 
 if __name__ == "__main__":

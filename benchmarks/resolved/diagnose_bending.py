@@ -12,10 +12,10 @@ each; the camera's zero and the modulus are fitted).
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.settings import PRESET
 from mu_addon.evidence.unit_fem import KNOWN, UnitSettings
@@ -27,13 +27,11 @@ from mu_addon.usecases.diagnose.job import Job
 from mu_addon.usecases.diagnose.run import USE_CASE
 from mu_addon.usecases.diagnose.unknown import unknown_of
 
-from .running import print_heading, print_row
-
 DATA = Path(__file__).parents[2] / "assets" / "examples" / "paper-bending"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--unknown", type=Path)
     parser.add_argument("--refine", type=float, default=0.5)
@@ -65,21 +63,13 @@ def main() -> None:
 def print_shapes(found: dict) -> None:
     """Rows of the shapes, the best first."""
     names = list(found["fitted"][0]["values"])
-    print_heading(["shape", *names, "modulus factor", "at a bound", "-20 kPa", "50 kPa", "misfit"])
+    print_head("shape", *names, "modulus factor", "at a bound", "-20 kPa", "50 kPa", "misfit")
     for of in ("fitted", "simulated"):
         for s in found[of]:
             low, high = (f"{angle - s['zero']:.1f}" for angle in list(s["predicted"].values())[:2])
-            print_row(
-                [
-                    of,
-                    *(f"{v:.3g}" for v in s["values"].values()),
-                    f"{s['modulus']:.2f}",
-                    " ".join(s["ends"]),
-                    low,
-                    high,
-                    f"{s['misfit']:.0f}",
-                ]
-            )
+            values = (f"{v:.3g}" for v in s["values"].values())
+            found_at = f"{s['modulus']:.2f}", " ".join(s["ends"]), low, high, f"{s['misfit']:.0f}"
+            print_row(of, *values, *found_at)
 
 
 if __name__ == "__main__":

@@ -10,19 +10,18 @@ simulations of the first serve them all. Prints a row a set, with seconds by the
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import time
 from pathlib import Path
 
+import attrs
 import numpy as np
 
-from benchmarks.circumstances import circumstances
 from benchmarks.evidence.second_code.judging import verdict_on
 from benchmarks.evidence.second_code.recording import Trial, instrument, read, write
-from benchmarks.evidence.second_code.whole_unit import small_unit
-from mu_addon.design.parameters import to_toml
+from benchmarks.table import circumstances, options_of, print_row
+from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
@@ -47,6 +46,12 @@ SETS: dict[str, tuple[str, float]] = {
     "gravity": ("gravity", 1150.0),
     "obstacle": (FLAT_OBSTACLE.name, -1.0),
 }
+
+
+def small_unit() -> Unit:
+    """The 1.0x preset with three chambers, for short runs of the judge."""
+    unit = load_preset("mu-1.0x")
+    return attrs.evolve(unit, name="mu-three-chambers", chambers=attrs.evolve(unit.chambers, count=3))
 
 
 def angles(name: str, refine: float, folder: Path) -> np.ndarray:
@@ -89,7 +94,7 @@ def trials(name: str, rng: np.random.Generator, bent: np.ndarray, low: float = L
 
 def main() -> None:
     """Make every set, have it diagnosed, and print a row each."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default=",".join(SETS))
     parser.add_argument("--refine", type=float, default=1.2, help="of the mesh that the data are of")
@@ -117,7 +122,7 @@ def main() -> None:
         write_text(given.folder / f"{data.name}-{base}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")
-        print("| " + " | ".join(row) + " |", flush=True)
+        print_row(*row)
 
 
 def _processor_s() -> float:

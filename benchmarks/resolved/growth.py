@@ -9,7 +9,6 @@ process's largest so far, so list sizes from small to large.
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import time
@@ -18,14 +17,13 @@ from typing import Any
 
 import attrs
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import FIDELITIES, MeshSettings
 from mu_addon.resolved.printed_mesh import mesh_of
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
-
-from .running import print_heading, print_row
 
 STEP_KPA = -1.0
 
@@ -47,20 +45,20 @@ def seconds(call: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--cells", nargs="*", default=["3x4x3", "3x4x6", "3x4x20", "5x4x20"])
     parser.add_argument("--refine", type=float, default=1.0)
     parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=FIDELITIES)
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
     columns = ["mesh", "order and analysis", "tangent", "factorisation", "solution", "load step"]
-    print_heading(["model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB"])
+    print_head("model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB")
     for name in options.models:
         for cells in options.cells:
             try:
-                print_row([name, cells, *costs(unit_of(cells), name, options.refine)])
+                print_row(name, cells, *costs(unit_of(cells), name, options.refine))
             except MuError as why:
-                print_row([name, cells, why])
+                print_row(name, cells, why)
 
 
 def costs(unit: Unit, fidelity: str, refine: float) -> list[str]:

@@ -8,14 +8,13 @@ Nothing is fitted to them: rigid zones come from one solid cell, three elements 
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.circumstances import circumstances
+from benchmarks.table import circumstances, options_of, print_head
 from mu_addon.design.lattice_kinds import LatticeKind, constant, register, sin_squared
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
@@ -53,13 +52,13 @@ def angle(kind: LatticeKind, chambers: int, fidelity: str, kPa: float, folder: P
 
 def main() -> None:
     """Print a row a kind."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("--kinds", nargs="*", default=[k.name for k in KINDS])
     parser.add_argument("--chambers", type=int, default=3)
     parser.add_argument("--pressure", type=float, default=10.0, help="kPa")
     options = parser.parse_args()
     print(circumstances() + "\n")
-    print("| lattice | beams, deg | solid, deg | unknowns | of solids |\n| --- | --- | --- | --- | --- |")
+    print_head("lattice", "beams, deg", "solid, deg", "unknowns", "of solids")
     with tempfile.TemporaryDirectory() as name:
         for kind in KINDS:
             if kind.name in options.kinds:

@@ -10,7 +10,6 @@ projection. Nothing is fitted to a block: the law comes from the coupons pulled 
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import attrs
 import numpy as np
 from scipy.optimize import least_squares
 
+from benchmarks.table import options_of
 from mu_addon.design import lattice_kinds
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.materials import Layer, Materials
@@ -80,7 +80,7 @@ def fitted(branches, poisson):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("data", type=Path)
     parser.add_argument("--rings", type=int, default=2)
     parser.add_argument("--layers", type=int, default=10)

@@ -14,17 +14,17 @@ The paper's ranges over -20 to 50 kPa: -50 to 45, -65 to 50 and -65 to 55 degree
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.meshing.settings import FIDELITIES, RESOLVED, MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job
 
-from .running import angles_deg, outward, print_heading, print_row, run_study
+from .running import angles_deg, outward, run_study
 
 SHAPES: dict[str, dict[str, Any]] = {
     "as preset": {},
@@ -52,7 +52,7 @@ SHAPES: dict[str, dict[str, Any]] = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--presets", nargs="*", default=["mu-1.0x"])
     parser.add_argument("--shapes", nargs="*", choices=SHAPES, default=list(SHAPES))
@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--refine", type=float, default=0.5)
     options = parser.parse_args()
     sides = [[p for p in options.pressures if p * sign > 0] for sign in (1, -1)]
-    print_heading(["preset", "shape", "model", "kPa", "deg", "s"])
+    print_head("preset", "shape", "model", "kPa", "deg", "s")
     for name in options.presets:
         for shape in options.shapes:
             for model in options.models:
@@ -82,10 +82,10 @@ def main() -> None:
                         )
                         angle = angles_deg(run_study(job, options.folder / folder)[1])
                     except MuError as why:
-                        print_row([*row, why.what, "", f"{time.process_time() - began:.0f}"])
+                        print_row(*row, why.what, "", f"{time.process_time() - began:.0f}")
                         continue
                     shown = [f"{p:g}" for p in side], [f"{angle[p]:.2f}" for p in side]
-                    print_row([*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}"])
+                    print_row(*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}")
 
 
 if __name__ == "__main__":

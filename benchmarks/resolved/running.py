@@ -1,4 +1,4 @@
-"""What benchmarks of resolved units share: a protocol outward from rest, a study in a folder of its own."""
+"""What benchmarks of printed units share: a protocol outward from rest, a study in a folder of its own."""
 
 from __future__ import annotations
 
@@ -35,14 +35,3 @@ def run_study(job: Job, folder: Path) -> tuple[Study, dict[str, Any]]:
 def angles_deg(summary: dict[str, Any]) -> dict[float, float]:
     """Bending angle in degrees by pressure in kPa."""
     return {float(pressure): angle for pressure, angle in summary["angle_deg"].items()}
-
-
-def print_row(cells: Sequence[object]) -> None:
-    """A row of a Markdown table, at once."""
-    print("| " + " | ".join(map(str, cells)) + " |", flush=True)
-
-
-def print_heading(columns: Sequence[str]) -> None:
-    """The head of a Markdown table."""
-    print_row(columns)
-    print("| --- " * len(columns) + "|", flush=True)

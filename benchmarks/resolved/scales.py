@@ -10,22 +10,22 @@ those since.
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 
 import attrs
 
+from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job
 
-from .running import angles_deg, outward, print_heading, print_row, run_study
+from .running import angles_deg, outward, run_study
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--presets", nargs="*", default=["mu-0.75x", "mu-1.0x", "mu-1.5x"])
     parser.add_argument("--refine", type=float, nargs="*", default=[0.7])
@@ -36,7 +36,7 @@ def main() -> None:
     protocol = outward(options.pressure)
     pressures = [float(p) for p in protocol.pressure_kPa]
     angles = [f"{p:g} kPa, deg" for p in pressures if p]
-    print_heading(["preset", "refine", "unknowns", *angles, "J_hat mm", "s"])
+    print_head("preset", "refine", "unknowns", *angles, "J_hat mm", "s")
     for name in options.presets:
         preset = load_preset(name)
         unit = attrs.evolve(preset, chambers=attrs.evolve(preset.chambers, count=options.chambers))
@@ -51,7 +51,7 @@ def main() -> None:
             try:
                 study, summary = run_study(job, folder)
             except MuError as why:
-                print_row([name, f"{refine:g}", why])
+                print_row(name, f"{refine:g}", why)
                 continue
             angle = angles_deg(summary)
             J = summary["J_hat_mm"]
@@ -59,7 +59,7 @@ def main() -> None:
             row += [f"{angle[p]:.3f}" for p in pressures if p]
             row += [", ".join(f"{n} {J[n]:.4f}" for n in sorted(J, key=J.get))]
             row += [f"{time.process_time() - began:.0f}"]
-            print_row(row)
+            print_row(*row)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 An element gets the moduli of the infinite lattice with the strut diameters at its position: the diameters are
 assumed to vary slowly between cells. Moduli of the periodic body-centred cell were computed once from its
-quadratic solid (`benchmarks/grading.py`, resin of Poisson's ratio 0.45) over the diameters at junctions and
+quadratic solid (`benchmarks.grading`, resin of Poisson's ratio 0.45) over the diameters at junctions and
 at mid-span. Polynomials in their logarithms fit them within 1.6 %, and cells left out of the fit within 3 %.
 """
 

@@ -95,7 +95,7 @@ def mesh_quality(
         lattice_min_dihedral_deg=float(angles[mesh.region == LATTICE].min()),
         min_scaled_jacobian=float((low / np.abs(high)).min()),
         min_corner_jacobian=float(folded_corners(mesh).min()),
-        inverted=int(np.count_nonzero(low <= 0)),
+        inverted=len(inverted(mesh)),
         **{f"{name}_volume_mm3": value for name, value in measured.items()},
         **{f"{name}_volume_error": value / exact[name] - 1 for name, value in measured.items()},
     )

@@ -34,11 +34,7 @@ def test_what_depends_on_the_turn_of_a_unit_is_no_noise(part, verdict):
 
 
 def test_what_makes_the_sets_knows_nothing_of_the_engine():
-    # A whole unit has the program's shape and surfaces, and no physics of it.
-    shared = {
-        "__main__": ("mu_addon.run.processes",),
-        "whole_unit": ("mu_addon.design.", "mu_addon.meshing.", "mu_addon.files"),
-    }
+    shared = {"__main__": ("mu_addon.run.processes",)}
     for file in FOLDER.glob("*.py"):
         if file.stem == "judging":
             continue

@@ -1,8 +1,7 @@
 """A bench that hides what is wrong with it: `python -m tests.blind.injector`, an order a line of stdin.
 
 For each, it writes a folder of measured data, prints a commitment (sha256 of the answer with a salt), waits
-for the line `reveal`, and only then prints the answer and writes what the instruments would have read
-without noise, FOLDER-bare.
+for the line `reveal`, and only then prints the answer.
 
 An order is JSON; it holds a folder and a seed, and may hold: effect (a name, or several), times (its
 detection limit), values (sizes that are not drawn by what can be seen), unit ("written" or "simulated", or
@@ -95,12 +94,11 @@ def main():
             hide(order)
 
 
-def sealed(answer, folder, bare):
-    """Commit to an answer, and tell it when asked; `bare` writes what the instruments would have read."""
+def sealed(answer):
+    """Commit to an answer, and tell it when asked."""
     text = json.dumps({**answer, "salt": secrets.token_hex(16)}, sort_keys=True)
     print(json.dumps({"commitment": hashlib.sha256(text.encode()).hexdigest()}), flush=True)
     if sys.stdin.readline().strip() == "reveal":
-        bare(folder.with_name(folder.name + "-bare"))
         print(text, flush=True)
 
 
@@ -153,7 +151,7 @@ def hide(order):
     write(folder, rng, tests, truth, zeros, noise, order, clock)
     if order.get("dead_load"):
         add_dead_load(folder, rng, values["modulus_factor"])
-    sealed(answer, folder, lambda bare: write(bare, rng, tests, truth, zeros, None, order, clock))
+    sealed(answer)
 
 
 def hide_machine(order):
@@ -183,7 +181,7 @@ def hide_machine(order):
     truth = bench.observe(planned, values)
     clock = float(rng.uniform(0.0, 500.0))
     write_machine(folder, rng, bench, planned, truth, source, order, clock)
-    sealed(answer, folder, lambda bare: write_machine(bare, rng, bench, planned, truth, None, order, clock))
+    sealed(answer)
 
 
 def sized_machine(rng, bench, planned, effect, times, base, source):
@@ -218,7 +216,7 @@ def weighed(planned, observed):
 
 
 def write_machine(folder, rng, bench, planned, truth, source, order, clock):
-    """The folder of measured data of another kind; source: of the noise, or None."""
+    """The folder of measured data of another kind; source: of the noise."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = []
     for k, (e, y) in enumerate(zip(planned, truth, strict=True)):
@@ -233,15 +231,13 @@ def write_machine(folder, rng, bench, planned, truth, source, order, clock):
         lines += [f"temperature_C = {e.temperature_C}"] if np.isfinite(e.temperature_C) else []
         if "mass_g" in y:
             mass = float(y["mass_g"][0])
-            off = 0.0 if source is None else 5e-3 * rng.normal()
-            lines += [f"mass_g = {mass * (1 + off)}", f"mass_sd_g = {5e-3 * mass}"]
-        if source is not None:
-            time = columns.get("time_s", np.arange(len(e), dtype=float))
-            noise = drawn(rng, time, source.white, source.slow, source.time_s, order.get("noise") == "two")
-            columns[bench.channel] = columns[bench.channel] + noise
-            for drive in ("strain", "angle_deg") if "time_s" in columns else ():
-                if drive in columns:
-                    columns[drive] = gauged(order, k, columns[drive])
+            lines += [f"mass_g = {mass * (1 + 5e-3 * rng.normal())}", f"mass_sd_g = {5e-3 * mass}"]
+        time = columns.get("time_s", np.arange(len(e), dtype=float))
+        noise = drawn(rng, time, source.white, source.slow, source.time_s, order.get("noise") == "two")
+        columns[bench.channel] = columns[bench.channel] + noise
+        for drive in ("strain", "angle_deg") if "time_s" in columns else ():
+            if drive in columns:
+                columns[drive] = gauged(order, k, columns[drive])
         if "time_s" in columns:
             columns["time_s"] = columns["time_s"] + clock
         lines += [f'source = "{rng.choice(["machine 1", "machine 2", "worn grips?", "new operator"])}"', ""]
@@ -337,16 +333,15 @@ def long(data, observed):
 
 
 def write(folder, rng, tests, truth, zeros, noise, order, clock):
-    """The folder of measured data, with metadata that mean nothing among those that do; noise: or None."""
+    """The folder of measured data, with metadata that mean nothing among those that do."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = []
     many = order.get("noise") == "two"
     for k, ((name, time, pressure, how), y) in enumerate(zip(tests, truth, strict=True)):
-        seen = pressure if noise is None else gauged(order, k, pressure)
-        columns, head = [time + clock, seen], ["time_s", "pressure_kPa"]
+        columns, head = [time + clock, gauged(order, k, pressure)], ["time_s", "pressure_kPa"]
 
         def read(values, c, time=time):
-            return values if noise is None else values + drawn(rng, time, *noise[c], many=many)
+            return values + drawn(rng, time, *noise[c], many=many)
 
         for c, v, zero in zip(analytic.CHANNELS, y, zeros, strict=True):
             if order.get("markers", True) or c == "angle_deg":

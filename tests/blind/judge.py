@@ -6,42 +6,22 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import attrs
 
 from mu_addon.evidence.diagnosis import diagnose
-from mu_addon.evidence.fit import Fitter
-from mu_addon.evidence.found_causes import RIVAL_DELTA_CHI2
 from mu_addon.evidence.prediction.bench import bench_simulators
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
-from mu_addon.evidence.record import KNOWN, record
 from mu_addon.evidence.simulator import Composite
 from mu_addon.measured import read_folder
 from mu_addon.run.processes import one_thread_each
-from tests.blind import unit_runs
 from tests.blind.machines import BENCHES
 from tests.blind.truth import UNITS
 from tests.evidence import stand_ins
 
 ROOT = Path(__file__).parents[2]
-# What makes responses, which the battery has in a table, and what is made of a verdict.
-FEM = ("unit_fem", "unit_effects", "lattice_fem", "extended", "markers")
 CHANGES = ("later", "shuffled", "doubled marker", "every second sample", "no marker out of the plane")
-
-
-def fingerprint():
-    """Hash of the code that verdicts of the battery come from."""
-    engine = ROOT / "mu_addon" / "evidence"
-    code = [p for p in engine.glob("*.py") if p.stem not in FEM]
-    code += [
-        *(engine / "prediction").glob("*.py"),
-        ROOT / "tests" / "evidence" / "analytic.py",
-        unit_runs.TABLE,
-    ]
-    code += [p for p in (ROOT / "tests" / "blind").glob("*.py") if p.stem != "test_blind"]
-    return hashlib.sha256(b"".join(c.read_bytes() for c in sorted(code))).hexdigest()[:12]
 
 
 @functools.cache
@@ -70,7 +50,7 @@ def reply(bench, words):
 
 
 def hidden(order, judge):
-    """What `judge(folder)` says of an ordered bench, the answer, and `nearest_rival`.
+    """What `judge(folder)` says of an ordered bench, and the answer.
 
     The commitment made before the verdict is checked.
     """
@@ -88,8 +68,7 @@ def hidden(order, judge):
         sealed = reply(bench, "reveal").strip()
         assert hashlib.sha256(sealed.encode()).hexdigest() == commitment
         answer = json.loads(sealed)
-        nearest = nearest_rival(order, Path(place) / "measured-bare", verdict, answer)
-    return verdict, answer, nearest
+    return verdict, answer
 
 
 def simulator_of(order, experiments):
@@ -113,32 +92,6 @@ def verdict_of(folder, order, change=None):
     return diagnose(experiments, simulator_of(order, experiments))
 
 
-def nearest_rival(order, bare, verdict, answer):
-    """The explanation that comes next to the truth in data without noise: chi squared left, and its names.
-
-    By the noise of the verdict; of single effects for one true effect, and of any for a cause that the
-    library lacks. None where the verdict was right anyway, or none could be expected.
-    """
-    truth = set(answer["effect"])
-    if not truth or len(truth) > 1 or answer["times"] < 4 or answer.get("impossible"):
-        return None
-    if verdict.kind == "named" and set(verdict.names) == truth:
-        return None
-    experiments = [e for e in read_folder(bare).experiments if e.role == "fit"]
-    simulator = simulator_of(order, experiments)
-    data = record(experiments, simulator)
-    if any(g not in verdict.sources for g in data.groups if g != KNOWN):
-        return None
-    fitter = Fitter(data, simulator, verdict.sources)
-    base = fitter.fit()
-    least = (base.chi2, "nothing")
-    for e in simulator.effects:
-        if e.name not in truth:
-            fit = fitter.best([e], [{**base.values, **s} for s in e.starts()])
-            least = min(least, (fit.chi2, e.name))
-    return least
-
-
 def changed(experiments, change):
     """The same experiments, told otherwise."""
     if change == "shuffled":
@@ -159,13 +112,8 @@ def changed(experiments, change):
     return tuple(found)
 
 
-# Of an answer, what rates are counted by.
-COUNTED_BY = ("effect", "times", "count", "dt", "rho", "level", "gauge", "impossible")
-
-
 def judged(order):
-    """One order as a row of plain data."""
-    start = time.perf_counter()
+    """One order as a row of plain data; same: of each change that must not matter whether it did not."""
     again = []
 
     def judge(folder):
@@ -175,43 +123,25 @@ def judged(order):
             again.append((change, other.kind, sorted(other.names), sorted(other.ambiguity)))
         return verdict
 
-    verdict, answer, nearest = hidden(order, judge)
-    chosen = verdict.selection.chosen
-    truth = set(answer["effect"])
-    inside = []
-    for key, value in answer["values"].items():
-        if key in verdict.intervals and key.split(".")[0] in truth:
-            low, high = verdict.intervals[key]
-            inside.append((key, value, chosen.values[key], (low, high), low <= value <= high))
+    verdict, answer = hidden(order, judge)
     held = verdict.gain.held_out
+    said = verdict.kind, sorted(verdict.names), sorted(verdict.ambiguity)
     return {
-        **{k: answer.get(k) for k in COUNTED_BY},
-        "part": order.get("part", ""),
-        "unit": order.get("unit", "written"),
-        "seed": order["seed"],
-        "code": fingerprint(),
         "verdict": verdict.kind,
         "names": list(verdict.names),
         "ambiguity": sorted(verdict.ambiguity),
-        "left": list(verdict.selection.left),
         "doubted": verdict.selection.doubted,
         "identifiability": sorted(verdict.identifiability),
-        "chosen": list(chosen.names),
-        "p_best": verdict.selection.p_best,
-        "parameters": inside,
-        "nearest": nearest,
+        "chosen": list(verdict.selection.chosen.names),
         "gain": held.as_json() if held else None,
-        "same": [(c, (k, n, a) == (verdict.kind, sorted(verdict.names), sorted(verdict.ambiguity)), k, n, a)
-                 for c, k, n, a in again],
-        "seconds": time.perf_counter() - start,
-        "outcome": outcome(truth, verdict, {"mesh_error"} if order.get("unit") == "simulated" else set()),
-    }  # fmt: skip
+        "same": [(change, tuple(other) == said, *other) for change, *other in again],
+        "outcome": outcome(
+            set(answer["effect"]), verdict, {"mesh_error"} if order.get("unit") == "simulated" else set()
+        ),
+    }
 
 
 IN_SET = ("exact", "exact_with_rivals", "in_set")
-# A rival whose chi squared, without noise, is less than this beats the truth's by `RIVAL_DELTA_CHI2` in
-# fewer than nine sets of ten, whoever judges: the difference is normal of variance four times its mean.
-TELLABLE = (1.28 + (1.28**2 + RIVAL_DELTA_CHI2) ** 0.5) ** 2
 
 
 def outcome(truth, verdict, allowed=frozenset()):

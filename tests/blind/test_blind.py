@@ -1,11 +1,8 @@
-"""A share of the blind battery, with seeds that stay; the whole is `python -m benchmarks.blind`."""
-
-import json
+"""Data whose fault is hidden from the judge in another process: the verdict is held against it afterwards."""
 
 import numpy as np
 import pytest
 
-from benchmarks import blind
 from mu_addon.evidence.prediction.effective_pressure import first_order_lag
 from tests.blind import judge, truth, unit_runs
 from tests.blind.judge import CHANGES, IN_SET, judged
@@ -142,55 +139,3 @@ def test_the_table_of_runs_holds_what_battery_and_judge_ask_of_it():
     assert all(np.isfinite(v).all() for v in runs.values())
     assert {f"hidden {n} {s:g} 0" for n, sizes in unit_runs.SIZES.items() for s in sizes} <= set(runs)
     assert set(unit_runs.JUDGED) == set(unit_runs.response(runs, 0.0).variants)
-
-
-def test_orders_are_the_same_for_a_seed_each_once_and_any_beginning_is_a_fair_share():
-    found = blind.orders(2, 7, blind.PARTS, blind.TIMES, 10)
-    assert found == blind.orders(2, 7, blind.PARTS, blind.TIMES, 10)
-    assert len({blind.key_of(o) for o in found}) == len(found)
-    assert {o["part"] for o in found[: len(found) // 2]} == set(blind.PARTS)
-    other = blind.orders(2, 10**7, blind.PARTS, blind.TIMES, 10)
-    assert not {blind.key_of(o) for o in found} & {blind.key_of(o) for o in other}
-
-
-def test_a_file_of_rows_is_read_as_far_as_it_is_whole_and_of_this_code(tmp_path):
-    path = tmp_path / "rows.ndjson"
-    assert blind.known(path, "a") == {}
-    rows = [{"key": "1", "code": "a"}, {"key": "2", "code": "b"}, {"key": "3", "code": "a"}]
-    path.write_text("\n".join(map(json.dumps, rows)) + '\n{"key": "4", "co')
-    assert set(blind.known(path, "a")) == {"1", "3"}
-
-
-def test_every_order_is_given_out_once_and_what_fails_is_not_in_the_file(tmp_path, monkeypatch):
-    from dask.distributed import Client, LocalCluster
-
-    def quick(order):
-        if order["seed"] == 5:
-            raise ValueError("no such bench")
-        return {"seed": order["seed"], "code": "a"}
-
-    monkeypatch.setattr(blind, "judged", quick)
-    path = tmp_path / "rows.ndjson"
-    todo = [{"seed": k} for k in range(12)]
-    here = {"processes": False, "dashboard_address": None}
-    with LocalCluster(n_workers=2, threads_per_worker=1, **here) as cluster, Client(cluster) as client:
-        assert blind.run(client, todo, path, until=float("inf")) == 1
-        assert blind.run(client, todo, tmp_path / "none.ndjson", until=0.0) == 0
-    assert sorted(r["seed"] for r in blind.known(path, "a").values()) == [k for k in range(12) if k != 5]
-    assert not (tmp_path / "none.ndjson").exists()
-
-
-@pytest.mark.nightly("test_every_order_is_given_out_once_and_what_fails_is_not_in_the_file")
-def test_the_battery_runs_on_dask_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
-    rows = tmp_path / "rows.ndjson"
-    command = ["blind", "--sets", "1", "--only", "mesh,clean", "--most", "3", "--workers", "1"]
-    command += ["--rows", str(rows), "--pictures", str(tmp_path)]
-    monkeypatch.setattr("sys.argv", [*command, "--minutes", "0.01"])
-    assert blind.main() == 0
-    done = len(rows.read_text().splitlines())
-    assert 0 < done < 11
-    monkeypatch.setattr("sys.argv", [*command, "--minutes", "0"])
-    assert blind.main() == 0
-    assert len(rows.read_text().splitlines()) == done
-    assert "clean: a cause named" in capsys.readouterr().out
-    assert (tmp_path / "evidence-confusion.png").stat().st_size > 5000

@@ -212,29 +212,29 @@ def test_a_followed_strut_becomes_the_bar():
             )
 
 
-def test_a_well_in_a_strut_is_caught():
+@pytest.fixture(scope="module")
+def held():
+    """Lattice, its solid, a waveguide's bar, and the lattice with that bar."""
     unit = Unit(chambers=Chambers(count=3))
     d, facets = unit.dimensions, solids.QUALITY["interactive"]
-    lattice = lattice_of(d)
-    bar = waveguide(unit, windows(3)[0])
-    stray = Block(anchor_points(unit)[1] + [1.5, 1.5, 1.5], np.eye(3), np.array([0.4, 0.4, 0.4]))
+    lattice, bar = lattice_of(d), waveguide(unit, windows(3)[0])
     bare = solids.lattice_solid(d, lattice, facets)
-    holder = solids.with_waveguide(d, lattice, facets, bar, bare)
+    return lattice, bare, bar, solids.with_waveguide(d, lattice, facets, bar, bare)
+
+
+def test_a_well_in_a_strut_is_caught(held):
+    lattice, bare, bar, holder = held
+    stray = Block(anchor_points(Unit())[1] + [1.5, 1.5, 1.5], np.eye(3), np.array([0.4, 0.4, 0.4]))
     with pytest.raises(gates.GateError, match="gate: cuts clear of struts"):
         gates.check_waveguide(holder, bar.solid(), stray.solid(), [bare], lattice.cycles + bar.loops)
 
 
-def test_a_well_through_the_bar_is_caught():
-    unit = Unit(chambers=Chambers(count=3))
-    d, facets = unit.dimensions, solids.QUALITY["interactive"]
-    lattice = lattice_of(d)
-    bar = waveguide(unit, windows(3)[0])
-    through = attrs.evolve(bar.wells[0], half=np.array([0.3, 3.0, 0.3]))
-    bare = solids.lattice_solid(d, lattice, facets)
-    holder = solids.with_waveguide(d, lattice, facets, bar, bare)
+def test_a_well_through_the_bar_is_caught(held):
+    lattice, _, bar, holder = held
+    through = attrs.evolve(bar.wells[0], half=np.array([0.3, 3.0, 0.3])).solid()
     with pytest.raises(gates.GateError, match="gate: waveguide genus"):
         gates.check_waveguide(
-            holder, bar.solid(), through.solid(), [shapes.box([0] * 3, [1] * 3)], lattice.cycles + 2
+            holder, bar.solid(), through, [shapes.box([0] * 3, [1] * 3)], lattice.cycles + 2
         )
 
 

@@ -7,7 +7,10 @@ import itertools
 import attrs
 import numpy as np
 
+from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Layer, Materials
+from mu_addon.fem.model import Model
+from mu_addon.fem.newton_settings import CONTACT_NEWTON
 from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces, edges_of, second_order
 
 
@@ -173,3 +176,18 @@ def everywhere(mesh, law, *parameters):
     """One law with the same parameters in every element."""
     count = len(mesh.tets)
     return Materials((Layer(law, np.arange(count), np.tile(np.array(parameters, float), (count, 1))),))
+
+
+def stacked(below, above, foot_mm, at, order=1):
+    """A block of foot_mm x foot_mm x 1 clamped at its foot, and one of 2 x 2 x 1 with its corner at `at`."""
+    one, first = _grid((below, below, 1), (foot_mm, foot_mm, 1.0))
+    other, second = _grid((above, above, 1), (2.0, 2.0, 1.0))
+    nodes = np.vstack([one, other + np.asarray(at)])
+    return make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
+
+
+def touching(mesh, *obstacles, poisson=0.3):
+    """An elastic body of 1 MPa that may touch obstacles, without pressure."""
+    model = Model(mesh, threads=1)
+    model.obstacles = obstacles
+    return Equilibrium(model, uniform(mesh, 1.0, poisson), CONTACT_NEWTON)

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 from mu_addon.fem.beams import Beams, Sections, frames_along, sections_of
 from mu_addon.fem.rotations import rotation
 
+from .derivatives import assert_beams_consistent
+
 RNG = np.random.default_rng(5)
 
 
@@ -62,15 +64,7 @@ def bent(beams, load, steps, fixed=6):
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 0.05, 0.4, 1.5])
 def test_forces_are_the_slope_of_the_energy_and_stiffness_that_of_the_forces(size):
-    beams, h = some(20), 1e-6
-    x = size * RNG.normal(size=(20, 12))
-    forces, stiffness = beams.forces(x), beams.stiffness(x)
-    steps = h * np.eye(12)
-    slope = np.stack([(beams.energy_mJ(x + s) - beams.energy_mJ(x - s)) / (2 * h) for s in steps], axis=1)
-    bend = np.stack([(beams.forces(x + s) - beams.forces(x - s)) / (2 * h) for s in steps], axis=2)
-    assert np.abs(forces - slope).max() < 2e-8 * max(1.0, np.abs(forces).max())
-    assert np.abs(stiffness - bend).max() < 2e-8 * np.abs(stiffness).max()
-    np.testing.assert_allclose(stiffness, stiffness.transpose(0, 2, 1), atol=1e-12 * np.abs(stiffness).max())
+    assert_beams_consistent(some(20), size * RNG.normal(size=(20, 12)))
 
 
 @given(

@@ -6,11 +6,12 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.fem import Materials, Model
+from mu_addon.fem import Model
 from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import Mesh
 from mu_addon.meshing.settings import MeshSettings
 
+from . import bodies
 from .cavities import CavitiesModel
 
 
@@ -33,18 +34,13 @@ def beside(mesh: Mesh) -> Mesh:
     )
 
 
-def materials(mesh):
-    count = len(mesh.tets)
-    return Materials.neo_hooke(np.full(count, 0.1), np.full(count, 0.3))
-
-
 def test_each_of_two_bodies_feels_its_own_share_alone(unit_mesh):
     one, two = (
         Model(unit_mesh, threads=1),
         CavitiesModel(beside(unit_mesh), [len(unit_mesh.cavity)] * 2, threads=1),
     )
     two.shares = np.array([0.3, -0.5])
-    single, both = one.parameters(materials(unit_mesh)), two.parameters(materials(two.mesh))
+    single, both = (m.parameters(bodies.uniform(m.mesh, 0.1, 0.3)) for m in (one, two))
     u = 0.05 * np.random.default_rng(1).normal(size=unit_mesh.nodes.shape)
     whole = np.vstack([u, u])
     n = len(u)

@@ -30,21 +30,22 @@ def test_gradients_of_a_linear_field_are_exact(order):
     assert reference.volumes.sum() == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize(("order", "degree"), [(1, 1), (2, 2)])
-def test_tetrahedron_rule_is_exact_to_its_degree(order, degree):
-    points, weights = elements.tet_quadrature(order)
+@pytest.mark.parametrize(
+    ("rule", "order", "degree"),
+    [
+        (elements.tet_quadrature, 1, 1),
+        (elements.tet_quadrature, 2, 2),
+        (elements.triangle_quadrature, 1, 2),
+        (elements.triangle_quadrature, 2, 4),
+    ],
+)
+def test_a_rule_is_exact_to_its_degree(rule, order, degree):
+    """Of x^i y^j over a simplex of n dimensions: i! j!/(i + j + n)!."""
+    points, weights = rule(order)
+    more = 3 if rule is elements.tet_quadrature else 2
     for i in range(degree + 1):
         for j in range(degree + 1 - i):
-            exact = factorial(i) * factorial(j) / factorial(i + j + 3)
-            assert (weights * points[:, 1] ** i * points[:, 2] ** j).sum() == pytest.approx(exact, rel=1e-12)
-
-
-@pytest.mark.parametrize(("order", "degree"), [(1, 2), (2, 4)])
-def test_triangle_rule_is_exact_to_its_degree(order, degree):
-    points, weights = elements.triangle_quadrature(order)
-    for i in range(degree + 1):
-        for j in range(degree + 1 - i):
-            exact = factorial(i) * factorial(j) / factorial(i + j + 2)
+            exact = factorial(i) * factorial(j) / factorial(i + j + more)
             assert (weights * points[:, 1] ** i * points[:, 2] ** j).sum() == pytest.approx(exact, rel=1e-12)
 
 

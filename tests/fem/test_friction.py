@@ -6,17 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.fem.dead_loads import gravity
-from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.materials import Materials
-from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 
-from .bodies import box, hollow_box
+from .bodies import box, hollow_box, touching
 from .derivatives import assert_consistent
 
 E, NU, MU = 1.0, 0.3, 0.3
@@ -26,14 +22,6 @@ RIGID = [
     Sphere((0.4, 0.6, 1.3), 0.5),
     Box((1.2, 0.5, 1.1), (0.5, 0.2, 0.4)),
 ]
-
-
-def touched(mesh, *obstacles, poisson=NU):
-    """An elastic body that may touch obstacles, without pressure."""
-    model = Model(mesh, threads=1)
-    model.obstacles = obstacles
-    count = len(mesh.tets)
-    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, poisson)), CONTACT_NEWTON)
 
 
 def along(time_s, places):
@@ -58,7 +46,7 @@ def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
     """The obstacle turned and moved since the last committed state; points stick, slide, come and go."""
     mesh = box((2, 2, 2), order=order, jiggle=0.2, clamp=True)
     obstacle = Obstacle(mesh, rigid, 0.3, 0.02, friction=0.4, stick_mm=0.01)
-    eq = touched(mesh, obstacle)
+    eq = touching(mesh, obstacle)
     model, m = eq.model, eq.parameters
     random = np.random.default_rng(0)
     before, u = (0.02 * random.standard_normal(mesh.nodes.shape) for _ in range(2))
@@ -75,7 +63,7 @@ def test_a_dragged_block_resists_with_mu_times_the_normal_force():
     mesh = box((3, 3, 3), clamp=True)
     path = along([0, 1, 2, 3], [(0, 0, 0), (0, 0, -0.05), (0.3, 0, -0.05), (0.4, 0, -0.05)])
     obstacle = Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path)
-    _, contacts = simulated_in_time(touched(mesh, obstacle), np.linspace(0, 3, 31))
+    _, contacts = simulated_in_time(touching(mesh, obstacle), np.linspace(0, 3, 31))
     pressed, drawn, last = contacts[10], contacts[20], contacts[30]
     assert pressed.sticking == 1.0
     assert pressed.lost_mJ < 1e-9
@@ -93,6 +81,20 @@ def test_a_dragged_block_resists_with_mu_times_the_normal_force():
     assert last.lost_mJ - drawn.lost_mJ == pytest.approx(lost, rel=1e-3)
 
 
+def test_a_stored_memory_gives_the_forces_back():
+    """Of points that stick as of those that slide: a run that was killed goes on from it."""
+    mesh = box((3, 3, 3), clamp=True)
+    path = along([0, 1, 2], [(0, 0, 0), (0, 0, -0.05), (0.05, 0, -0.05)])
+    drawn, again = (Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path) for _ in range(2))
+    states, contacts = simulated_in_time(touching(mesh, drawn), np.linspace(0, 2, 5))
+    assert 0.0 < contacts[-1].sticking < 1.0
+    again.move(2.0)
+    again.restore(states[-1].u, drawn.kept())
+    np.testing.assert_allclose(
+        again.contact(states[-1].u).tangential_N, contacts[-1].tangential_N, rtol=1e-12, atol=1e-15
+    )
+
+
 def test_a_turned_lid_is_held_by_the_moment_of_its_pressure():
     """About its middle: mu N times the mean distance of a square's points from its centre, 0.3826 sides."""
     mesh = box((4, 4, 2), (1, 1, 0.5), clamp=True)
@@ -104,7 +106,7 @@ def test_a_turned_lid_is_held_by_the_moment_of_its_pressure():
 
     obstacle = Obstacle(mesh, LID, 0.05, 0.002, friction=MU, path=path)
     # Without a Poisson's ratio the clamped base leaves the pressure uniform.
-    states, contacts = simulated_in_time(touched(mesh, obstacle, poisson=0.0), np.linspace(0, 2, 11))
+    states, contacts = simulated_in_time(touching(mesh, obstacle, poisson=0.0), np.linspace(0, 2, 11))
     nodes, forces = obstacle.forces(states[-1].u)
     arm = (mesh.nodes + states[-1].u)[nodes] - (0.5, 0.5, 0)
     mean = (np.sqrt(2) + np.arcsinh(1)) / 6
@@ -120,7 +122,7 @@ def test_the_angle_at_which_a_block_slides():
     shares = gravity(mesh, 2e-7, np.array([0.0, 0.0, 1.0]))[:, 2]
     weight, deep = shares.sum(), 1e-4
     obstacle = Obstacle(mesh, Plane((0, 0, 0), (0, 0, 1)), weight / side**2, deep, friction=mu)
-    eq = touched(mesh, obstacle)
+    eq = touching(mesh, obstacle)
 
     def tilted(degrees, u):
         t = np.radians(degrees)
@@ -168,7 +170,7 @@ def cycle(friction, steps):
         [0, 1, 2, 3, 4], [(0, 0, 0), (0, 0, -0.4), (0.8, 0.2, -0.4), (0.8, 0.2, -0.4), (1.6, 0.2, 0.1)]
     )
     ball = Obstacle(mesh, Sphere((1.6, 1.9, 5.0), 1.0), 0.3, 0.02, 1, friction=friction, path=path)
-    eq = touched(mesh, ball)
+    eq = touching(mesh, ball)
     time = np.linspace(0, 4, 4 * steps + 1)
     pressure = np.interp(time, [0, 1, 2, 3, 4], [0, 20, 20, 0, 0])
     volume, force, stored, lost = [], [], [], []
@@ -219,7 +221,7 @@ def test_what_comes_nearer_aslant_does_not_rub_before_it_touches():
 
     def rubbed(*times):
         lid = Obstacle(mesh, LID, 0.05, 1e-4, friction=MU, stick_mm=1.0, path=ways)
-        return simulated_in_time(touched(mesh, lid), np.array(times))[1][-1].tangential_N[0]
+        return simulated_in_time(touching(mesh, lid), np.array(times))[1][-1].tangential_N[0]
 
     alone, fine = rubbed(0, 1), rubbed(*np.linspace(-0.1, 1, 12))
     assert fine == pytest.approx(alone, rel=0.02)
@@ -230,7 +232,7 @@ def test_what_comes_nearer_aslant_does_not_rub_before_it_touches():
 
 def test_a_body_that_rubs_is_marched_and_bad_friction_refused():
     mesh = box((1, 1, 1), clamp=True)
-    eq = touched(mesh, Obstacle(mesh, LID, 0.05, 0.01, friction=MU))
+    eq = touching(mesh, Obstacle(mesh, LID, 0.05, 0.01, friction=MU))
     with pytest.raises(InputError, match="depends on its history"):
         simulate(eq, np.arange(2.0), np.zeros(2))
     with pytest.raises(InputError, match="friction coefficient of -0"):

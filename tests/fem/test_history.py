@@ -179,8 +179,7 @@ def test_several_sliding_layers_add_up():
 
 def test_an_elastic_body_marches_where_its_path_goes():
     mesh = bodies.hollow_box(2, n=3)
-    count = len(mesh.tets)
-    materials = Materials.neo_hooke(np.full(count, 0.3), np.full(count, 0.4))
+    materials = bodies.uniform(mesh, 0.3, 0.4)
     time, pressure = np.arange(6.0), np.array([0.0, 10, 25, -5, -5, 0])
     equilibrium = Equilibrium(Model(mesh), materials)
     a, b = simulate(equilibrium, time, pressure), simulate_in_time(equilibrium, time, pressure)
@@ -204,8 +203,7 @@ def test_a_body_with_friction_stays_where_it_slid_and_forgets_when_it_starts_ane
 
 def test_failures_are_named():
     mesh = bodies.sphere_octant(10, 12, 2)
-    count = len(mesh.tets)
-    equilibrium = Equilibrium(Model(mesh), Materials.neo_hooke(np.full(count, 0.02), np.full(count, 0.45)))
+    equilibrium = Equilibrium(Model(mesh), bodies.uniform(mesh, 0.02, 0.45))
     with pytest.raises(ConvergenceError, match="no equilibrium at") as error:
         simulate_in_time(equilibrium, [0.0, 10.0], [0.0, 50.0])
     assert "the last converged state is at" in error.value.where

@@ -10,7 +10,6 @@ from scipy.optimize import minimize_scalar
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import time_stepping
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON, NewtonSettings
 from mu_addon.fem.obstacle import Obstacle
@@ -25,9 +24,8 @@ A, B, NU = 10.0, 11.0, 0.499
 
 
 def equilibrium(mesh, modulus, poisson, held=None, **options):
-    k = len(mesh.tets)
-    materials = Materials.neo_hooke(np.full(k, modulus), np.full(k, poisson))
-    return Equilibrium(Model(mesh, supports=held, threads=1), materials, NewtonSettings(**options))
+    model = Model(mesh, supports=held, threads=1)
+    return Equilibrium(model, bodies.uniform(mesh, modulus, poisson), NewtonSettings(**options))
 
 
 def balloon(around=3):

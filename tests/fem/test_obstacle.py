@@ -9,15 +9,11 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from mu_addon.errors import InputError
-from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.materials import Materials
-from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Box, Plane, Pose, Sphere
 from mu_addon.fem.state import rest
 
-from .bodies import box, make
+from .bodies import box, make, touching
 from .derivatives import assert_consistent
 
 E, NU = 1.0, 0.3
@@ -26,14 +22,6 @@ RIGID = [
     Sphere((0.4, 0.6, 1.3), 0.5),
     Box((1.2, 0.5, 1.1), (0.5, 0.2, 0.4)),
 ]
-
-
-def pressed(mesh, obstacle):
-    """An elastic body that may touch an obstacle, without pressure."""
-    model = Model(mesh, threads=1)
-    model.obstacles = (obstacle,)
-    count = len(mesh.tets)
-    return Equilibrium(model, Materials.neo_hooke(np.full(count, E), np.full(count, NU)), CONTACT_NEWTON)
 
 
 @pytest.mark.parametrize("rigid", RIGID)
@@ -65,7 +53,7 @@ def test_force_and_tangent_are_derivatives_of_the_energy(rigid, order):
     obstacle = Obstacle(mesh, rigid, 0.3, 0.02)
     turn = Rotation.from_rotvec((0.1, -0.2, 0.15)).as_matrix()
     obstacle.pose = Pose(turn, (0.02, -0.03, 0.05))
-    eq = pressed(mesh, obstacle)
+    eq = touching(mesh, obstacle)
     model, m = eq.model, eq.parameters
     random = np.random.default_rng(0)
     u = 0.02 * random.standard_normal(mesh.nodes.shape)
@@ -88,7 +76,7 @@ def test_patch(order):
     mesh = box((2, 3, 2), order=order, jiggle=0.2, symmetry=("x", "y", "z"))
     depth, pressure, by = 0.01, 0.2, 0.2
     obstacle = Obstacle(mesh, Plane((0, 0, 1), (0, 0, -1)), pressure, depth)
-    eq = pressed(mesh, obstacle)
+    eq = touching(mesh, obstacle)
     state = rest(mesh)
     for shift in (0.5 * by, by):
         obstacle.pose = Pose(shift=(0, 0, -shift))
@@ -139,7 +127,7 @@ def approached(mesh, rigid, radius, approach):
     Hertz's pressure, p0 sqrt(1 - r^2/a^2), has a mean of r^2 of 2/5 a^2.
     """
     obstacle = Obstacle(mesh, rigid, hertz(radius, approach)[1], 0.01 * approach)
-    eq = pressed(mesh, obstacle)
+    eq = touching(mesh, obstacle)
     state = rest(mesh)
     for share in (0.1, 0.4, 1.0):
         obstacle.pose = Pose(shift=(0, 0, -share * approach))

@@ -5,9 +5,6 @@ import numpy as np
 import pytest
 
 from mu_addon.fem.embedding import embed
-from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.model import Model
-from mu_addon.fem.newton_settings import CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.outer_faces import outer_faces
 from mu_addon.fem.rigid import Plane, Pose
@@ -15,7 +12,7 @@ from mu_addon.fem.state import rest
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.meshing.mesh import LATTICE, boundary_faces
 
-from .bodies import box, uniform
+from .bodies import box, touching
 
 E, NU = 1.0, 0.3
 LOW, HIGH = 0.6, 0.3
@@ -42,12 +39,6 @@ def overlapping(symmetry=()):
         tied_to=follows.nodes,
         tied_weights=follows.weights,
     )
-
-
-def touching(mesh, obstacle):
-    model = Model(mesh, threads=1)
-    model.obstacles = (obstacle,)
-    return Equilibrium(model, uniform(mesh, E, NU), CONTACT_NEWTON)
 
 
 def test_what_lies_inside_another_part_is_no_outer_face():

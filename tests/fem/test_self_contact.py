@@ -10,7 +10,6 @@ from mu_addon.errors import InputError
 from mu_addon.fem.batched_newton import BatchedNewton
 from mu_addon.fem.dead_loads import traction
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import SELF_CONTACT_NEWTON
 from mu_addon.fem.obstacle import Obstacle
@@ -21,6 +20,7 @@ from mu_addon.fem.self_intersection import crossings
 from mu_addon.fem.state import rest
 
 from . import bodies
+from .bodies import uniform
 from .derivatives import assert_consistent
 from .test_self_intersection import GAP, fork, lean, pouch
 
@@ -30,23 +30,15 @@ E, NU = 1.0, 0.3
 D, K = 0.05, 0.1
 
 
-def plates(below, above, order=1, apart=0.5):
-    """A block of 2 x 2 x 1 clamped at its foot, and another above it, its mesh another."""
-    one, first = bodies._grid((below, below, 1), (2.0, 2.0, 1.0))
-    other, second = bodies._grid((above, above, 1), (2.0, 2.0, 1.0))
-    nodes = np.vstack([one, other + np.array([0.0, 0.0, 1.0 + apart])])
-    return bodies.make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
+def plates(order=1, apart=0.5):
+    """Two blocks of 2 x 2 x 1 on each other, of unlike meshes."""
+    return bodies.stacked(4, 5, 2.0, (0.0, 0.0, 1.0 + apart), order)
 
 
-def filled(mesh, modulus, poisson):
-    count = len(mesh.tets)
-    return Materials.neo_hooke(np.full(count, modulus), np.full(count, poisson))
-
-
-def body(mesh, gap=D, stiffness=K, supports=None, material=(E, NU)):
+def body(mesh, gap=D, stiffness=K, supports=None, material=(E, NU), friction=0.0):
     model = Model(mesh, supports, threads=1)
-    model.self_contact = SelfContact(mesh, gap, stiffness)
-    return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON)
+    model.self_contact = SelfContact(mesh, gap, stiffness, friction)
+    return Equilibrium(model, uniform(mesh, *material), SELF_CONTACT_NEWTON)
 
 
 def onto_mirror(depth=0.02):
@@ -105,7 +97,7 @@ def test_the_tangent_is_symmetric_and_gets_room_for_what_touches():
     whole = model.self_contact.stiffness(u).tocsr()
     assert abs(whole - whole.T).max() < 1e-12 * abs(whole).max()
     without = Model(mesh, threads=1)
-    expected = without.matrix(without.tangent(u, 0.0, without.parameters(filled(mesh, E, NU))))
+    expected = without.matrix(without.tangent(u, 0.0, without.parameters(uniform(mesh, E, NU))))
     expected = expected + whole[model.free][:, model.free]
     assert abs(model.matrix(values) - expected).max() < 1e-12 * abs(expected).max()
     # What has grown holds the rest as it was, without contact or with none left.
@@ -146,7 +138,7 @@ def test_a_new_path_begins_without_the_room_that_contact_took():
 
 
 def test_what_slides_past_the_edges_of_facets_needs_no_more_room():
-    mesh = plates(4, 5)
+    mesh = plates()
     eq = body(mesh)
     down = np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.47], 0.0)
     aside = np.where(mesh.nodes[:, 2:] > 1.2, [1.0, 0.6, 0.0], 0.0)
@@ -161,7 +153,7 @@ def test_what_slides_past_the_edges_of_facets_needs_no_more_room():
 
 
 def test_what_presses_on_itself_is_in_balance():
-    mesh = plates(4, 5)
+    mesh = plates()
     contact = SelfContact(mesh, D, K)
     u = np.where(mesh.nodes[:, 2:] > 1.2, [0.0, 0.0, -0.47], 0.0)
     nodes, forces = contact.forces(u)
@@ -174,7 +166,7 @@ def test_what_presses_on_itself_is_in_balance():
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_block_on_another_passes_on_its_pressure(order):
     """The upper block, 2 x 2 mm, bears 20 kPa, so the lower one does; the gap is what the barrier says."""
-    mesh = plates(4, 5, order)
+    mesh = plates(order)
     x, y, z = mesh.nodes.T
     supports = np.zeros(mesh.nodes.shape, bool)
     supports[:, :2] = True
@@ -219,7 +211,7 @@ def test_what_is_kept_of_a_search_finds_what_a_new_one_does():
 
 def test_a_plate_presses_a_block_on_another_without_a_touch():
     """Self-contact and an obstacle in one model: what the plate presses with arrives at the base."""
-    mesh = plates(4, 5)
+    mesh = plates()
     supports = np.zeros(mesh.nodes.shape, bool)
     supports[:, :2] = True
     eq = body(mesh, supports=supports, material=(E, 0.0))
@@ -286,7 +278,7 @@ def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
     mesh = pouch()
     eq = body(mesh, gap=0.04, material=(1.0, 0.45))
     contact = eq.model.self_contact
-    free = Equilibrium(Model(mesh, threads=1), filled(mesh, 1.0, 0.45))
+    free = Equilibrium(Model(mesh, threads=1), uniform(mesh, 1.0, 0.45))
     history = [rest(mesh)]
     for pressure in (-0.00005, -0.0001, -0.0002, -0.002, -0.02):
         history.append(eq.reach(pressure, history))
@@ -305,7 +297,7 @@ def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
 def test_bodies_that_share_a_factor_have_no_self_contact():
     eq = body(fork())
     with pytest.raises(InputError, match="self-contact"):
-        BatchedNewton(eq.model, filled(eq.model.mesh, E, NU), [])
+        BatchedNewton(eq.model, uniform(eq.model.mesh, E, NU), [])
 
 
 def test_a_gap_that_reaches_across_a_wall_is_refused():

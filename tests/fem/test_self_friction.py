@@ -1,5 +1,7 @@
 """Friction of a body with itself: derivatives, Coulomb's law between blocks, and where energy goes."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from mu_addon.fem.trajectory import simulate
 
 from . import bodies
 from .derivatives import assert_consistent
-from .test_self_contact import NU, D, E, K, filled
+from .test_self_contact import D, E, K, body
 from .test_self_intersection import fork, lean
 
 pytest.importorskip("ipctk")
@@ -24,18 +26,12 @@ pytest.importorskip("ipctk")
 MU = 0.3
 
 
-def stacked(below=4, above=5, order=1):
+def stacked(below=4, above=5):
     """A block of 3 x 3 x 1 clamped at its foot, and 0.5 above it one of 2 x 2 x 1, its mesh another."""
-    one, first = bodies._grid((below, below, 1), (3.0, 3.0, 1.0))
-    other, second = bodies._grid((above, above, 1), (2.0, 2.0, 1.0))
-    nodes = np.vstack([one, other + np.array([0.5, 0.5, 1.5])])
-    return bodies.make(nodes, np.vstack([first, second + len(one)]), order, base=(lambda p: p[2] == 0,))
+    return bodies.stacked(below, above, 3.0, (0.5, 0.5, 1.5))
 
 
-def with_friction(mesh, friction=MU, material=(E, NU)):
-    model = Model(mesh, threads=1)
-    model.self_contact = SelfContact(mesh, D, K, friction)
-    return Equilibrium(model, filled(mesh, *material), SELF_CONTACT_NEWTON)
+with_friction = partial(body, friction=MU)
 
 
 def moved(mesh, way):
@@ -46,7 +42,7 @@ def moved(mesh, way):
 @pytest.mark.parametrize("order", [1, 2])
 def test_force_and_tangent_are_derivatives_of_the_energy(order):
     mesh = fork(order)
-    eq = with_friction(mesh, 0.1)
+    eq = with_friction(mesh, friction=0.1)
     contact, random = eq.model.self_contact, np.random.default_rng(0)
     before, lagged, u = (
         lean(mesh, by) + 1e-3 * random.standard_normal(mesh.nodes.shape) for by in (0.48, 0.49, 0.49)
@@ -102,7 +98,7 @@ def test_what_is_pushed_by_less_than_friction_stays_and_by_more_is_lost():
     down, aside = (traction(mesh, top, np.array(t)) for t in ((0.0, 0.0, -0.02), (MU * 0.02, 0.0, 0.0)))
     supports = np.zeros(mesh.nodes.shape, bool)
     supports[:, :2] = True
-    upright = Equilibrium(Model(mesh, supports, threads=1), filled(mesh, E, 0.0), SELF_CONTACT_NEWTON)
+    upright = Equilibrium(Model(mesh, supports, threads=1), bodies.uniform(mesh, E, 0.0), SELF_CONTACT_NEWTON)
     upright.model.self_contact, upright.model.load = SelfContact(mesh, D, K), down
     pressed = upright.newton(moved(mesh, (0.0, 0.0, -0.46)), 0.0).u
     eq.model.self_contact.begin(pressed)
@@ -122,7 +118,7 @@ def dragged(friction, way, steps):
     Contacts of the lid (steps + 1,), energies in mJ stored in the blocks and the lid, and lost by then.
     """
     mesh = stacked(3, 4)
-    eq = with_friction(mesh, friction)
+    eq = with_friction(mesh, friction=friction)
     model = eq.model
     lid = Obstacle(mesh, Plane((0.0, 0.0, 2.03), (0.0, 0.0, -1.0)), 0.05, 0.002, friction=3.0)
     sliding = model.self_contact

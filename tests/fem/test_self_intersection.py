@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.self_intersection import crossings, first_self_intersection
@@ -101,9 +100,9 @@ def test_the_first_contact_lies_between_two_states():
 def test_a_vacuum_closes_a_pouch_and_says_where_and_when():
     """Both plates meet in their middle as it has sunk by half the gap; the other wall is a mirror image."""
     mesh = pouch()
-    k = len(mesh.tets)
-    materials = Materials.neo_hooke(np.full(k, 1.0), np.full(k, 0.4))
-    body = Equilibrium(Model(mesh, threads=1), materials, NewtonSettings(min_step_MPa=1e-6))
+    body = Equilibrium(
+        Model(mesh, threads=1), bodies.uniform(mesh, 1.0, 0.4), NewtonSettings(min_step_MPa=1e-6)
+    )
     start = rest(mesh)
     states = [start, *body.path(-np.arange(1, 8) * 5e-5, start)]
     found = first_self_intersection(mesh, states)

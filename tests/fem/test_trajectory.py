@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.fem import Equilibrium, Materials, Model, State, simulate, simulate_in_time
+from mu_addon.fem import Equilibrium, Model, State, simulate, simulate_in_time
 from mu_addon.fem.trajectory import Trajectory
 
 from . import bodies
@@ -16,8 +16,7 @@ TIME = np.arange(6.0)
 
 def test_states_and_volumes_come_in_the_order_of_the_protocol():
     mesh = bodies.hollow_box(1, n=3)
-    count = len(mesh.tets)
-    body = Equilibrium(Model(mesh), Materials.neo_hooke(np.full(count, 0.3), np.full(count, 0.4)))
+    body = Equilibrium(Model(mesh), bodies.uniform(mesh, 0.3, 0.4))
     motion = simulate(body, TIME, PRESSURE)
     np.testing.assert_allclose([s.pressure_kPa for s in motion.states], PRESSURE)
     assert [s.pressure_kPa for s in motion.solved] == pytest.approx([-4.0, 0.0, 3.0, 5.0])

@@ -74,40 +74,43 @@ def test_without_its_packages_it_says_how_to_install_them(tmp_path, words):
     assert_clear_failure(done, 1, "package attr", "is not installed", "-m pip install")
 
 
-def test_an_empty_word_names_its_option(tmp_path):
-    done = here("simulate", "--preset", "mu-1.0x", "--resin", "", "--out", tmp_path / "out")
-    assert_clear_failure(done, 2, "it is empty", "where: --resin")
+PRESET = ("--preset", "mu-1.0x")
 
 
-def test_unknown_preset(tmp_path):
-    done = here("place", "--preset", "mu-2.0x", "--out", tmp_path / "out")
-    assert_clear_failure(done, 2, "mu-2.0x", "mu-1.0x", "what to do")
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("place", "--preset", "mu-2.0x"), ("mu-2.0x", "mu-1.0x")),
+        (("place", "--presett", "mu-1.0x"), ("--help",)),
+        (("simulate", *PRESET, "--resin", ""), ("it is empty", "where: --resin")),
+        (("design", *PRESET, "--path", "alpha11"), ("alpha11", "alpha10")),
+        (("simulate", *PRESET, "--protocol", "none.csv"), ("none.csv",)),
+        (("simulate", *PRESET, "--times", "1"), ()),
+        (("simulate", *PRESET, "--refine", "0"), ()),
+        (("simulate", *PRESET, "--refine", "nan"), ()),
+        (("place", *PRESET, "--times", "2"), ("none of the 2 samples",)),
+        (("place", *PRESET, "--paths", "graph", "--shortest-cells", "40"), ("no path of the lattice",)),
+    ],
+)
+def test_words_that_no_run_can_use_are_refused_before_any_work(tmp_path, words, told):
+    assert_clear_failure(here(*words, "--out", tmp_path / "out"), 2, *told, "what to do")
+    assert not (tmp_path / "out" / "unit.stl").exists()
 
 
-def test_unknown_option(tmp_path):
-    assert_clear_failure(here("place", "--presett", "mu-1.0x", "--out", tmp_path), 2, "what to do", "--help")
-
-
-def test_malformed_toml_names_its_line(tmp_path):
-    file = tmp_path / "unit.toml"
-    file.write_text('format = 1\nname = "x"\nscale = = 2\n')
-    assert_clear_failure(here("design", "--unit", file, "--out", tmp_path / "out"), 2, "unit.toml", "line 3")
-
-
-def test_misspelt_parameter_names_its_line_and_the_right_word(tmp_path):
-    file = tmp_path / "unit.toml"
-    file.write_text("format = 1\nscale = 1.0\n\n[chambers]\nwal_mm = 0.7\n")
-    assert_clear_failure(here("design", "--unit", file, "--out", tmp_path / "out"), 2, "line 5", "wall_mm")
-
-
-def test_impossible_geometry_names_the_largest_wall(tmp_path):
-    file = tmp_path / "unit.toml"
-    file.write_text(
-        to_toml(load_preset("mu-1.0x"), comments=False).replace("wall_mm = 0.9", "wall_mm = 2.5", 1)
-    )
-    done = here("design", "--unit", file, "--out", tmp_path / "out")
-    # a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm
-    assert_clear_failure(done, 2, "wall", "1.87", "cavity")
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('format = 1\nname = "x"\nscale = = 2\n', ("unit.toml", "line 3")),
+        ("format = 1\nscale = 1.0\n\n[chambers]\nwal_mm = 0.7\n", ("line 5", "wall_mm")),
+        # The largest wall, a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm.
+        ("format = 1\n[chambers]\nwall_mm = 2.5\n", ("wall", "1.87", "cavity")),
+    ],
+    ids=["malformed", "misspelt", "impossible"],
+)
+def test_a_units_file_is_refused_in_its_own_words(tmp_path, text, told):
+    (tmp_path / "unit.toml").write_text(text)
+    done = here("design", "--unit", tmp_path / "unit.toml", "--out", tmp_path / "out")
+    assert_clear_failure(done, 2, *told)
 
 
 @pytest.mark.parametrize(
@@ -129,18 +132,11 @@ def test_unreadable_protocol_names_its_line(tmp_path, text, words):
     assert_clear_failure(done, 2, "protocol", *words)
 
 
-def test_missing_and_binary_protocols(tmp_path):
-    base = ("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol")
-    assert_clear_failure(here(*base, tmp_path / "none.csv"), 2, "none.csv")
+def test_a_binary_protocol(tmp_path):
     binary = tmp_path / "binary.csv"
     binary.write_bytes(bytes(range(256)))
-    assert_clear_failure(here(*base, binary), 2, "not a text file")
-
-
-@pytest.mark.parametrize(("option", "value"), [("--times", "1"), ("--refine", "0"), ("--refine", "nan")])
-def test_numbers_out_of_range(tmp_path, option, value):
-    done = here("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", option, value)
-    assert_clear_failure(done, 2, "what to do")
+    done = here("simulate", *PRESET, "--out", tmp_path / "out", "--protocol", binary)
+    assert_clear_failure(done, 2, "not a text file")
 
 
 def three_chambers(folder):
@@ -188,12 +184,6 @@ def test_a_folder_in_the_way_of_a_file(tmp_path):
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_an_unknown_path_is_refused_before_any_work(tmp_path):
-    done = here("design", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--path", "alpha11")
-    assert_clear_failure(done, 2, "alpha11", "alpha10")
-    assert not (tmp_path / "out" / "unit.stl").exists()
-
-
 def test_json_messages_end_with_one_terminal_message(tmp_path):
     unit = three_chambers(tmp_path)
     good = here("design", "--unit", unit, "--out", tmp_path / "out", "--json", "--no-report")
@@ -211,18 +201,6 @@ def test_a_folder_with_somebody_elses_files_is_left_alone(tmp_path):
     )
     assert (tmp_path / "unit.stl").read_text() == "mine"
     assert not (tmp_path / "summary.json").exists()
-
-
-@pytest.mark.parametrize("words", [("--preset", "", "--out", "x"), ("--preset", "mu-1.0x", "--out", "")])
-def test_empty_words(tmp_path, monkeypatch, words):
-    monkeypatch.chdir(tmp_path)
-    assert_clear_failure(here("design", *words), 2, "what to do")
-    assert not list(tmp_path.iterdir())
-
-
-def test_samples_without_any_pressure_are_refused(tmp_path):
-    done = here("place", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--times", "2")
-    assert_clear_failure(done, 2, "none of the 2 samples")
 
 
 def test_files_from_a_windows_editor_are_read(tmp_path):

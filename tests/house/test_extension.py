@@ -20,6 +20,11 @@ ROOT = Path(__file__).resolve().parents[2]
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="bpy is not installed")
 
 
+def ran(words, **more):
+    """A finished process, and what it said."""
+    return subprocess.run(words, capture_output=True, text=True, check=False, **more)
+
+
 @pytest.fixture
 def ci(monkeypatch):
     """Imports a module of .ci by name."""
@@ -30,9 +35,7 @@ def ci(monkeypatch):
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     out = tmp_path_factory.mktemp("extension")
-    done = subprocess.run(
-        [sys.executable, ROOT / ".ci" / "extension.py", out], capture_output=True, text=True, check=False
-    )
+    done = ran([sys.executable, ROOT / ".ci" / "extension.py", out])
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Success parsing TOML" in done.stdout
     (path,) = out.glob("*.zip")
@@ -59,9 +62,7 @@ def test_blender_refuses_a_bad_manifest(tmp_path, ci):
     manifest = source / "blender_manifest.toml"
     manifest.write_text(manifest.read_text().replace('tagline = "', 'tagline = "' + "x" * 64))
     tool = extension.blender_ext()
-    done = subprocess.run(
-        [sys.executable, tool, "validate", source], capture_output=True, text=True, check=False
-    )
+    done = ran([sys.executable, tool, "validate", source])
     assert done.returncode != 0
     assert "tagline" in done.stdout + done.stderr
 
@@ -77,7 +78,7 @@ def wheel(folder, name, metadata):
 
 def test_the_bill_of_materials_names_every_wheel(tmp_path, ci):
     (tmp_path / "wheels").mkdir()
-    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path)
     one = wheel(tmp_path / "wheels", "one_a", "License-Expression: MIT AND Zlib")
     wheel(tmp_path / "wheels", "three", "License: " + "All of its text, naïve " * 9)
     wheel(tmp_path / "wheels", "two", "License: x\nClassifier: License :: OSI Approved :: BSD License")
@@ -143,11 +144,15 @@ def published(tmp_path):
     """A wheel of a package that ships its tests, where a download lies."""
     path = tmp_path / "linux-x64" / "3.11" / NAME
     path.parent.mkdir(parents=True)
-    record = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in SCIPY.items()]
+    return with_record(path, SCIPY, "scipy-9.dist-info/RECORD")
+
+
+def with_record(path, files, record):
+    """A wheel of these files, by name, with its record of them."""
+    rows = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in files.items()]
     with zipfile.ZipFile(path, "w") as stream:
-        for name, text in SCIPY.items():
+        for name, text in (files | {record: "".join(rows) + f"{record},,\n"}).items():
             stream.writestr(name, text)
-        stream.writestr("scipy-9.dist-info/RECORD", "".join(record) + "scipy-9.dist-info/RECORD,,\n")
     return path
 
 
@@ -206,11 +211,7 @@ WARP = {
 def test_warps_library_is_replaced_by_the_pinned_one_alone(tmp_path, ci, published, monkeypatch):
     slim, wheels, bill = ci("slim"), ci("wheels"), ci("bill")
     whole = published.with_name("warp_lang-1-py3-none-any.whl")
-    record = [f"{name},sha256={digest(text.encode())},{len(text)}\n" for name, text in WARP.items()]
-    with zipfile.ZipFile(whole, "w") as stream:
-        for name, text in WARP.items():
-            stream.writestr(name, text)
-        stream.writestr("warp_lang-1.dist-info/RECORD", "".join(record))
+    with_record(whole, WARP, "warp_lang-1.dist-info/RECORD")
     sha = hashlib.sha256(whole.read_bytes()).hexdigest()
     pin = wheels.Wheel("linux-x64", "3.11", "warp-lang", "1", whole.name, sha)
     library = b"for the processor"
@@ -228,7 +229,7 @@ def test_warps_library_is_replaced_by_the_pinned_one_alone(tmp_path, ci, publish
     other, _ = slim.slim(whole, tmp_path / "slim", {"warp/bin/warp.so": b"another"})
     (wrong,) = wheels.not_as_pinned(archive_of(tmp_path, {other.name: other.read_bytes()}), [pin], tmp_path)
     assert wrong == f"wheels/{made.name}: warp/bin/warp.so has another SHA-256 than pinned"
-    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path)
     slim.slim(whole, tmp_path / "wheels", {"warp/bin/warp.so": library})
     bill.write_bill(tmp_path, [change])
     (component,) = json.loads((tmp_path / "sbom.cdx.json").read_text())["components"]
@@ -295,14 +296,7 @@ def test_gmsh_without_its_window_loads_none_of_its_libraries_and_writes_step(tmp
     made.write_bytes(ci("gmsh_window").without_window(gmsh_library().read_bytes()))
     # gmsh takes the library that lies beside its module. The loader reads all names at once.
     shutil.copy(importlib.util.find_spec("gmsh").origin, tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-c", STEP],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(tmp_path), "PATH": ""},
-    )
+    done = ran([sys.executable, "-c", STEP], cwd=tmp_path, env={"PYTHONPATH": str(tmp_path), "PATH": ""})
     assert done.returncode == 0, done.stdout + done.stderr
     nodes, files = done.stdout.splitlines()[-2:]
     assert (int(nodes) > 8, files) == (True, f"['{made.name}']")
@@ -328,7 +322,7 @@ def test_a_library_of_other_bytes_than_pinned_is_refused(tmp_path, ci, monkeypat
 
 
 def test_the_bill_says_what_a_slimmed_wheel_was_made_from(tmp_path, ci, published):
-    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path)
     made, change = ci("slim").slim(published, tmp_path / "wheels")
     ci("bill").write_bill(tmp_path, [change])
     (component,) = json.loads((tmp_path / "sbom.cdx.json").read_text())["components"]
@@ -344,7 +338,7 @@ def test_the_bill_says_what_a_slimmed_wheel_was_made_from(tmp_path, ci, publishe
     ("python", "first", "end"), [("3.11", "4.5.0", "5.1.0"), ("3.13", "5.1.0", None), ("3.14", "5.1.0", None)]
 )
 def test_an_archive_is_for_the_blenders_of_its_python(python, first, end, tmp_path, ci, published):
-    (tmp_path / "blender_manifest.toml").write_text((ROOT / "blender_manifest.toml").read_text())
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path)
     ci("extension").bundle(tmp_path, [published], "linux-x64", python)
     manifest = tomllib.loads((tmp_path / "blender_manifest.toml").read_text())
     assert (manifest["blender_version_min"], manifest.get("blender_version_max")) == (first, end)
@@ -373,12 +367,7 @@ def test_pins_are_those_of_the_project(ci):
 def test_without_bpy_it_says_what_to_do_before_any_work(tmp_path):
     out = tmp_path / "out"
     # Without site-packages there is no bpy, as after a plain `pip install -e .`.
-    done = subprocess.run(
-        [sys.executable, "-S", ROOT / ".ci" / "extension.py", out],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran([sys.executable, "-S", ROOT / ".ci" / "extension.py", out])
     assert done.returncode == 2
     assert "bpy==" in done.stderr
     assert "--install" in done.stderr or "use python3.11" in done.stderr
@@ -406,11 +395,8 @@ print("registered")
 
 @needs_bpy
 def test_installs_and_registers_twice(archive, tmp_path):
-    done = subprocess.run(
+    done = ran(
         [sys.executable, "-c", INSTALL, archive],
-        capture_output=True,
-        text=True,
-        check=False,
         cwd=tmp_path,
         env={"PATH": "", "HOME": str(tmp_path), "BLENDER_USER_RESOURCES": str(tmp_path / "blender")},
     )

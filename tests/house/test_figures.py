@@ -29,7 +29,7 @@ PRINTED = """2026-11-25; CPU, 2 cores, load 0.1 at the start; commit abc
 @pytest.mark.parametrize("page", sorted((DOCS / "engineering").glob("*.md")), ids=lambda page: page.stem)
 def test_a_page_shows_the_figures_of_its_files(page):
     text = page.read_text(encoding="utf-8")
-    assert figures.filled(text) == text, "run `python benchmarks/figures.py fill`"
+    assert figures.filled(text) == text, "run `python -m benchmarks.figures fill`"
 
 
 def test_a_figure_that_no_page_shows_is_none():

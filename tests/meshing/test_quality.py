@@ -8,9 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from mu_addon.errors import MeshingError
 from mu_addon.meshing import LATTICE, Mesh
 from mu_addon.meshing.mesh import TET_EDGES, bisected, edges_of, oriented, second_order
-from mu_addon.meshing.quality import cavity_enclosed, dihedral_angles, element_volumes, folded_corners
+from mu_addon.meshing.quality import (
+    cavity_enclosed,
+    check_positive,
+    dihedral_angles,
+    element_volumes,
+    folded_corners,
+    inverted,
+)
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 REGULAR = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
@@ -65,6 +73,15 @@ def test_a_side_bent_flat_is_a_folded_corner() -> None:
     bend[0] = [0.0, 0.25, 0.0]
     bend[2] = [0.25, 0.0, 0.0]
     assert folded_corners(single(curved(CORNERS, bend)))[0] <= 1e-12
+
+
+def test_an_inverted_element_is_found_and_named() -> None:
+    check_positive(single(CORNERS))
+    turned = single(CORNERS[[1, 0, 2, 3]])
+    assert inverted(turned).tolist() == [0]
+    with pytest.raises(MeshingError, match="1 of 1 elements are inverted") as refused:
+        check_positive(turned)
+    assert "lattice at x, y, z = 0.25, 0.25, 0.25 mm" in refused.value.where
 
 
 def test_bisection_and_second_order_keep_the_volume() -> None:

@@ -5,17 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.design.surface import volume
 from mu_addon.report.shapes import ball, tube
 
 
 def edge_count(faces):
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return np.unique(edges, axis=0, return_counts=True)[1]
-
-
-def volume(vertices, faces):
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
 
 
 def test_ball():

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from mu_addon.design.parameters import load_preset
+from mu_addon.design.surface import volume
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Mesh, mirror, second_order
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report import unit_pictures as pictures
@@ -31,11 +32,6 @@ def cube(order, low=(0.0, -1.0, 0.0), high=(1.0, 1.0, 2.0)):
         nodes, tets, triangles = second_order(nodes, tets, triangles, middles)
     region = np.array([MEMBRANE, LATTICE, LATTICE, LATTICE, LATTICE])
     return Mesh(nodes, tets, region, triangles, np.array([0]), np.array([1]), ("x",))
-
-
-def volume(vertices, faces):
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
 
 
 @pytest.mark.parametrize(("order", "faces"), [(1, 12), (2, 48)])

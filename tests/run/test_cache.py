@@ -1,8 +1,6 @@
 """Entries that come back whole, or not at all."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mu_addon.files import write_npz
 from mu_addon.run.cache import Cache, key
@@ -15,25 +13,6 @@ def test_an_entry_comes_back(tmp_path):
     assert found is not None
     np.testing.assert_array_equal(found["x"], np.arange(5.0))
     assert cache.get("mesh", "b") is None
-
-
-@settings(max_examples=150)
-@given(st.data())
-def test_a_damaged_entry_is_missing_or_whole(tmp_path_factory, data):
-    cache = Cache(tmp_path_factory.mktemp("cache"))
-    expected = np.random.default_rng(0).standard_normal(200)
-    cache.put("state", "a", {"u": expected})
-    path = cache.path("state", "a")
-    content = bytearray(path.read_bytes())
-    if data.draw(st.booleans()):
-        place = data.draw(st.integers(0, len(content) - 1))
-        content[place] ^= data.draw(st.integers(1, 255))
-    else:
-        del content[data.draw(st.integers(0, len(content) - 1)) :]
-    path.write_bytes(content)
-    found = cache.get("state", "a")
-    if found is not None and "u" in found:
-        np.testing.assert_array_equal(found["u"], expected)
 
 
 def test_another_entry_under_this_name_is_missing(tmp_path):
@@ -55,3 +34,4 @@ def test_keys_tell_inputs_apart():
         == 4
     )
     assert key("ab", "c") != key("a", "bc")
+    assert key(np.zeros((2, 3))) != key(np.zeros((3, 2)))

@@ -68,34 +68,20 @@ def test_a_crash_is_told_with_signal_and_last_words(start):
     assert Path(child.error["where"]).is_file()
 
 
-def test_an_end_without_a_word_is_a_failure_even_with_status_0(start):
-    child = start("wordless")
+@pytest.mark.parametrize(("how", "status"), [("wordless", 0), ("lies", 3)])
+def test_neither_a_status_nor_a_result_is_believed_without_the_other(start, how, status):
+    child = start(how)
     watch(child)
     assert child.state == FAILED
-    assert "exit status 0" in child.error["what"]
+    assert f"exit status {status}" in child.error["what"]
 
 
-def test_a_result_is_not_believed_beside_a_bad_status(start):
-    child = start("lies")
-    watch(child)
-    assert child.state == FAILED
-    assert "exit status 3" in child.error["what"]
-
-
-def test_garbage_is_passed_over(start):
-    child = start("garbage")
+@pytest.mark.parametrize(("how", "fraction", "garbage"), [("garbage", 0.75, 6), ("half_a_line", 0.5, 0)])
+def test_garbage_is_passed_over_and_half_a_line_waits_for_the_other_half(start, how, fraction, garbage):
+    child = start(how)
     watch(child)
     assert child.state == DONE
-    assert child.garbage == 6
-    assert child.progress["fraction"] == 0.75
-
-
-def test_half_a_line_waits_for_the_other_half(start):
-    child = start("half_a_line")
-    watch(child)
-    assert child.state == DONE
-    assert child.progress["fraction"] == 0.5
-    assert child.garbage == 0
+    assert (child.progress["fraction"], child.garbage) == (fraction, garbage)
 
 
 def test_a_flood_neither_blocks_the_child_nor_its_parent(start):

@@ -137,11 +137,11 @@ def test_a_fault_before_there_is_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "status", "state"),
-    [(signal.SIGINT, 130, "partial"), (signal.SIGTERM, 143, "cancelled")],
+    ("number", "status", "state", "reason"),
+    [(signal.SIGINT, 130, "partial", "stopped by Ctrl-C"), (signal.SIGTERM, 143, "cancelled", "cancelled")],
     ids=["ctrl-c", "terminate"],
 )
-def test_stopped_from_outside(tmp_path, number, status, state):
+def test_stopped_from_outside(tmp_path, number, status, state, reason):
     process = start("wait", tmp_path)
     assert process.stdout.readline() == "ready\n"
     # What was found before the stage is on disk, whatever becomes of the process.
@@ -157,7 +157,7 @@ def test_stopped_from_outside(tmp_path, number, status, state):
     assert log[-1]["status"] == status
     assert (tmp_path / "mesh.txt").read_text() == "kept"
     # Who asked for the end waits for it.
-    assert (tmp_path / "last_words.txt").read_text().endswith("hurried: True")
+    assert (tmp_path / "last_words.txt").read_text() == f"{reason}, hurried: True"
 
 
 def test_a_full_disk_that_a_library_meets():
@@ -191,9 +191,6 @@ def test_a_second_ctrl_c_cuts_short_what_takes_long(tmp_path):
 
 
 def test_handlers_are_put_back():
-    from mu_addon.run.context import run_to_end
-    from mu_addon.run.progress import Progress
-
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with run_to_end(Progress()) as context:
         raise KeyboardInterrupt
@@ -202,11 +199,6 @@ def test_handlers_are_put_back():
 
 
 def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
-    import os
-
-    from mu_addon.run.context import run_to_end
-    from mu_addon.run.progress import Progress
-
     messages = []
     with run_to_end(Progress([messages.append])) as context:
         context.open_folder(tmp_path)
@@ -215,8 +207,6 @@ def test_a_full_disk_still_ends_with_its_message(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr(os, "fsync", full)
-        from mu_addon.files import write_text
-
         write_text(tmp_path / "a.csv", "x")
     assert context.status == 5
     assert messages[-1]["type"] == "error"
@@ -291,12 +281,3 @@ def test_a_run_that_was_killed_is_told_by_the_next_one_in_its_folder(tmp_path):
         warned.append([m["what"] for m in messages if m["type"] == "warning"])
     assert ["was interrupted" in what for what in warned[0]] == [True]
     assert warned[1] == []
-
-
-def test_a_report_is_given_the_reason_of_a_stop(tmp_path):
-    given = []
-    with run_to_end(Progress()) as context:
-        context.open_folder(tmp_path)
-        context.report = given.append
-        raise KeyboardInterrupt
-    assert given == ["stopped by Ctrl-C"]

@@ -1,7 +1,7 @@
 """Files of every kind that is read, damaged at random: each is read or refused, and nothing else happens.
 
 The corpus is one sound file of each kind, and in fuzz.zip what a fuzzer found to reach other code
-(`python benchmarks/fuzz.py`). `MUTANTS=2000 python -m pytest tests/run/test_mutated_files.py` draws so many
+(`python -m benchmarks.fuzz`). `MUTANTS=2000 python -m pytest tests/run/test_mutated_files.py` draws so many
 of each; the same numbers give the same files, and `MUTANTS_SEED=2` others.
 """
 

@@ -65,7 +65,7 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
 
 @pytest.mark.parametrize("step", [251, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
-    """Each 251st call, to be quick; `python benchmarks/faults.py calls` has every one fail."""
+    """Each 251st call, to be quick; `python -m benchmarks.faults calls` has every one fail."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 

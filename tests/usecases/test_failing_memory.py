@@ -70,7 +70,7 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
 
 @pytest.mark.parametrize("step", [307, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
-    """What follows from the states of the unit and of its candidates; all of it by benchmarks/faults.py."""
+    """What follows from the states of the unit and of its candidates; all of it by `benchmarks.faults`."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
     assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 

@@ -8,14 +8,13 @@ another battery.
 
 from __future__ import annotations
 
-import argparse
 import json
 import multiprocessing
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
-from benchmarks.circumstances import circumstances
+from benchmarks.table import circumstances, options_of
 from mu_addon.run.processes import end_with_parent, one_thread_each
 
 from .battery import ROUNDS, row_of, shuffled
@@ -24,7 +23,7 @@ from .tables import report
 
 def main() -> None:
     """Judge what the file does not hold yet, then print rates."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options_of(__doc__)
     parser.add_argument("--seed", type=int, required=True, help="of the battery")
     parser.add_argument("--only", default=",".join(ROUNDS), help="classes, by commas")
     parser.add_argument("--rounds", type=int, default=1, help="each case of each class once a round")

@@ -57,13 +57,6 @@ class Limit:
         return "measured" if self.measured else "assumed" if self.assumed else "published"
 
 
-SUPPLIED = {
-    "support_mm": Limit(7.0, "a raft of 2 mm and supports of 5 mm above it; set your slicer's figures", True),
-    "layer_s": Limit(15.0, "exposure, peel and settling of a soft resin; your slicer's time by layers", True),
-}
-"""Defaults for files without these limits, as those of older versions."""
-
-
 @attrs.frozen
 class Printer:
     """A printer with a resin and a layer height; limits by the names of MEANING, which end with their units.
@@ -113,17 +106,14 @@ def read_printer(path: str | Path) -> Printer:
     document = parse(text, keys, str(path))
     if document.get("format") != 1 or document["format"] is True:
         raise InputError("the printer's file has no format = 1", place(str(path), None), "write format = 1")
-    missing = [name for name in MEANING if name not in document and name not in SUPPLIED]
+    missing = [name for name in MEANING if name not in document]
     if missing:
         raise InputError(
             f"a limit is missing: {missing[0]}, {MEANING[missing[0]]}",
             str(path),
             f"add [{missing[0]}] with value and source, or start from a shipped file",
         )
-    limits = {
-        name: _limit(name, document[name], str(path)) if name in document else SUPPLIED[name]
-        for name in MEANING
-    }
+    limits = {name: _limit(name, document[name], str(path)) for name in MEANING}
     if limits["support_mm"].value >= limits["build_z_mm"].value:
         raise InputError(
             "supports take the whole height of the build volume", f"{path}, [support_mm]", "correct it"

@@ -131,7 +131,7 @@ def resin_text(resin: Material | None) -> dict[str, str]:
 
 
 def read_resin(folder: Path, name: str) -> Material:
-    """Resin in a folder, or of the library for an older folder; raises InputError."""
+    """Resin in a folder, or of the library where the folder has none; raises InputError."""
     # Only now: a window that writes a job needs none of the solver's packages that come with it.
     from ...materials.library import load_material, read_material
 

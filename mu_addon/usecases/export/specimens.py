@@ -179,8 +179,8 @@ class Job:
 def read_job(folder: Path) -> Job:
     """The job that a folder of `specimens` describes; raises InputError."""
     values, _ = read_inputs(folder / LAYOUT.inputs)
-    printer = read_printer(folder / PRINTER) if "printer" in values else load_printer()
-    return Job(read_unit(folder / UNIT), read_resin(folder, str(values.get("resin"))), printer)
+    resin = read_resin(folder, str(values.get("resin")))
+    return Job(read_unit(folder / UNIT), resin, read_printer(folder / PRINTER))
 
 
 def make_specimens(job: Job, folder: Path, context: RunContext) -> None:

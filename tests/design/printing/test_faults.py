@@ -12,6 +12,7 @@ from mu_addon.design.lattice import lattice_of
 from mu_addon.design.printing.check import check
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
 from mu_addon.design.solid import build_solid, printable
+from mu_addon.errors import InputError
 
 from ..bodies import cylinder
 from . import parts
@@ -254,11 +255,13 @@ def test_supports_need_some_of_the_height():
     assert build_volume(20, 20, 203.5).severity == "error"
 
 
-def test_a_printers_file_without_supports_is_given_them(tmp_path):
+def test_a_printers_file_without_supports_is_refused(tmp_path):
     text = printer_text(load_printer())
     start = text.index("# height that supports")
-    (tmp_path / "old.toml").write_text(text[:start] + text[text.index("# height of a layer") :])
-    assert read_printer(tmp_path / "old.toml")["support_mm"] == 7.0
+    (tmp_path / "short.toml").write_text(text[:start] + text[text.index("# height of a layer") :])
+    with pytest.raises(InputError, match="a limit is missing: support_mm") as refused:
+        read_printer(tmp_path / "short.toml")
+    assert "add [support_mm] with value and source" in refused.value.remedy
 
 
 def without_a_strut():
