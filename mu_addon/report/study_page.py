@@ -33,10 +33,10 @@ def page_of(work: Execution, versions: Mapping[str, str], stopped: str = "") -> 
         ("files", "Files of this run", facts_table("file", "content", _files(work))),
         ("versions", "Versions", facts_table("program", "version", versions)),
     ]
-    said = [
+    listed = [
         part for _, parts in work.shown for part in flat(parts) if isinstance(part, Sentence) and part.note
     ]
-    notes = [*work.context.summary.get("warnings", []), *(part.text for part in said)]
+    notes = [*work.context.summary.get("warnings", []), *(part.text for part in listed)]
     return page(study.title(), signed(study.subtitle()), note(notes, stopped), lead, sections)
 
 

@@ -344,7 +344,7 @@ class Check(Study):
             "chamber_ml": ("resin to drain from chambers", ".3g", "ml"),
             "trapped_ml": ("resin trapped in sealed voids", ".3f", "ml"),
         }
-        said = [
+        lead = [
             Sentence(f"{strong}: {listed or 'every check passed'}.", answer=True, strong=strong),
             Sentence(
                 f"Built along {up}, away from the platform, on supports. Spheres mark findings: red must be "
@@ -364,7 +364,7 @@ class Check(Study):
 
             return [("places.png", places_picture(part.vertices, part.triangles, found, direction))]
 
-        yield Beside([said, Pictures(picture)])
+        yield Beside([lead, Pictures(picture)])
         yield File(PART, lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("check.json", lambda path: json_text(self._plain(part, found, printer, direction)))
         yield from self._summary(found, printer)
