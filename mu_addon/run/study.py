@@ -122,10 +122,6 @@ class Over:
     grows: Callable[[Any, Members], Sequence[Any]] | None = None
     choose: Callable[[Any, Sequence[Any], Members], Sequence[Any]] | None = None
 
-    def values(self, member: Any) -> dict[str, Any]:
-        """The parameters that a member gives."""
-        return dict(zip(self.names, member if len(self.names) > 1 else (member,), strict=True))
-
 
 @attrs.frozen
 class Stage:
@@ -148,9 +144,15 @@ class Stage:
         own = self.over.names if self.over else ()
         return tuple(p for p in parameters_of(self.method) if p not in own and p != TELL)
 
+    def of_member(self, member: Any) -> dict[str, Any]:
+        """The parameters that a member of its set gives."""
+        if self.over is None:
+            return {}
+        return dict(zip(self.over.names, member if len(self.over.names) > 1 else (member,), strict=True))
+
     def title_of(self, member: Any) -> str:
         """Its title, for a member of its set."""
-        return self.title.format(**self.over.values(member)) if self.over else self.title
+        return self.title.format(**self.of_member(member))
 
     @property
     def result_type(self) -> Any:

@@ -20,6 +20,7 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
 from mu_addon.run.parts import Fact, Sentence, csv
 from mu_addon.run.progress import Progress
+from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
 from mu_addon.run.study import Dropped, Over, Study, derived, section, setting, stage
 from mu_addon.studies import STUDIES, study
@@ -118,7 +119,7 @@ def test_every_stage_runs_once_and_its_results_are_shown(tmp_path):
     assert summary["points"] == {"done": 3, "complete": True}
     assert work.lines == ["unnamed was loaded"]
     assert (tmp_path / "curve.csv").read_text() == "load_N,moved_mm\n1.0,0.5\n2.0,1.0\n3.0,1.5\n"
-    assert work.value(("states", 3.0)).before == (1.0, 2.0)
+    assert work.results.value(("states", 3.0)).before == (1.0, 2.0)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +155,7 @@ def test_a_failed_member_is_told_and_drops_what_needs_it(tmp_path):
     assert summary["points"] == {"done": 1, "complete": False}
     assert summary["energy_mJ"] == pytest.approx(0.25)
     with pytest.raises(Dropped):
-        work.value(("states", 2.0))
+        work.results.value(("states", 2.0))
 
 
 def test_a_dropped_member_is_no_fault(tmp_path):
@@ -168,7 +169,7 @@ def test_a_killed_run_goes_on_at_the_first_member_that_is_missing(tmp_path, monk
         pass
 
     with monkeypatch.context() as patch:
-        patch.setattr(Execution, "_make", make_until(3.0, Killed))
+        patch.setattr(Results, "_make", make_until(3.0, Killed))
         with pytest.raises(Killed):
             run(tmp_path)
     context = RunContext(Progress())
@@ -178,7 +179,7 @@ def test_a_killed_run_goes_on_at_the_first_member_that_is_missing(tmp_path, monk
 
 
 def make_until(load, stop):
-    whole = Execution._make
+    whole = Results._make
 
     def make(self, task, name):
         if task == ("states", load):

@@ -1,0 +1,173 @@
+"""Results of a study: each made once, from what it depends on, and kept in the folder's cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from .cache import Cache, key
+from .progress import Progress
+from .stored import content, packed, unpacked
+from .study import TELL, Dropped, Members, Study, Tell, parameters_of
+
+Task = tuple[str, Any]
+"""A stage's name and a member of its set, None of a stage without one."""
+# Array of an entry of the cache with the hash of what it holds, whatever its own name.
+_CONTENT = "content"
+
+
+class Results:
+    """Inputs, derived values and results of a study: made, or read from the cache, when they are asked for.
+
+    members: of each stage that the study wants; failed: tasks that have no result, with the reason, "" of one
+    that was dropped.
+    """
+
+    def __init__(self, study: Study, folder: Path, progress: Progress) -> None:
+        self.study, self.folder, self.progress = study, folder, progress
+        self.cache = Cache(folder / "cache")
+        self.stages = study.stages()
+        wanted = {name: one for name, one in self.stages.items() if one.wanted(study)}
+        self.members = {n: list(s.over.members(study)) if s.over else [None] for n, s in wanted.items()}
+        self.failed: dict[Task, str] = {}
+        self._given: dict[str, Any] = {name: getattr(study, name) for name in study.inputs()}
+        self._contents: dict[str, str] = {}
+        self._values: dict[Task, Any] = {}
+        self._digests: dict[Task, str] = {}
+
+    def given(self, name: str) -> Any:
+        """An input, or a value derived from inputs; made once."""
+        if name not in self._given:
+            method = self.study.derived()[name]
+            self._given[name] = method(self.study, **{p: self.given(p) for p in parameters_of(method)})
+        return self._given[name]
+
+    def taken(self, task: Task, name: str) -> list[Task]:
+        """The tasks of which a task takes the results by one of its parameters; none for an input."""
+        if name not in self.stages:
+            return []
+        wanted = self._wanted(task, name)
+        return [(name, one) for one in (wanted if isinstance(wanted, list) else [wanted])]
+
+    def _wanted(self, task: Task, name: str) -> Any:
+        """What a task takes of another stage: a member, or a list of members."""
+        over = self.stages[task[0]].over
+        needs = over.needs(self.study, task[1]) if over else {}
+        if name in needs:
+            return needs[name]
+        return self.members.get(name, []) if self.stages[name].over else None
+
+    def key(self, task: Task) -> str | None:
+        """Hash of all that a task's result depends on; None while it lacks something that it takes."""
+        stage, member = self.stages[task[0]], task[1]
+        parts: list[Any] = [__version__, stage.name, stage.revision, content(member)]
+        for name in stage.needs:
+            if name not in self.stages:
+                parts += [name, self._content(name)]
+                continue
+            several = isinstance(self._wanted(task, name), list)
+            for one in self.taken(task, name):
+                digest = self.digest(one)
+                if digest is None and not (several and one in self.failed):
+                    return None
+                parts += [name, content(one[1]), digest or ""]
+        return key(*parts)
+
+    def _content(self, name: str) -> str:
+        if name not in self._contents:
+            self._contents[name] = content(self.given(name))
+        return self._contents[name]
+
+    def digest(self, task: Task) -> str | None:
+        """Hash of a result's content, or None while there is none."""
+        if task not in self._digests:
+            name = None if task in self.failed or task[0] not in self.members else self.key(task)
+            if name is None:
+                return None
+            if not self.stages[task[0]].kept:
+                self._digests[task] = name
+            elif not self._load(task, name):
+                return None
+        return self._digests[task]
+
+    def is_kept(self, task: Task) -> bool:
+        """Return True if a result is in the cache."""
+        return self.stages[task[0]].kept and self.digest(task) is not None
+
+    def is_there(self, task: Task) -> bool:
+        """Return True if a result can be given without the work of a stage of the run."""
+        stage = self.stages[task[0]]
+        if stage.title and not stage.kept:
+            return task in self._values
+        if not stage.kept:
+            every = [one for name in stage.needs for one in self.taken(task, name)]
+            if not all(one in self.failed or self.is_there(one) for one in every):
+                return False
+        return self.digest(task) is not None
+
+    def _load(self, task: Task, name: str) -> bool:
+        """Read a kept result, if the cache has it and it is of the stage's type."""
+        stage = self.stages[task[0]]
+        arrays = self.cache.get(stage.name, name)
+        if arrays is None or _CONTENT not in arrays:
+            return False
+        digest = str(arrays.pop(_CONTENT))
+        try:
+            self._values[task] = unpacked(stage.result_type, arrays)
+        except (ValueError, TypeError, InputError):
+            # Of a class that has changed since: made anew.
+            return False
+        self._digests[task] = digest
+        return True
+
+    def value(self, task: Task) -> Any:
+        """A result: remembered, from the cache, or made now. Raises Dropped where it has none."""
+        if task not in self._values:
+            name = None if task in self.failed or task[0] not in self.members else self.key(task)
+            if name is None:
+                raise Dropped
+            if not self.stages[task[0]].kept or not self._load(task, name):
+                self._make(task, name)
+        return self._values[task]
+
+    def several(self, name: str, members: Sequence[Any]) -> Members:
+        """Results of those members of a stage's set that have one."""
+        found = Members()
+        for member in members:
+            try:
+                found[member] = self.value((name, member))
+            except Dropped:
+                found.complete = False
+        return found
+
+    def _make(self, task: Task, name: str) -> None:
+        """Do the work of a task, and keep its result."""
+        stage, member = self.stages[task[0]], task[1]
+        values = {n: self._of_parameter(task, n) for n in stage.needs} | stage.of_member(member)
+        if TELL in parameters_of(stage.method):
+            values[TELL] = Tell(self.progress)
+        found = stage.method(self.study, **values)
+        self._values[task], self._digests[task] = found, name
+        if stage.kept:
+            arrays = packed(found)
+            digest = key(*(part for item in sorted(arrays.items()) for part in item))
+            self.cache.put(stage.name, name, {**arrays, _CONTENT: np.asarray(digest)})
+            self._digests[task] = digest
+
+    def _of_parameter(self, task: Task, name: str) -> Any:
+        if name not in self.stages:
+            return self.given(name)
+        wanted = self._wanted(task, name)
+        return self.several(name, wanted) if isinstance(wanted, list) else self.value((name, wanted))
+
+    def forget(self, is_needed: Callable[[str], bool]) -> None:
+        """Release results of stages that are not needed, and that are kept or can be made anew."""
+        for name, member in [*self._values]:
+            stage = self.stages[name]
+            if not is_needed(name) and (stage.kept or not stage.title):
+                del self._values[name, member]
