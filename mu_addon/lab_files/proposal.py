@@ -16,6 +16,7 @@ from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may
 from ..table_cells.notation import number
 from .blocks import Block, Unread
 from .columns import READ_IN, Column, column, plain, unit_of
+from .signs import LOADS, jumps, turned
 
 Array = np.ndarray[Any, Any]
 
@@ -44,8 +45,8 @@ _KEYS_OF_NUMBERS = (
     "gap_mm",
     *ACCURACIES,
 )
-# Columns that are asked for at most.
-_MOST_ASKED = 12
+# Columns that are asked for, and jumps of a column that are named, at most.
+_MOST_ASKED, _MOST_JUMPS = 12, 3
 # A column that is missing in a larger share of the rows is left out instead of them, where it may be.
 _SPARSE = 0.1
 # More degrees than a full turn in radians.
@@ -569,16 +570,27 @@ class _Proposing:
 
     def _signs(self, columns: dict[str, Array], kind: str) -> None:
         """Set signs: compression positive in a lattice block; a coupon's force with its stretch's sign."""
-        pairs = [name for name in ("strain", "displacement_mm", "stress_kPa", "force_N") if name in columns]
-        negative = [name for name in pairs if _extreme(columns[name]) < 0]
-        differ = kind == "coupon" and len(negative) < len(pairs)
-        turned = negative if kind == "lattice_compression" or differ else []
-        for name in turned:
-            columns[name] = -columns[name]
+        pairs = [name for name in LOADS if name in columns]
+        if kind not in ("coupon", "lattice_compression") or not pairs:
+            return
+        lines = self.block.lines[self.keep]
+        for name in pairs:
+            for row in jumps(columns, name)[:_MOST_JUMPS]:
+                by = columns[name][row] - columns[name][row - 1]
+                self.concluded.append(
+                    f"{name}: jumps by {by:.4g} at line {lines[row]} while the test goes on; check it"
+                )
+        pressed = kind == "lattice_compression"
+        found = turned(columns, pressed)
+        if self._choice("sign", ("as_read",)):
+            return
+        for name in found:
+            columns[name] = 0.0 - columns[name]
             self.concluded.append(
-                f"{name}: sign turned, positive in {'compression' if kind != 'coupon' else 'tension'}"
+                f"{name}: sign turned, positive in {'compression' if pressed else 'tension'} "
+                "(sign=as_read keeps it)"
             )
-        if kind == "coupon" and negative and not turned:
+        if not pressed and not found and all(np.nanmean(columns[name]) < 0 for name in pairs):
             self.concluded.append("force and displacement are negative: read as compression of the coupon")
 
     def _zero(self, columns: dict[str, Array]) -> None:
@@ -746,8 +758,3 @@ def stepped(columns: Mapping[str, Array]) -> bool:
         return False
     later = np.interp(t + _WITHIN * lasts, t, p)
     return bool(np.abs(later - p).max() >= _STEP * extent)
-
-
-def _extreme(values: Array) -> float:
-    """The value of the largest magnitude."""
-    return float(values[np.nanargmax(np.abs(values))])

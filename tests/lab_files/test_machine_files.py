@@ -562,3 +562,40 @@ def test_a_stray_quote_among_titles_joins_no_two_of_them(tmp_path):
     (proposal,) = understand([tmp_path / "a.csv"], COUPON).proposals
     assert "displacement_mm" in proposal.columns
     assert proposal.columns["displacement_mm"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+RAMP = np.arange(120.0)
+SLIPPED = np.where(RAMP < 50, RAMP, -157.0 - 0.05 * RAMP)
+SPIKED = np.where(RAMP == 60, -9000.0, RAMP)
+CYCLE = 100.0 * np.sin(RAMP / 119 * 4 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mm", "newton", "signs", "named"),
+    [
+        ("coupon", SLIPPED, RAMP, (1, 1), ("displacement_mm", 52)),
+        ("coupon", RAMP, SPIKED, (1, 1), ("force_N", 62)),
+        ("coupon", RAMP, -SPIKED, (1, -1), ("force_N", 62)),
+        ("coupon", -SPIKED, -RAMP, (1, 1), ("displacement_mm", 62)),
+        ("coupon", RAMP, RAMP - 110, (1, 1), None),
+        ("coupon", CYCLE, -2 * CYCLE, (-1, 1), None),
+        ("coupon", CYCLE, np.where(CYCLE < 0, 3, 1) * CYCLE, (1, 1), None),
+        ("coupon", np.minimum(RAMP, 60), np.minimum(RAMP, 60) - 100 * (RAMP > 60), (1, 1), ("force_N", 63)),
+        ("lattice_compression", -RAMP, SPIKED, (-1, 1), ("force_N", 62)),
+        ("lattice_compression", -np.where(RAMP < 3, 0, 100), -np.where(RAMP < 3, 0, 90), (-1, -1), None),
+    ],
+)
+def test_the_sign_of_a_column_is_that_of_its_course_not_of_one_reading(
+    tmp_path, kind, mm, newton, signs, named
+):
+    body = [
+        f"{0.1 * i:.1f},{0.1 * f:.3f},{0.01 * x:.4f}" for i, (x, f) in enumerate(zip(mm, newton, strict=True))
+    ]
+    keys = COUPON | {"kind": kind}
+    p, _ = one(tmp_path, lines(TITLES, *body), keys | {"zero": "as_read"})
+    assert p.columns["displacement_mm"] == pytest.approx(signs[0] * 0.01 * mm, abs=1e-4)
+    assert p.columns["force_N"] == pytest.approx(signs[1] * 0.1 * newton, abs=1e-3)
+    told = [words for words in p.concluded if "jumps" in words]
+    assert not told if named is None else told[0].startswith(named[0]) and f"line {named[1]} " in told[0]
+    kept, _ = one(tmp_path, lines(TITLES, *body), keys | {"zero": "as_read", "sign": "as_read"})
+    assert kept.columns["force_N"] == pytest.approx(0.1 * newton, abs=1e-3)

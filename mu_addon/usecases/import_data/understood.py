@@ -24,6 +24,7 @@ KEYS = (
     "length_mm",
     "interval_s",
     "zero",
+    "sign",
     "specimen",
     "role",
     "plates",
