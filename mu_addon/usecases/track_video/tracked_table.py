@@ -39,7 +39,7 @@ _ABOVE, _BELOW = 6, 4
 _OWN = {"right": 0, "down": 1}
 _OWN_TITLE = re.compile(r"(?P<name>.+) (?P<axis>right|down)_px")
 _TITLE = re.compile(
-    r"(?:(?P<name>.+?)[\s_.:/-]+)?(?P<axis>[xy])(?:[\s_]*(?:[(\[](?P<unit>[^)\]]*)[)\]]|(?P<plain>px|pixels?|mm)))?",
+    r"(?:(?P<name>.+?)[\s_.:/-]+)?(?P<axis>[xyz])(?:[\s_]*(?:[(\[](?P<unit>[^)\]]*)[)\]]|(?P<plain>px|pixels?|mm)))?",
     re.IGNORECASE,
 )
 _NO_NAMES = ("position", "pos", "center", "centroid", "coord", "image")
@@ -53,18 +53,25 @@ _LAYOUTS = (
     "name the columns `NAME right_px` and `NAME down_px`, a row a frame; or export, in pixels, NAME x and "
     "NAME y for each marker, frame, id, x and y in each row, or DeepLabCut's CSV"
 )
+_PLANE = (
+    "write the two axes of the bending plane of each marker as `NAME right_px` (y) and `NAME down_px` (-z), "
+    "in mm, with mm_per_pixel = 1 in the description"
+)
+# The markers of a picture extend over more pixels than this; in m they do not.
+_LEAST_PX = 1.0
 
 
 @attrs.frozen
 class _Layout:
     """Position of everything in a table.
 
-    heading: row of the titles; markers: columns of x and y by name, "" if the rows have names; likelihood:
-    its column by name; own: True for this program's layout.
+    heading: row of the titles; markers: columns of x and y by name, "" if the rows have names; depth: columns
+    of z; likelihood: its column by name; own: True for this program's layout.
     """
 
     heading: int
     markers: Mapping[str, tuple[int, int]]
+    depth: Sequence[int]
     likelihood: Mapping[str, int]
     titles: Sequence[str]
     frame: int | None
@@ -112,13 +119,14 @@ def _layout(lines: Sequence[Line], where: str) -> _Layout:
             if plain[0] == "coords":
                 frame = 0
             id_ = next((places[name] for name in _IDS if name in places), None)
-            return _Layout(n, markers, likelihood, titles, frame, id_ if "" in markers else None, own)
+            depth = [k for _, axis, k in found if axis == 2]
+            return _Layout(n, markers, depth, likelihood, titles, frame, id_ if "" in markers else None, own)
         above.append(titles)
     raise InputError("the file contains no tracked markers", where, _LAYOUTS)
 
 
 def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tuple[str, int, int]]:
-    """Name, axis (0 or 1) and column of each position that these titles name."""
+    """Name, axis (0, 1 or 2) and column of each position that these titles name."""
     found = []
     for k, title in enumerate(titles):
         if match := _OWN_TITLE.fullmatch(title):
@@ -126,8 +134,8 @@ def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tupl
         elif match := _TITLE.fullmatch(title):
             name = match["name"] or ""
             name = "" if name.casefold() in _NO_NAMES else name
-            found.append((name, "xy".index(match["axis"].casefold()), k))
-    if len({axis for _, axis, _ in found}) < 2 and not any(_OWN_TITLE.fullmatch(t) for t in titles):
+            found.append((name, "xyz".index(match["axis"].casefold()), k))
+    if len({axis for _, axis, _ in found} - {2}) < 2 and not any(_OWN_TITLE.fullmatch(t) for t in titles):
         return []
     if above and not any(name for name, _, _ in found):
         # DeepLabCut names individuals, too, where there are several.
@@ -148,8 +156,13 @@ def _paired(
 ) -> tuple[dict[str, tuple[int, int]], dict[str, int]]:
     """Columns of x and y by name, and of the likelihood; raises InputError for one without the other."""
     columns: dict[str, dict[int, int]] = {}
+    spatial = any(axis == 2 for _, axis, _ in found)
     for name, axis, k in found:
+        if axis == 2:
+            continue
         if axis in columns.setdefault(name, {}):
+            if spatial:
+                raise InputError("the table has three axes, with several columns for one", where, _PLANE)
             raise InputError(
                 f"two columns hold the {'xy'[axis]} of {name or 'a marker without a name'}",
                 where,
@@ -200,8 +213,7 @@ def _in_pixels(layout: _Layout, units: Sequence[str], where: str) -> _Layout:
         else:
             other = other or f"column {layout.titles[pair[0]]!r} is in {found[0]}, not in pixels"
     if not kept:
-        remedy = "export the positions in pixels; the description of the video gives the scale"
-        raise InputError(other, where, remedy)
+        raise InputError(other, where, f"export the positions in pixels, or {_PLANE}")
     return attrs.evolve(layout, markers=kept)
 
 
@@ -285,6 +297,15 @@ class _Table:
 
     def _tracks(self, names: tuple[str, ...], pixels: Array, time_s: Array | None) -> Tracks:
         if not self.layout.own:
+            self._require_plane()
+            seen = pixels[np.isfinite(pixels).all(axis=2)]
+            extent = np.ptp(seen, axis=0).max() if len(seen) else np.inf
+            if extent < _LEAST_PX:
+                raise InputError(
+                    f"the positions of all markers lie within {extent:.3g}: they are not in pixels",
+                    self.where,
+                    f"export pixels, or {_PLANE}",
+                )
             if np.nanmin(pixels, initial=0.0) < -1.0:
                 raise InputError(
                     "positions are negative: its coordinates are not those of the picture",
@@ -299,6 +320,17 @@ class _Table:
                 )
             )
         return Tracks(names, pixels, time_s=time_s, remarks=tuple(self.remarks))
+
+    def _require_plane(self) -> None:
+        """Raise InputError for markers that move along a third axis; a tracker of pictures writes 0."""
+        for k in self.layout.depth:
+            depth = self._numbers(k)
+            if len(np.unique(depth[np.isfinite(depth)])) > 1:
+                raise InputError(
+                    f"column {self.layout.titles[k]!r} varies: the table has three axes, as motion capture",
+                    self.where,
+                    _PLANE,
+                )
 
     def _time(self, units: Sequence[str]) -> tuple[int | None, float]:
         """Column of the time, and seconds of its unit; None without one."""
