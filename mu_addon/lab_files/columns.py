@@ -62,7 +62,7 @@ _SPELT: dict[str, dict[str, float]] = {
     },
     "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "\u00ba"), 1.0),
     "": {
-        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1"), 1.0),
+        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1", "-"), 1.0),
         "%": 1e-2,
         **dict.fromkeys(
             ("\u00b5\u03b5", "\u03bc\u03b5", "ue", "microstrain", "\u00b5m/m", "\u03bcm/m"), 1e-6
@@ -113,6 +113,7 @@ _WORDS = tuple(
         ),
         ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
         ("angle", r"angle|winkel|angolo|angulo|\bkat\b|hoek|vinkel|kulma|szog|\buhel|\baci\b|угол|角度|각도"),
+        ("stretch", r"\bstretch\b|stretch ratio|\blambda\b|\u03bb|streckung|streckverhaltnis|etirement"),
         (
             "strain",
             r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria|\brek\b|"
@@ -144,7 +145,7 @@ _WORDS = tuple(
         ("added_mass", r"added.mass|zusatzmasse"),
         (
             "displacement",
-            r"extension|displacement|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"extension|displacement|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
             r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
             r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
             r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
@@ -163,8 +164,10 @@ _WORDS = tuple(
         ),
     )
 )
-# Units that quantities are read in; a machine's position is a displacement, a count is not read.
-READ_IN = {**UNITS, "position": "mm", "count": ""}
+# Units that quantities are read in. A machine's position is a displacement, a stretch (1 at rest) a strain; a
+# count is not read.
+READ_IN = {**UNITS, "position": "mm", "stretch": "", "count": ""}
+READ_AS = {"position": "displacement", "stretch": "strain"}
 # Never concluded from a unit, which suggests a more usual quantity.
 _ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
 _UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
@@ -208,14 +211,21 @@ def column(title: str, unit: str = "") -> Column:
         name, unit = _apart(title)
     unit = unit.strip().strip("()[]{}").strip()
     known = unit_of(unit) if unit else None
+    if known and known[1] == 60.0 and unit.casefold() == "min" and _meant(name, "s") != "time":
+        # A minimum, as beside a (Max).
+        name, unit, known = title, "", None
     if unit and not known and _COMPOUND.fullmatch(unit):
         return Column(title, "count", unit, None)
     meant = _meant(name)
     if meant == "count" and not (known and known[0]):
         return Column(title, "count", unit, None)
+    if known and known[0] == "g" and meant == "force":
+        return Column(title, meant, unit, known_in("force", unit))
     quantity = _meant(name, known[0]) if known else meant
     if quantity == "count" or (not known and quantity == "strain" and not unit):
         return Column(title, quantity, unit, None)
+    if quantity == "stretch":
+        return Column(title, quantity, unit, known[1] if known else 1.0)
     if quantity or not known or not known[0]:
         return Column(title, quantity, unit, known[1] if known else None)
     # The unit says it, where only one quantity has it, or the title speaks of another one of a test.
@@ -234,6 +244,17 @@ def unit_of(text: str) -> tuple[str, float] | None:
     if text in _BY_CASE:
         return _BY_CASE[text]
     return _UNITS.get(text.casefold()) or (_UNITS.get(text[:-1].casefold()) if text.endswith(".") else None)
+
+
+def known_in(quantity: str, text: str) -> float | None:
+    """Factor from a unit to that in which a quantity is read, None for the unit of another quantity.
+
+    A force in g or kg is the weight of that mass.
+    """
+    known = unit_of(text) if text else None
+    if known and quantity == "force" and known[0] == "g":
+        return known[1] * _KILOPOND / 1000.0
+    return known[1] if known and known[0] == READ_IN[quantity] else None
 
 
 def is_unit(cell: str) -> bool:

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may_be_missing, named
 from ..table_cells.notation import number
 from .blocks import Block, Unread
-from .columns import READ_IN, Column, column, plain, unit_of
+from .columns import READ_AS, READ_IN, Column, column, known_in, plain, unit_of
 from .signs import LOADS, jumps, turned
 
 Array = np.ndarray[Any, Any]
@@ -49,6 +49,14 @@ _KEYS_OF_NUMBERS = (
 _MOST_ASKED, _MOST_JUMPS = 12, 3
 # A column that is missing in a larger share of the rows is left out instead of them, where it may be.
 _SPARSE = 0.1
+# Titles of a table of amplitudes, by frequency or temperature.
+_OSCILLATION = re.compile(
+    r"oscillat|\bosz|amplitud|(storage|loss|complex) mod|speichermod|verlustmod|module de (conservation|"
+    r"perte)|modulo (elastico|viscoso)|tan ?\W?(delta|d\b|\u03b4)|loss factor|verlustfaktor|"
+    r"\b[eg]['\u2032\"\u2033]|\bfrequen|\bfreq\b|\bf ?[/\[(] ?hz|phase angle|phasenwinkel"
+)
+# A stretch at rest is 1, a strain 0, within this.
+_AT_REST = 0.1
 # More degrees than a full turn in radians.
 _NO_RADIANS = 7.0
 # A pressure that goes this share of its range within that share of a record, read so many times a second.
@@ -160,6 +168,7 @@ class _Proposing:
         kind = self._kind(columns)
         if kind:
             self._interval(columns, origin, kind)
+            self._require_curve(kind)
             self._require_needed(columns, kind)
             columns = self._of_kind(columns, kind)
             columns = self._complete(columns, kind)
@@ -217,14 +226,15 @@ class _Proposing:
             if not one.quantity or one.quantity == "count":
                 self.free.append(k)
                 continue
+            one = self._stretch(self._weight(one, k), k)
             if one.factor is None:
                 one = self._unit(one, k)
             if one.stated and one.stated != one.quantity:
                 self.concluded.append(f"{self._title(k)} is read as {one.quantity}, by its unit")
-            values = self.block.values[:, k] * (one.factor or 1.0)
+            values = self.block.values[:, k] * (one.factor or 1.0) - (one.quantity == "stretch")
             read = f" [{one.unit}]" if one.unit else ""
             source = f"{one.title or f'column {one.place}'!r}{read}"
-            target = named("displacement" if one.quantity == "position" else one.quantity)
+            target = named(READ_AS.get(one.quantity, one.quantity))
             # A clock beside a numeric time adds nothing; nor does a machine's position beside an extension.
             first = self.places.get(target)
             if one.quantity == "position":
@@ -246,6 +256,48 @@ class _Proposing:
                 columns["displacement_mm"], origin["displacement_mm"] = values, source
                 self.places["displacement_mm"] = k
         return columns, origin
+
+    def _weight(self, one: Column, k: int) -> Column:
+        """A load in grams as the weight of that mass, or as a mass that bends a beam."""
+        unit = unit_of(one.unit) if one.unit else None
+        if unit is None or unit[0] != "g" or one.quantity not in ("force", "added_mass"):
+            return one
+        others = {other.quantity for other in self.block.columns}
+        kind = self.answers.get("kind", "beam_deadweight" if "tip_deflection" in others else "")
+        if kind == "beam_deadweight":
+            return attrs.evolve(one, quantity="added_mass", factor=unit[1])
+        forced = kind in KINDS and "force_N" in KINDS[kind].columns and "force" not in others
+        if one.quantity == "force" or forced:
+            self.concluded.append(
+                f"{self._title(k)} is read as a force, the weight of that mass: 1 {one.unit} is "
+                f"{known_in('force', one.unit):.6g} N"
+            )
+            return attrs.evolve(one, quantity="force", factor=known_in("force", one.unit))
+        return one
+
+    def _stretch(self, one: Column, k: int) -> Column:
+        """A stretch, 1 or 100 % at rest, and a strain, 0 at rest, told apart by the first reading."""
+        if one.quantity not in ("stretch", "strain"):
+            return one
+        values = self.block.values[:, k]
+        first = float(values[np.isfinite(values)][0]) * (one.factor or 1.0)
+        answered = self._answer("column", one)[1] is not None
+        if one.quantity == "stretch":
+            if abs(first - 100.0) < 100.0 * _AT_REST and not unit_of(one.unit):
+                one = attrs.evolve(one, unit="%", factor=0.01)
+            elif abs(first) < _AT_REST and not answered:
+                self.concluded.append(
+                    f"{self._title(k)} is read as a strain: it begins at {first:g}, not at 1"
+                )
+                return attrs.evolve(one, quantity="strain", factor=one.factor if one.unit else None)
+            self.concluded.append(f"{self._title(k)} is read as a stretch: the strain is its value less 1")
+        elif abs(first - 1.0) < _AT_REST or (one.factor is None and abs(first - 100.0) < 100.0 * _AT_REST):
+            words = f"{self._title(k)} begins at {first:g}, as a stretch does, and a strain at 0"
+            if answered:
+                self.concluded.append(f"{words}: column.{self._name(one)}=stretch if it is one")
+            else:
+                self._ask(f"column.{self._name(one)}", words, ("strain", "stretch"), "stretch")
+        return one
 
     def _again(self, k: int, first: int, one: Column) -> None:
         self.unread.append(Unread(self._title(k), f"another {one.quantity}: {self._title(first)} is read"))
@@ -288,9 +340,10 @@ class _Proposing:
             )
         if one.unit == "clock" and answer == "time":
             return one
-        known = unit_of(one.unit) if one.unit else None
-        fits = known is not None and known[0] == READ_IN[answer]
-        return attrs.evolve(one, quantity=answer, factor=known[1] if known and fits else None, stated="")
+        factor = known_in(answer, one.unit)
+        if answer == "stretch" and factor is None:
+            factor = 1.0
+        return attrs.evolve(one, quantity=answer, factor=factor, stated="")
 
     def _ask_column(self, k: int, quantities: Sequence[str], words: str, why: str = "") -> None:
         """Ask for the quantity of a column."""
@@ -330,17 +383,15 @@ class _Proposing:
                 )
             )
             return attrs.evolve(one, factor=1.0)
-        known = (wanted, 1.0) if answer == "" or answer == wanted else unit_of(answer)
-        if answer == "1" and wanted == "":
-            known = ("", 1.0)
-        if known is None or known[0] != wanted:
+        factor = 1.0 if answer in ("", wanted) else known_in(one.quantity, answer)
+        if factor is None:
             raise InputError(
                 f"{key} = {answer!r} is not a unit of {one.quantity}",
                 self.where,
                 f"choose one of {', '.join(_OFTEN[wanted])}; column.{self._name(one)}=QUANTITY says that "
                 f"it is no {one.quantity}",
             )
-        return attrs.evolve(one, unit=answer, factor=known[1])
+        return attrs.evolve(one, unit=answer, factor=factor)
 
     def _likely(self, one: Column, k: int) -> str:
         """The likely unit: of strain and of time by the size of the values."""
@@ -450,13 +501,26 @@ class _Proposing:
             if len(unknown) == 1 and len(wanted) == 1:
                 self.questions[-1] = attrs.evolve(self.questions[-1], proposed=wanted[0])
 
+    def _require_curve(self, kind: str) -> None:
+        """Raise NoExperiment for loads that are amplitudes of an oscillation; an answered column is none."""
+        if kind not in ("coupon", "lattice_compression"):
+            return
+        for k, one in enumerate(self.block.columns):
+            if _OSCILLATION.search(plain(one.title)) and self._answer("column", one)[1] is None:
+                raise NoExperiment(
+                    f"{self._title(k)} shows a test by oscillation: its loads are amplitudes, and no "
+                    "stress-strain curve",
+                    self.where,
+                    "export a test of one pull or pressing; if each row is a reading of one, answer "
+                    f"column.{self._name(one)}=none, or with its quantity",
+                )
+
     def _may_be(self, k: int, quantities: Sequence[str]) -> bool:
         """Return True if an unread column may hold one of these quantities, by its unit."""
         one = self.block.columns[k]
         if self._answer("column", one)[1] is not None or (one.quantity == "count" and one.unit):
             return False
-        known = unit_of(one.unit) if one.unit else None
-        return known is None or any(READ_IN[q] == known[0] for q in quantities)
+        return unit_of(one.unit) is None or any(known_in(q, one.unit) is not None for q in quantities)
 
     def _loading(self) -> str:
         """Kind of loading, tension of a specimen or compression of a lattice, by the file's text."""

@@ -599,3 +599,57 @@ def test_the_sign_of_a_column_is_that_of_its_course_not_of_one_reading(
     assert not told if named is None else told[0].startswith(named[0]) and f"line {named[1]} " in told[0]
     kept, _ = one(tmp_path, lines(TITLES, *body), keys | {"zero": "as_read", "sign": "as_read"})
     assert kept.columns["force_N"] == pytest.approx(0.1 * newton, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("titles", "cells", "answers", "column", "last"),
+    [
+        ("Load (g),Extension (mm)", "{i},{i}", {}, "force_N", 49 * 9.80665e-3),
+        ("Kraft [kg],Weg [mm]", "{i},{i}", {}, "force_N", 49 * 9.80665),
+        ("Weight (g),Extension (mm)", "{i},{i}", {}, "force_N", 49 * 9.80665e-3),
+        ("W,Weg (mm)", "{i},{i}", {"column.W": "force", "unit.W": "g"}, "force_N", 49 * 9.80665e-3),
+        ("Load (g),Tip deflection (mm)", "{i},{i}", {"kind": "beam_deadweight"}, "added_mass_g", 49),
+        ("Stretch,Nominal stress (kPa)", "1.{i:02d},{i}", {}, "strain", 0.49),
+        ("lambda [-],Stress [kPa]", "1.{i:02d},{i}", {}, "strain", 0.49),
+        ("Stretch [%],Stress [kPa]", "1{i:02d},{i}", {}, "strain", 0.49),
+        ("Stretch [%],Stress [kPa]", "{i},{i}", {}, "strain", 0.49),
+        ("Stretch (mm),Force (N)", "{i},{i}", {}, "displacement_mm", 49),
+        ("Strain [-],Stress [kPa]", "1.{i:02d},{i}", {"column.Strain [-]": "stretch"}, "strain", 0.49),
+        ("Strain [-],Stress [kPa]", "1.{i:02d},{i}", {"column.Strain [-]": "strain"}, "strain", 1.49),
+    ],
+)  # fmt: skip
+def test_what_a_title_means_beside_its_unit_and_its_first_reading(
+    tmp_path, titles, cells, answers, column, last
+):
+    body = [cells.format(i=i) for i in range(50)]
+    p, _ = one(tmp_path, lines(titles, *body), COUPON | answers)
+    assert p.columns[column][-1] == pytest.approx(last)
+
+
+def test_a_strain_that_begins_at_one_is_asked_for(tmp_path):
+    text = lines("Strain [-],Stress [kPa]", *(f"1.{i:02d},{i}" for i in range(50)))
+    assert [(q.key, q.proposed) for _, q in understood(tmp_path, text).open] == [
+        ("column.Strain [-]", "stretch")
+    ]
+    text = lines("Reading,Force (N),Signal(Min)", *(f"{i},{i},4{i}" for i in range(12)))
+    asked = {q.key: q.proposed for _, q in understood(tmp_path, text, {}).asked}
+    assert "time" not in asked.values()
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "Frequency,Temperature,Oscillation strain,Oscillation stress,Storage modulus",
+        "Zeit,Temp,Dehnung,Spannung,Speichermodul E'",
+        "Freq,Temp,Strain,Stress,Tan(delta)",
+        "t,T,Strain,Stress,G''",
+    ],
+)
+def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
+    text = lines(titles, "Hz,\u00b0C,%,kPa,kPa", *(f"1,{25 + i},0.1,{80 - i},{80 - i}" for i in range(40)))
+    with pytest.raises(InputError, match="oscillation"):
+        understood(tmp_path, text)
+    said = {f"column.{titles.split(',')[k]}": "none" for k in (0, 4)}
+    if "Oscillation" in titles:
+        said |= {"column.Oscillation strain": "strain", "column.Oscillation stress": "stress"}
+    assert len(understood(tmp_path, text, COUPON | said).proposals[0].lines) == 40
