@@ -134,6 +134,11 @@ def test_a_device_that_starts_anew() -> None:
         ("csv", "{0},7.5\n"),
         ("csv", "{0} 7.5\r\n"),
         ("csv", "{0};7.5\n"),
+        ("csv", "{0},7.5,\n"),
+        ("csv", "({0}, 7.5)\r\n"),
+        ("csv", "[{0}, 7.5]\r\n"),
+        ("csv", "{0} | 7.5\n"),
+        ("labels", "light:\t{0}\t| dark:\t7.5\r\n"),
     ],
 )
 def test_text_is_told_apart(name: str, line: str) -> None:
