@@ -55,7 +55,9 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("mmHg", "Torr"), 101.325 / 760.0),
         "\u043a\u043f\u0430": 1.0,
         "atm": 101.325,
-        "cmH2O": 0.0980665,
+        **dict.fromkeys(("mmH2O", "mmWC", "mmWS"), 0.00980665),
+        **dict.fromkeys(("cmH2O", "cmWC", "cmWS"), 0.0980665),
+        "inH2O": _INCH * 0.00980665,
         "inHg": _INCH * 101.325 / 760.0,
         "ksi": 1e3 * CONVERTED["kPa"]["psi"],
         "hPa": 0.1,
@@ -92,6 +94,11 @@ _BY_CASE = {
     "v": None,
     "H": None,
 }
+
+
+# A unit of pressure with the zero it counts from, such as psia, bar(g) and kPa abs, and titles that say so.
+_REFERENCE = re.compile(r"(psi|m?bar|[kmh]?pa|torr|mmhg)[ _]?[(\[]?(a|abs\.?|absolute?|g|ga|gauge)[)\]]?")
+_ABSOLUTE = re.compile(r"\babsolut\w*|\babs\b|\bgauge (?=press)")
 
 
 def plain(text: str) -> str:
@@ -196,6 +203,13 @@ class Column:
     stated: str = ""
 
     @property
+    def reference(self) -> str:
+        """Whether unit or title say of a pressure that it is "absolute" or "gauge"; "" for neither."""
+        said = _REFERENCE.fullmatch(self.unit.casefold())
+        word = said[2] if said else (_ABSOLUTE.search(plain(self.title)) or [""])[0]
+        return {"a": "absolute", "g": "gauge", "": ""}[word[:1]] if self.quantity == "pressure" else ""
+
+    @property
     def name(self) -> str:
         """Its title, or its number without one, as used in answers."""
         return self.title or str(self.place)
@@ -243,6 +257,8 @@ def unit_of(text: str) -> tuple[str, float] | None:
     text = unicodedata.normalize("NFC", text.strip().strip("()[]{}").strip())
     if text in _BY_CASE:
         return _BY_CASE[text]
+    if said := _REFERENCE.fullmatch(text.casefold()):
+        return unit_of(text[: said.end(1)])
     return _UNITS.get(text.casefold()) or (_UNITS.get(text[:-1].casefold()) if text.endswith(".") else None)
 
 

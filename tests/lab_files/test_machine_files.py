@@ -653,3 +653,40 @@ def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
     if "Oscillation" in titles:
         said |= {"column.Oscillation strain": "strain", "column.Oscillation stress": "stress"}
     assert len(understood(tmp_path, text, COUPON | said).proposals[0].lines) == 40
+
+
+def test_a_unit_that_changes_within_a_column_is_that_of_each_row(tmp_path):
+    body = [f"{i}, {'%g mN' % (100 * i) if i < 40 else '%g N' % (0.1 * i)}, {i} mm" for i in range(80)]
+    p, told = one(tmp_path, lines("Time (s),Load,Extension", *body))
+    assert p.columns["force_N"] == pytest.approx(0.1 * np.arange(80))
+    assert told == []
+    assert any("changes from 'mN' to 'N' at line 42" in words for words in p.concluded)
+
+
+@pytest.mark.parametrize("written", ["{i},5", "{i},125", "0,{i:03d}"])
+def test_decimal_signs_that_alternate_are_named_with_their_lines(tmp_path, written):
+    cells = [written.format(i=10 + i) for i in range(40)]
+    body = [f"{i};{c if i % 2 else c.replace(',', '.')};{i}" for i, c in enumerate(cells)]
+    with pytest.raises(InputError, match="alternate") as caught:
+        understood(tmp_path, lines("Time (s);Load (N);Extension (mm)", *body))
+    assert re.search(r"line \d", caught.value.where)
+
+
+@pytest.mark.parametrize(
+    ("head", "length", "section"),
+    [
+        ('Strain : Tensile strain (Displacement) gauge length,"80.00000",mm', 80.0, None),
+        ("Gauge length;80;mm\nWidth;10;mm\nThickness;2;mm", 80.0, [10.0, 2.0]),
+        ("Gauge length [mm]: 80\nWidth [mm]: 10\nThickness [mm]: 2", 80.0, [10.0, 2.0]),
+        ("Width,mm,10\nThickness,mm,2\nGauge length,cm,8", 80.0, [10.0, 2.0]),
+        ("Specimen of width 10 mm, thickness 2 mm and gauge length 80 mm", 80.0, [10.0, 2.0]),
+        ("Cross section: 10 x 2 mm", None, [10.0, 2.0]),
+        ("Area (mm2);20", None, [20.0**0.5, 20.0**0.5]),
+        ("width and thickness were 10 mm and 2 mm", None, None),
+    ],
+)
+def test_dimensions_in_the_head_of_a_file(tmp_path, head, length, section):
+    found = understood(tmp_path, lines(head, "", TITLES, *rows()), {"kind": "coupon", "mode": "uniaxial"})
+    keys = found.proposals[0].keys
+    assert keys.get("length_mm") == length
+    assert keys.get("section_mm") == (section and pytest.approx(section, abs=1e-5))

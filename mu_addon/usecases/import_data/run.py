@@ -11,7 +11,8 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
-from ...lab_files.proposal import Proposal, Question
+from ...lab_files.draft import Question
+from ...lab_files.proposal import Proposal
 from ...measured.table import Remark
 from ...measured.writing import csv_text, file_stem, put, require_free, tried
 from ...run.context import RunContext

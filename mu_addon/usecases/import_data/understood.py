@@ -9,7 +9,8 @@ import attrs
 
 from ...errors import InputError
 from ...lab_files.blocks import Block, tables
-from ...lab_files.proposal import NoExperiment, Proposal, Question, answers_for, propose
+from ...lab_files.draft import NoExperiment, Question
+from ...lab_files.proposal import Proposal, answers_for, propose
 from ...lab_files.source import Sheet, read_sheets
 from ...measured.kinds import ACCURACIES
 from ...table_cells.notation import DECIMALS
