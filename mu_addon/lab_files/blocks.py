@@ -19,7 +19,7 @@ from ..table_cells.clock import clock, is_clock
 from ..table_cells.dialect import BRACKET, Row, split
 from ..table_cells.notation import Numbers, is_like_number, judged, number, unit_behind, with_units
 from .columns import Column, column, is_unit, plain, unit_of
-from .source import Sheet
+from .sheet import Sheet
 
 Array = np.ndarray[Any, Any]
 
@@ -293,7 +293,7 @@ class _Finding:
             row = self._title_row(k, width)
             if not row.filled:
                 continue
-            if not _is_titles(row):
+            if not (_is_titles(row) or (self.fewest == 1 and _known(row))):
                 within = self.numeric[k] & self.usual
                 if found or len(damaged) == _MOST_BETWEEN or not (within or len(row.filled) == 1):
                     break
@@ -357,7 +357,7 @@ def _is_units(row: Row) -> bool:
     filled = row.filled
     if all(re.fullmatch(r"[(\[].*[)\]]", cell) for cell in filled):
         return True
-    known = sum(map(is_unit, filled))
+    known = sum(is_unit(cell) and cell != "-" for cell in filled)
     return (
         2 * known >= len(filled) and all(is_unit(c) or len(c) <= _LONGEST_UNIT for c in filled) and known > 0
     )

@@ -17,12 +17,25 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(
             ("sec", "secs", "second", "seconds", "sek", "sekunden", "\u0441", "\u0441\u0435\u043a"), 1.0
         ),
-        **dict.fromkeys(("\u79d2", "\ucd08"), 1.0),
-        **dict.fromkeys(("msec", "millis", "millisecond", "milliseconds", "\u043c\u0441"), 1e-3),
+        **dict.fromkeys(
+            ("\u79d2", "\ucd08", "segundos", "segundo", "seg", "secondes", "secondi", "sekunder"), 1.0
+        ),
+        **dict.fromkeys(
+            (
+                "msec",
+                "millis",
+                "millisecond",
+                "milliseconds",
+                "milisegundos",
+                "millisekunden",
+                "\u043c\u0441",
+            ),
+            1e-3,
+        ),
         **dict.fromkeys(("\u00b5s", "\u03bcs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
         "ns": 1e-9,
-        **dict.fromkeys(("mins", "minute", "minutes"), 60.0),
-        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), 3600.0),
+        **dict.fromkeys(("mins", "minute", "minutes", "minuten", "minutos", "minuti"), 60.0),
+        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "stunden", "horas", "heures", "ore"), 3600.0),
         **dict.fromkeys(("d", "day", "days"), 86400.0),
         # Times of day of two parts are read as the former.
         **dict.fromkeys(("h:min", "hh:mm"), 1.0),
@@ -31,7 +44,18 @@ _SPELT: dict[str, dict[str, float]] = {
     "mm": {
         **dict.fromkeys(("in", "inch", "inches"), _INCH),
         **dict.fromkeys(("\u00b5m", "\u03bcm", "micron", "microns", "\u043c\u043a\u043c"), 1e-3),
-        **dict.fromkeys(("millimeter", "millimeters", "millimetre", "\u043c\u043c"), 1.0),
+        **dict.fromkeys(
+            (
+                "millimeter",
+                "millimeters",
+                "millimetre",
+                "millimetres",
+                "milimetros",
+                "millimetri",
+                "\u043c\u043c",
+            ),
+            1.0,
+        ),
         **dict.fromkeys(("mil", "mils", "thou"), _INCH / 1000.0),
         "ft": 12.0 * _INCH,
         "nm": 1e-6,
@@ -40,7 +64,7 @@ _SPELT: dict[str, dict[str, float]] = {
     "N": {
         **dict.fromkeys(("lbf", "lb", "lbs"), _POUND),
         **dict.fromkeys(("kgf", "kp", "\u043a\u0433\u0441"), _KILOPOND),
-        **dict.fromkeys(("newton", "newtons", "\u043d"), 1.0),
+        **dict.fromkeys(("newton", "newtons", "newtones", "\u043d"), 1.0),
         "gf": _KILOPOND / 1000.0,
         "ozf": _POUND / 16.0,
         "\u043a\u043d": 1e3,
@@ -62,7 +86,7 @@ _SPELT: dict[str, dict[str, float]] = {
         "ksi": 1e3 * CONVERTED["kPa"]["psi"],
         "hPa": 0.1,
     },
-    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "\u00ba"), 1.0),
+    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "grados", "gradi", "degres", "\u00ba"), 1.0),
     "": {
         **dict.fromkeys(("mm/mm", "m/m", "in/in", "1", "-"), 1.0),
         "%": 1e-2,
@@ -259,7 +283,9 @@ def unit_of(text: str) -> tuple[str, float] | None:
         return _BY_CASE[text]
     if said := _REFERENCE.fullmatch(text.casefold()):
         return unit_of(text[: said.end(1)])
-    return _UNITS.get(text.casefold()) or (_UNITS.get(text[:-1].casefold()) if text.endswith(".") else None)
+    return _UNITS.get(text.casefold()) or _UNITS.get(
+        plain(text).removesuffix(".") if text[:-1].isalpha() else ""
+    )
 
 
 def known_in(quantity: str, text: str) -> float | None:

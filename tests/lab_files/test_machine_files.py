@@ -18,6 +18,8 @@ from mu_addon.lab_files.source import read_sheets, sheet_of_text
 from mu_addon.usecases.import_data.report import terminal_lines
 from mu_addon.usecases.import_data.understood import understand
 
+from .test_cells import workbook
+
 COUPON = {"kind": "coupon", "mode": "uniaxial", "section_mm": "10x1", "length_mm": "100"}
 TITLES = "Time (s),Load (N),Extension (mm)"
 COUNT = int(os.environ.get("MUTANTS", "15"))
@@ -690,3 +692,122 @@ def test_dimensions_in_the_head_of_a_file(tmp_path, head, length, section):
     keys = found.proposals[0].keys
     assert keys.get("length_mm") == length
     assert keys.get("section_mm") == (section and pytest.approx(section, abs=1e-5))
+
+
+PRESSED = {"kind": "unit_pressure"}
+CLOCKED = {"column.2": "pressure", "column.3": "angle", "unit.2": "kPa", "unit.3": "deg"}
+HELD = {"kind": "pressure_hold", "interval_s": "0.5", "column.1": "pressure", "unit.1": "kPa"}
+LABELLED = {"unit.t": "s", "unit.Pressure": "bar", "unit.Angle": "deg"}
+WRAP = 2**32
+
+
+def many(row, *head, count=60):
+    """Text of lines above `count` rows."""
+    return lines(*head, *map(row, range(count)))
+
+
+@pytest.mark.parametrize(
+    ("text", "answers", "column", "last"),
+    [
+        (many(lambda i: f"14:02:{i / 10 + 1:06.3f} -> {i},{2 * i}"), CLOCKED, "time_s", 5.9),
+        (
+            many(lambda i: f"1:02:{i:02d} -> {i}\t{i}", "1:01:59 -> Pressure (kPa)\tAngle (deg)"),
+            {},
+            "angle_deg",
+            59,
+        ),
+        (
+            many(lambda i: f"23:59:{i:02d} -> Pressure: {i}.5 kPa, Angle: {i}"),
+            {"unit.Angle": "deg"},
+            "pressure_kPa",
+            59.5,
+        ),
+        (many(lambda i: f"t:{i}\tPressure={i}.5\tAngle=-{i}", "boot"), LABELLED, "pressure_kPa", 5950),
+        (many(lambda i: f"{20 - 0.01 * i:.2f}", "# kPa"), HELD, "time_s", 29.5),
+        (many(lambda i: f"{2000 - i}", "Pressure (Pa)"), {"interval_s": "0.5"}, "pressure_kPa", 1.941),
+        (
+            many(
+                lambda i: f"{(65000 + 20 * i) % 65536},{14.7 + i / 10:.1f},{i}", "t_ms,P (psia),Angle (deg)"
+            ),
+            PRESSED | {"column.P (psia)": "pressure"},
+            "time_s",
+            1.18,
+        ),
+        (
+            many(lambda i: f"{(WRAP - 3000 + 1000 * i) % WRAP},{i},{i}", "t_us,Pressure (mmH2O),Angle (deg)"),
+            PRESSED,
+            "pressure_kPa",
+            59 * 9.80665e-3,
+        ),
+        (
+            many(
+                lambda i: f"{(WRAP - 3000 + 1000 * i) % WRAP / 1e6},{i},{i}", "t_s,Pressure (kPa),Angle (deg)"
+            ),
+            PRESSED,
+            "time_s",
+            0.059,
+        ),
+        (many(lambda i: f"{i / 100},{1000 * i}", "strain [-],force [mN]"), COUPON, "force_N", 59),
+        (many(lambda i: f"{i / 100},{i}", "Weg (mm),Spannung (MPa)"), COUPON, "stress_kPa", 59000),
+    ],
+)
+def test_what_boards_and_loggers_write(tmp_path, text, answers, column, last):
+    p, _ = one(tmp_path, text, answers)
+    assert p.columns[column][-1] == pytest.approx(last)
+    assert len(p.lines) == 60
+
+
+@pytest.mark.parametrize(
+    ("titles", "first", "reference", "asked"),
+    [
+        ("Pressure (kPa abs)", 101.3, "absolute", []),
+        ("Pressure (psia)", 14.7, "absolute", []),
+        ("Absolutdruck [kPa]", 101.3, "absolute", []),
+        ("Pressure (barg)", 1.0, "gauge", []),
+        ("Pressure (kPa)", 101.3, None, [("pressure", "absolute")]),
+        ("Pressure (kPa)", 0.0, None, []),
+    ],
+)
+def test_absolute_pressures_are_known_by_their_unit_or_asked_for(tmp_path, titles, first, reference, asked):
+    text = lines(f"Time (s),{titles},Angle (deg)", *(f"{i},{first + 0.1 * i:.2f},{i}" for i in range(60)))
+    found = understood(tmp_path, text, {"column." + titles: "pressure"})
+    assert [(q.key, q.proposed) for _, q in found.open] == asked
+    assert found.proposals[0].keys.get("pressure") == reference
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (
+            many(lambda i: f"{i},{100 + i},50,{200 + i},50", "Time (ms),a X,a Y,b X,b Y"),
+            "tracked markers: a, b",
+        ),
+        (
+            many(lambda i: f"0.{i:02d} {100 + i} {i}", "#Kinovea Trajectory data export", "#T X Y"),
+            "tracked markers: path 1",
+        ),
+        (
+            many(lambda i: f"{i},{i},90,0.9", "scorer,n,n,n", "bodyparts,a,a,a", "coords,x,y,likelihood"),
+            "tracked markers: a",
+        ),
+        (
+            many(lambda i: f"{i},=B{i}*2,{i}", "Time (s),Load,Extension (mm)"),
+            "formulas without stored values",
+        ),
+        (many(lambda i: f"{i}.5"), "one column of numbers.*time"),
+        (lines("a 1 2", "b c 3 4", "5 d e f 6"), "line 1 is 'a 1 2'"),
+        (many(lambda i: f"{60 - i},{i},{i}", TITLES), "time runs backward"),
+        (many(lambda i: f"{20 * (i % 30)},{i},{i}", TITLES), "time runs backward"),
+    ],
+)
+def test_what_is_refused_says_why(tmp_path, text, what):
+    with pytest.raises(InputError, match=what) as caught:
+        understood(tmp_path, text, COUPON)
+    assert caught.value.remedy
+
+
+def test_formulas_of_a_workbook_without_stored_values_are_named(tmp_path):
+    rows = [["Time (s)", "Load (N)", "Extension (mm)"], *([i, f"=A{i + 2}*2", i] for i in range(20))]
+    workbook(tmp_path / "a.xlsx", {"b & c": rows})
+    with pytest.raises(InputError, match=r"'Load \(N\)': formulas without stored values, such as '=A"):
+        understand([tmp_path / "a.xlsx"], COUPON)

@@ -74,8 +74,19 @@ def test_a_row_for_each_marker_and_frame(tmp_path):
             ("A", "B"),
             None,
         ),
+        (
+            "#Kinovea Trajectory data export\n#T X Y\n\n# A\n0 1.5 2 \n0.04 1.5 2 \n\n# B\n0 3 4\n0.04 3 4\n",
+            ("A", "B"),
+            [0.0, 0.04],
+        ),
+        (
+            "#Kinovea Trajectory data export\n#T X Y\n0:00:00:00 1,50 2,00\n0:00:01:03 1,50 2,00\n\n\n"
+            "0:00:00:00 3,00 4,00\n0:00:01:03 3,00 4,00\n",
+            ("path 1", "path 2"),
+            [0.0, 1.03],
+        ),
     ],
-    ids=["kinovea", "tracker", "sleap"],
+    ids=["kinovea", "tracker", "sleap", "kinovea text", "kinovea text with a clock"],
 )
 def test_columns_for_each_marker(tmp_path, text, names, time_s):
     read = read_pixels(table(tmp_path, text))

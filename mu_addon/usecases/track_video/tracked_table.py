@@ -49,6 +49,9 @@ _IDS = (
     "object", "id",
 )  # fmt: skip
 _FRAMES = ("frame", "frame idx", "frame id", "frame number", "frame nr", "frames", "slice", "slice n°")
+NO_MARKERS = "the file contains no tracked markers"
+# What Kinovea's text of paths begins with.
+_KINOVEA = "#Kinovea Trajectory"
 _LAYOUTS = (
     "name the columns `NAME right_px` and `NAME down_px`, a row a frame; or export, in pixels, NAME x and "
     "NAME y for each marker, frame, id, x and y in each row, or DeepLabCut's CSV"
@@ -86,7 +89,8 @@ def read_pixels(path: Path) -> Tracks:
     time_s, if present, is the time of each. Tables of other trackers need x to the right and y downward.
     """
     try:
-        lines = own_lines(own_text(path))
+        text = own_text(path)
+        lines = _lines_of_kinovea(text) if text.startswith(_KINOVEA) else own_lines(text)
         require_rows(len(lines) - 1, str(path))
         layout = _layout(lines, str(path))
         heading, *body = own_rows(lines[layout.heading :])
@@ -99,9 +103,40 @@ def read_pixels(path: Path) -> Tracks:
     units, body = _below(layout, body)
     layout = _in_pixels(layout, units, f"{path}, line {heading[0]}")
     if len(body) < 2:
-        raise InputError("the file contains no tracked markers", str(path), _LAYOUTS)
+        raise InputError(NO_MARKERS, str(path), _LAYOUTS)
     table = _Table(layout, units, body, str(path))
     return table.of_rows() if layout.id is not None else table.of_columns()
+
+
+def _lines_of_kinovea(text: str) -> list[Line]:
+    """Lines of a table with a row a moment, of Kinovea's text with lines `T X Y` below each other's paths."""
+    paths: dict[str, dict[float, str]] = {}
+    begun: dict[float, int] = {}
+    name, apart = "", True
+    for number, line in enumerate(text.split("\n"), 1):
+        words = line.replace(",", ".").split()
+        if line.startswith("#") or not words:
+            name, apart = line.strip("# \t") if words else name, True
+        elif len(words) == 3 and all(map(is_like_number, words[1:])):
+            if apart and (name in paths or name in ("", "T X Y")):
+                name = f"path {len(paths) + 1}"
+            apart = False
+            *above, seconds = words[0].split(":")[:3]
+            time = sum(60.0 ** (len(above) - k) * float(part) for k, part in enumerate(above)) + float(
+                seconds
+            )
+            # Its clock is h:mm:ss:hh, with hundredths of a second.
+            time += 0.01 * float((words[0].split(":")[3:] or ["0"])[0])
+            paths.setdefault(name, {})[time] = ",".join(words[1:])
+            begun.setdefault(time, number)
+    times = sorted(begun)
+    whole = ":" not in text and all(time == int(time) for time in times)
+    title = "Time (s)" if not whole else "Time (ms)" if np.diff(times[:2]).min(initial=2) > 1 else "Frame"
+    lines = [(1, ",".join([title, *(f"{name} X,{name} Y" for name in paths)]).replace('"', ""))]
+    for time in times:
+        cells = (places.get(time, ",") for places in paths.values())
+        lines.append((begun[time], ",".join([f"{time:.10g}", *cells])))
+    return lines
 
 
 def _layout(lines: Sequence[Line], where: str) -> _Layout:
@@ -122,7 +157,7 @@ def _layout(lines: Sequence[Line], where: str) -> _Layout:
             depth = [k for _, axis, k in found if axis == 2]
             return _Layout(n, markers, depth, likelihood, titles, frame, id_ if "" in markers else None, own)
         above.append(titles)
-    raise InputError("the file contains no tracked markers", where, _LAYOUTS)
+    raise InputError(NO_MARKERS, where, _LAYOUTS)
 
 
 def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tuple[str, int, int]]:
