@@ -229,8 +229,8 @@ class Column:
     @property
     def reference(self) -> str:
         """Whether unit or title say of a pressure that it is "absolute" or "gauge"; "" for neither."""
-        said = _REFERENCE.fullmatch(self.unit.casefold())
-        word = said[2] if said else (_ABSOLUTE.search(plain(self.title)) or [""])[0]
+        match = _REFERENCE.fullmatch(self.unit.casefold())
+        word = match[2] if match else (_ABSOLUTE.search(plain(self.title)) or [""])[0]
         return {"a": "absolute", "g": "gauge", "": ""}[word[:1]] if self.quantity == "pressure" else ""
 
     @property
@@ -281,8 +281,8 @@ def unit_of(text: str) -> tuple[str, float] | None:
     text = unicodedata.normalize("NFC", text.strip().strip("()[]{}").strip())
     if text in _BY_CASE:
         return _BY_CASE[text]
-    if said := _REFERENCE.fullmatch(text.casefold()):
-        return unit_of(text[: said.end(1)])
+    if match := _REFERENCE.fullmatch(text.casefold()):
+        return unit_of(text[: match.end(1)])
     return _UNITS.get(text.casefold()) or _UNITS.get(
         plain(text).removesuffix(".") if text[:-1].isalpha() else ""
     )

@@ -19,38 +19,34 @@ DECISIONS = {
     for one in (
         Decision(
             "decimal sign",
-            "the one that reads most cells of a column; `1,234` alone as the other columns, else asked; "
-            "signs that alternate are refused",
+            "the one that reads most cells of a column; `1,234` alone: other columns, else asked",
             "decimal=,",
         ),
         Decision(
             "quantity",
-            "the title; where title and unit disagree, the unit; a strain that begins at 1 is asked for, a "
-            "stretch that begins at 0 is a strain",
+            "the title, the unit where they disagree; a stretch begins at 1",
             "column.TITLE=force",
         ),
         Decision(
             "unit",
-            "the title, the row of units or the text behind each number; asked without one; a load in g is "
-            "a weight; kPa abs, psia and bar(a) are absolute",
+            "the title, a row or the text behind each number, else asked; a load in g is a weight",
             "unit.TITLE=N",
         ),
+        Decision("pressure", "*abs*, psia, bar(a)", "pressure=gauge"),
         Decision(
             "time",
-            "a clock or a date counts from its first row; a counter that begins again at 2^16, 2^31 or 2^32 "
-            "is counted on; any other step back is refused",
+            "a clock from its first row on; a counter that wraps is counted on",
             "interval_s=0.1",
         ),
         Decision(
             "sign",
-            "of a load the course of the whole record, less jumps of one column alone, which are named: "
-            "positive in tension of a coupon, in compression of a block",
+            "a load's whole course less its jumps: positive in tension of a coupon, compression of a block",
             "sign=as_read",
         ),
-        Decision("zero", "a displacement that begins away from 0 is a place of the machine", "zero=as_read"),
-        Decision("kind", "the quantities; tension or compression by the file's words", "kind=coupon"),
-        Decision("mode", "never by the data: asked", "mode=uniaxial"),
-        Decision("size", "the lines above the table", "section_mm=12.5x3"),
+        Decision("zero", "a displacement begins there", "zero=as_read"),
+        Decision("kind", "the quantities, and the words tension or compression", "kind=coupon"),
+        Decision("mode", "always asked", "mode=uniaxial"),
+        Decision("section, length", "the lines above the table", "section_mm=12.5x3"),
     )
 }
 

@@ -81,7 +81,7 @@ class Draft:
         sheet = f", sheet {self.block.sheet!r}" if self.block.sheet else ""
         return f"{self.path}{sheet}, lines {self.block.lines[0]} to {self.block.lines[-1]}"
 
-    def told(self, words: str) -> Draft:
+    def concluding(self, words: str) -> Draft:
         """With a conclusion."""
         return attrs.evolve(self, concluded=(*self.concluded, words))
 
@@ -129,7 +129,7 @@ class Draft:
         """Name of a column in answers: its number if others have its title."""
         return one.name if [c.title for c in self.block.columns].count(one.title) == 1 else str(one.place)
 
-    def said(self, key: str, one: Column) -> tuple[str, str | None]:
+    def answer_on(self, key: str, one: Column) -> tuple[str, str | None]:
         """Key and text of an answer about a column, `unit` or `column`, by its title or its number."""
         keys = [f"{key}.{one.title}", f"{key}.{one.place}"] if one.title else [f"{key}.{one.place}"]
         if self.key(one) != one.title:

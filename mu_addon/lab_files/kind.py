@@ -55,7 +55,7 @@ def with_kind(draft: Draft) -> Draft:
                     "the pressure jumps, and was read often enough to see the unit follow "
                     "(kind=unit_pressure where it was slow)"
                 )
-            return attrs.evolve(draft.told(f"{kind}: {why}") if why else draft, kind=kind)
+            return attrs.evolve(draft.concluding(f"{kind}: {why}") if why else draft, kind=kind)
     if any(have.issuperset(load) for load in KINDS["coupon"].needs):
         return _loading(draft)
     if asked:
@@ -90,8 +90,8 @@ def _loading(draft: Draft) -> Draft:
     pulled, pressed = (bool(pattern.search(plain(words))) for pattern in (_TENSION, _COMPRESSION))
     if pulled != pressed:
         kind = "coupon" if pulled else "lattice_compression"
-        told = f"{kind}: the file speaks of {'tension' if pulled else 'compression'}"
-        return attrs.evolve(draft.told(told), kind=kind)
+        words = f"{kind}: the file speaks of {'tension' if pulled else 'compression'}"
+        return attrs.evolve(draft.concluding(words), kind=kind)
     words = "a specimen was loaded: was it a coupon of resin, or a block of lattice compressed?"
     return draft.asked("kind", words, _LOADED)
 
@@ -111,7 +111,7 @@ def _is_stepped(columns: Mapping[str, Array]) -> bool:
 def require_curve(draft: Draft) -> Draft:
     """Raise NoExperiment for loads that are amplitudes of an oscillation; an answered column is none."""
     for k, one in enumerate(draft.block.columns) if draft.kind in _LOADED else ():
-        if _OSCILLATION.search(plain(one.title)) and draft.said("column", one)[1] is None:
+        if _OSCILLATION.search(plain(one.title)) and draft.answer_on("column", one)[1] is None:
             raise NoExperiment(
                 f"{draft.title(k)} shows a test by oscillation: its loads are amplitudes, and no "
                 "stress-strain curve",

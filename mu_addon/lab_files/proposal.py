@@ -185,7 +185,7 @@ def _with_zero(draft: Draft) -> Draft:
     first = float(found[0])
     if abs(first) <= _OFFSET * float(np.ptp(found)):
         return draft
-    return draft.with_column("displacement_mm", found - first).told(
+    return draft.with_column("displacement_mm", found - first).concluding(
         f"displacement_mm: minus its first value, {first:g} mm, the machine's position {kept_by('zero')}"
     )
 
@@ -199,15 +199,17 @@ def _with_signs(draft: Draft) -> Draft:
         for row in jumps(draft.columns, name)[:_MOST_JUMPS]:
             by = draft.columns[name][row] - draft.columns[name][row - 1]
             line = draft.lines[row]
-            draft = draft.told(f"{name}: jumps by {by:.4g} at line {line} while the test goes on; check it")
+            draft = draft.concluding(
+                f"{name}: jumps by {by:.4g} at line {line} while the test goes on; check it"
+            )
     pressed = draft.kind == "lattice_compression"
     found = () if draft.choice("sign", ("as_read",)) else turned(draft.columns, pressed)
     for name in found:
-        draft = draft.with_column(name, 0.0 - draft.columns[name]).told(
+        draft = draft.with_column(name, 0.0 - draft.columns[name]).concluding(
             f"{name}: sign turned, positive in {'compression' if pressed else 'tension'} {kept_by('sign')}"
         )
     if not pressed and not found and all(np.mean(draft.columns[name]) < 0 for name in loads):
-        draft = draft.told("force and displacement are negative: read as compression of the coupon")
+        draft = draft.concluding("force and displacement are negative: read as compression of the coupon")
     return draft
 
 
@@ -253,7 +255,9 @@ def _reference(draft: Draft) -> tuple[Draft, str | None]:
     least, most = float(np.nanmin(values)), float(np.nanmax(values))
     stated = draft.keys.get("pressure")
     if stated == "absolute" and least > 0:
-        return draft.told("pressure = absolute, by unit or title (pressure=gauge for another)"), "absolute"
+        return draft.concluding(
+            "pressure = absolute, by unit or title (pressure=gauge for another)"
+        ), "absolute"
     low, high = LIKE_ABSOLUTE_kPa
     if stated is None and low < least and most < high:
         words = (
@@ -274,11 +278,14 @@ def _section(draft: Draft) -> tuple[Draft, list[float] | None]:
     )
     pair = [width, thickness] if width and thickness else facts.pair_mm(lines, facts.SECTION, decimal)
     if pair:
-        return draft.told(f"section of {pair[0]:g} x {pair[1]:g} mm, as the file says"), pair
+        return draft.concluding(f"section of {pair[0]:g} x {pair[1]:g} mm, as the file says"), pair
     side = facts.square_mm(area, diameter)
     if side:
         words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
-        return draft.told(f"section {words}, as the file says: given as a square of that area"), [side, side]
+        return draft.concluding(f"section {words}, as the file says: given as a square of that area"), [
+            side,
+            side,
+        ]
     return draft, None
 
 
@@ -287,7 +294,7 @@ def _length(draft: Draft) -> tuple[Draft, float | None]:
     answered = draft.positive("length_mm")
     length = answered or facts.size_mm(draft.block.facts, facts.LENGTH, draft.block.decimal)
     if length and not answered:
-        draft = draft.told(f"length of {length:g} mm, as the file says")
+        draft = draft.concluding(f"length of {length:g} mm, as the file says")
     return draft, length
 
 

@@ -62,7 +62,7 @@ def with_values(draft: Draft, k: int, one: Column) -> Draft:
     """The draft with column k as a column of this quantity, its unit asked for where it is not known."""
     draft, one = _in_unit(*_strain_or_stretch(draft, k, one), k)
     if one.stated and one.stated != one.quantity:
-        draft = draft.told(f"{draft.title(k)} is read as {one.quantity}, by its unit")
+        draft = draft.concluding(f"{draft.title(k)} is read as {one.quantity}, by its unit")
     values = draft.block.values[:, k] * (one.factor or 1.0) - (one.quantity == "stretch")
     read = f" [{one.unit}]" if one.unit else ""
     origin = f"{one.title or f'column {one.place}'!r}{read}"
@@ -88,7 +88,7 @@ def ask_column(draft: Draft, k: int, quantities: Sequence[str], why: str = "", s
 def may_hold(draft: Draft, k: int, quantities: Sequence[str]) -> bool:
     """Return True if a column that is not read may hold one of these quantities, by its unit."""
     one = draft.block.columns[k]
-    if draft.said("column", one)[1] is not None or (one.quantity == "count" and one.unit):
+    if draft.answer_on("column", one)[1] is not None or (one.quantity == "count" and one.unit):
         return False
     return unit_of(one.unit) is None or any(known_in(q, one.unit) is not None for q in quantities)
 
@@ -121,8 +121,8 @@ def _rank(held: tuple[int, Column]) -> tuple[bool, bool, bool, int]:
 def _identified(draft: Draft, k: int) -> tuple[Draft, Column | None]:
     """Column k with its quantity, by an answer or its title; None for one that is not read."""
     one = draft.block.columns[k]
-    key, answer = draft.said("column", one)
-    unit = draft.said("unit", one)[1]
+    key, answer = draft.answer_on("column", one)
+    unit = draft.answer_on("unit", one)[1]
     if answer == "none":
         return draft.left(draft.title(k), "left out by the answer 'none'"), None
     if answer is not None and answer not in READ_IN:
@@ -157,8 +157,8 @@ def _weight(draft: Draft, k: int, one: Column) -> tuple[Draft, Column]:
     if kind == "beam_deadweight" or not (one.quantity == "force" or forced):
         return draft, attrs.evolve(one, quantity="added_mass", factor=unit[1])
     factor = known_in("force", one.unit)
-    told = f"{draft.title(k)} is read as a force, the weight of that mass: 1 {one.unit} is {factor:.6g} N"
-    return draft.told(told), attrs.evolve(one, quantity="force", factor=factor)
+    words = f"{draft.title(k)} is read as a force, the weight of that mass: 1 {one.unit} is {factor:.6g} N"
+    return draft.concluding(words), attrs.evolve(one, quantity="force", factor=factor)
 
 
 def _strain_or_stretch(draft: Draft, k: int, one: Column) -> tuple[Draft, Column]:
@@ -168,17 +168,19 @@ def _strain_or_stretch(draft: Draft, k: int, one: Column) -> tuple[Draft, Column
         return draft, one
     first = float(values[np.isfinite(values)][0]) * (one.factor or 1.0)
     percent = not unit_of(one.unit) and abs(first - 100.0) < 100.0 * _AT_REST
-    key, answer = draft.said("column", one)
+    key, answer = draft.answer_on("column", one)
     if one.quantity == "stretch" and answer is None and abs(first) < _AT_REST:
-        told = f"{draft.title(k)} is read as a strain: it begins at {first:g}, not at 1"
-        return draft.told(told), attrs.evolve(one, quantity="strain", factor=one.factor if one.unit else None)
+        words = f"{draft.title(k)} is read as a strain: it begins at {first:g}, not at 1"
+        return draft.concluding(words), attrs.evolve(
+            one, quantity="strain", factor=one.factor if one.unit else None
+        )
     if one.quantity == "stretch":
-        told = f"{draft.title(k)} is read as a stretch: the strain is its value less 1"
-        return draft.told(told), attrs.evolve(one, unit="%", factor=0.01) if percent else one
+        words = f"{draft.title(k)} is read as a stretch: the strain is its value less 1"
+        return draft.concluding(words), attrs.evolve(one, unit="%", factor=0.01) if percent else one
     if percent or abs(first - 1.0) < _AT_REST:
         words = f"{draft.title(k)} begins at {first:g}, as a stretch does, and a strain at 0"
         if answer is not None:
-            return draft.told(f"{words}: {key}=stretch if it is one"), one
+            return draft.concluding(f"{words}: {key}=stretch if it is one"), one
         draft = draft.asked(f"column.{draft.key(one)}", words, ("strain", "stretch"), "stretch")
     return draft, one
 
@@ -186,7 +188,7 @@ def _strain_or_stretch(draft: Draft, k: int, one: Column) -> tuple[Draft, Column
 def _in_unit(draft: Draft, one: Column, k: int) -> tuple[Draft, Column]:
     """A column with its unit from an answer, `unit.TITLE=N`; asked for where it has none."""
     wanted = READ_IN[one.quantity]
-    key, answer = draft.said("unit", one)
+    key, answer = draft.answer_on("unit", one)
     if answer is not None and one.unit != "clock":
         factor = 1.0 if answer in ("", wanted) else known_in(one.quantity, answer)
         if factor is None:
@@ -204,8 +206,8 @@ def _in_unit(draft: Draft, one: Column, k: int) -> tuple[Draft, Column]:
         and not one.unit
         and np.nanmax(np.abs(draft.block.values[:, k]), initial=0) > _NO_RADIANS
     ):
-        told = f"in degrees{draft.extent(k)}: {draft.title(k)}"
-        return draft.told(told), attrs.evolve(one, unit="deg", factor=1.0)
+        words = f"in degrees{draft.extent(k)}: {draft.title(k)}"
+        return draft.concluding(words), attrs.evolve(one, unit="deg", factor=1.0)
     shown = f"{one.unit!r}, which is not known" if one.unit else "not given"
     title = repr(one.title) if one.title else f"column {one.place}"
     words = f"the unit of {title}{draft.extent(k)} is {shown}"

@@ -51,11 +51,11 @@ def with_rising_time(draft: Draft) -> Draft:
                 "divide the file where a new record begins",
             )
         time = time + turn * np.concatenate([[0], np.cumsum(np.diff(time) < 0)])
-        draft = draft.with_column("time_s", time - time[0]).told(
+        draft = draft.with_column("time_s", time - time[0]).concluding(
             f"time_s: its counter begins again at 2^{bits} in line {line}; counted on, from the first row"
         )
     elif time[0] > _LONGEST_TEST_S:
-        draft = draft.with_column("time_s", time - time[0]).told(
+        draft = draft.with_column("time_s", time - time[0]).concluding(
             f"time_s: minus its first value, {time[0]:.10g} s, of a calendar"
         )
     still = np.flatnonzero(np.diff(draft.columns["time_s"]) == 0)
