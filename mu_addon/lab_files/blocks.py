@@ -319,7 +319,7 @@ class _Finding:
     def _title_row(self, k: int, width: int) -> Row:
         """A row above the numbers split into its titles, also with another separator."""
         row = self.rows[k]
-        cells = (_COMMENT.sub("", row.cells[0]), *row.cells[1:]) if row.cells else row.cells
+        cells = (_COMMENT.sub("", row.cells[0]) or row.cells[0], *row.cells[1:]) if row.cells else row.cells
         if len([c for c in cells if c]) == 1 and width > 1:
             text = next(c for c in cells if c)
             for delimiter in ("\t", ";", ",", "spaces"):

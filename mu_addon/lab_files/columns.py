@@ -62,10 +62,10 @@ _SPELT: dict[str, dict[str, float]] = {
         "\u0441\u043c": 10.0,
     },
     "N": {
-        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND),
+        **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), _POUND),
         **dict.fromkeys(("kgf", "kp", "\u043a\u0433\u0441"), _KILOPOND),
         **dict.fromkeys(("newton", "newtons", "newtones", "\u043d"), 1.0),
-        "gf": _KILOPOND / 1000.0,
+        **dict.fromkeys(("gf", "grf", "gram-force", "grams-force"), _KILOPOND / 1000.0),
         "ozf": _POUND / 16.0,
         "\u043a\u043d": 1e3,
         "dan": 10.0,
@@ -99,7 +99,7 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("mm\u00b3", "mm^3", "\u00b5l", "\u03bcl"), 1.0),
         **dict.fromkeys(("cm\u00b3", "cc", "cm^3"), 1e3),
     },
-    "g": {},
+    "g": dict.fromkeys(("gram", "grams", "gramm"), 1.0),
 }
 _UNITS = {
     unicodedata.normalize("NFC", name).casefold(): (read, factor)
@@ -144,7 +144,7 @@ _WORDS = tuple(
         ),
         ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
         ("angle", r"angle|winkel|angolo|angulo|\bkat\b|hoek|vinkel|kulma|szog|\buhel|\baci\b|угол|角度|각도"),
-        ("stretch", r"\bstretch\b|stretch ratio|\blambda\b|\u03bb|streckung|streckverhaltnis|etirement"),
+        ("stretch", r"\bstretch\b|stretch ratio|\blambda ?\d?\b|\u03bb|streckung|streckverhaltnis|etirement"),
         (
             "strain",
             r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria|\brek\b|"
@@ -176,7 +176,7 @@ _WORDS = tuple(
         ("added_mass", r"added.mass|zusatzmasse"),
         (
             "displacement",
-            r"extension|displacement|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"extension|\bext\b|displacement|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
             r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
             r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
             r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
@@ -191,7 +191,7 @@ _WORDS = tuple(
         ),
         (
             "count",
-            r"\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
+            r"^#$|\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
         ),
     )
 )
@@ -264,6 +264,8 @@ def column(title: str, unit: str = "") -> Column:
         return Column(title, quantity, unit, None)
     if quantity == "stretch":
         return Column(title, quantity, unit, known[1] if known else 1.0)
+    if not quantity and _REFERENCE.fullmatch(unit.casefold()):
+        quantity = "pressure"
     if quantity or not known or not known[0]:
         return Column(title, quantity, unit, known[1] if known else None)
     # The unit says it, where only one quantity has it, or the title speaks of another one of a test.
@@ -318,8 +320,8 @@ def _apart(title: str) -> tuple[str, str]:
             return _BRACKETED.sub(" ", title).strip(), text
     for sign in _BEFORE_UNIT.finditer(title):
         name, unit = title[: sign.start()], title[sign.end() :]
-        if name and is_unit(unit) and not unit.isdigit():
-            return name, unit
+        if name and ((is_unit(unit) and not unit.isdigit()) or (unit == "S" and _meant(name) == "time")):
+            return name, unit.lower() if unit == "S" else unit
     # Names of a program's variables, such as millis.
     return title, title if is_unit(title) and len(title) > 4 else ""
 

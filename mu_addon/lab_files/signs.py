@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,10 +13,12 @@ Array = np.ndarray[Any, Any]
 LOADS = ("strain", "displacement_mm", "stress_kPa", "force_N")
 # A jump is a step above this multiple of the usual one and this share of the range, in one column alone.
 _JUMP_USUAL, _JUMP_RANGE = 10.0, 0.1
-# Rows within which a jump of another column belongs to the same event of the test.
-_TOGETHER = 2
-# Share of the values at either end that does not count, and mean over range that decides the direction.
-_TAIL, _DECISIVE = 0.02, 0.1
+# Rows within which a jump of another column is of the same event, and one back of a spike.
+_TOGETHER, _SPIKE = 2, 3
+# Rows, and usual steps, that a column has moved where a jump ends the part that counts.
+_MOVED = 5
+# Mean over range that decides the direction.
+_DECISIVE = 0.1
 
 
 def turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
@@ -31,7 +34,8 @@ def turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
     first = known[-1] if known else next(reversed(courses), "")
     for name in courses:
         if not ways[name] and name != first:
-            along = float(np.dot(_centred(courses[name]), _centred(courses[first])))
+            rows = min(len(courses[name]), len(courses[first]))
+            along = np.cov(courses[name][:rows], courses[first][:rows])[0, 1] if rows > 1 else 0.0
             ways[name] = (ways[first] or 1) * int(np.sign(along))
     negative = tuple(name for name, way in ways.items() if way < 0)
     return negative if compression or len(negative) < len(ways) else ()
@@ -48,23 +52,28 @@ def jumps(columns: Mapping[str, Array], name: str) -> Array:
 def _steep(values: Array) -> Array:
     """Mask (n - 1,) of the steps that are jumps."""
     step = np.abs(np.diff(values))
-    usual = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
-    return step > max(_JUMP_USUAL * usual, _JUMP_RANGE * float(np.ptp(values)))
+    if not len(step):
+        return np.zeros(0, bool)
+    return step > max(_JUMP_USUAL * float(np.median(step)), _JUMP_RANGE * float(np.ptp(values)))
 
 
 def _course(columns: Mapping[str, Array], name: str) -> Array:
-    """Values (n,) from the first on, without jumps and without the largest and smallest."""
-    step = np.diff(columns[name])
-    step[jumps(columns, name) - 1] = 0.0
-    course = np.concatenate([[0.0], np.cumsum(step)])
-    return np.clip(course, *np.quantile(course, [_TAIL, 1.0 - _TAIL]))
+    """Values (m,) less the first and without spikes, up to the first jump after which nothing can be said."""
+    course = np.asarray(columns[name] - columns[name][0], float)
+    rows = [int(row) for row in jumps(columns, name)]
+    for begin, end in itertools.pairwise(rows):
+        back = abs(course[end] - course[begin - 1])
+        if end - begin <= _SPIKE and back < 0.5 * abs(course[begin] - course[begin - 1]):
+            course[begin:end] = course[begin - 1]
+    for row in rows:
+        before = course[:row]
+        usual = float(np.median(np.abs(np.diff(before)))) if row > 1 else 0.0
+        if row >= _MOVED and _steep(course)[row - 1] and abs(before[-1]) > _MOVED * usual > 0.0:
+            return before
+    return course
 
 
 def _way(course: Array) -> int:
     """1 or -1 for the direction in which a course goes for most of the record, 0 if in neither."""
     mean, extent = float(course.mean()), float(np.ptp(course))
     return int(np.sign(mean)) if abs(mean) > _DECISIVE * extent else 0
-
-
-def _centred(course: Array) -> Array:
-    return course - course.mean()

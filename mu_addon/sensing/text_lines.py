@@ -36,8 +36,8 @@ _TO_VOLT = {"mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "kV": 1e3}
 _UNITS = (
     *_TO_VOLT, "V", "mA", "uA", "µA", "A", "mW", "W", "kOhm", "kohm", "Ohm", "ohm", "kΩ", "Ω", "%RH", "%",
     "°C", "°F", "degC", "degF", "deg", "°", "rad", "kPa", "MPa", "hPa", "Pa", "mbar", "bar", "psi", "mmHg",
-    "mm", "cm", "m", "kN", "mN", "N", "kg", "g", "lux", "lx", "kHz", "Hz", "us", "µs", "ms", "s",
-    "K", "C", "F",
+    "mm", "cm", "m", "kN", "mN", "N", "kg", "g", "lbs", "lb", "lux", "lx", "kHz", "Hz", "us", "µs", "ms",
+    "s", "K", "C", "F",
 )  # fmt: skip
 # Of Greek letters and signs both that Unicode has; before a unit blanks, behind it no word and no other pair.
 _UNIT = rf"(?:\s*+({'|'.join(_UNITS)})(?![\w%°/]|\s*+[:=]))?"
