@@ -9,7 +9,6 @@ import numpy as np
 
 from ..preview import materials
 from ..results import field_colours
-from ..shared import viewports
 
 _LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice"}
 
@@ -44,11 +43,3 @@ def coloured(root: Any, part: Any, field: str, values: Any, ends: tuple[float, f
     attribute = part.data.attributes.get(field) or part.data.attributes.new(field, "FLOAT", "POINT")
     attribute.data.foreach_set("value", np.ascontiguousarray(values, np.float32))
     field_colours.write_colours(root, part.data, values, ends)
-
-
-def show(on: bool) -> None:
-    """Let 3D views in solid shading show colours of fields, or those of materials."""
-    for area in viewports.areas():
-        shading = area.spaces.active.shading
-        if shading.type == "SOLID":
-            shading.color_type = "VERTEX" if on else "MATERIAL"

@@ -170,7 +170,8 @@ def _pressed(root: Any) -> None:
 def _coloured(root: Any) -> None:
     """Show the chosen colours; a field that was not found yet is asked for."""
     live, wanted = of(root), root.mu_live.colour != PLAIN
-    colours.show(wanted)
+    if wanted:
+        viewports.show_colours()
     if live is None or live.shape is None:
         return
     pose(root, live.shape)

@@ -52,7 +52,9 @@ SUBJECTS = {
     "Body": ["body", "body_check", "body_repair", "body_remove"],
     "Cell Painting": ["paint_struts", "paint_struts_apply", "paint_struts_discard"],
     "Obstacles": ["obstacle", "obstacle_box", "obstacle_check"],
-    "Result": ["motion", "motion_range", "motion_legend", "motion_update", "motion_clear", "probe"],
+    "Result": [
+        *("motion", "motion_range", "motion_legend", "motion_update", "motion_clear", "colours", "probe"),
+    ],
     "Run": ["open", "run_restore", "run_remove", "cancel"],
     "Optimize": ["optimize"],
     "Evidence": ["import_files", "evidence_diagnose", "evidence_apply", "evidence_remove"],
