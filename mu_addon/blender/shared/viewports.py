@@ -145,6 +145,25 @@ def redraw_status() -> None:
                 region.tag_redraw()
 
 
+def extend_status_bar(draw: Callable[[Any, Any], None]) -> None:
+    """Append a function to what the status bar draws, for good.
+
+    Blender keeps what the bar draws at its first status text, such as that of an installation, and draws it
+    again after each text: that is extended, too.
+    """
+    bar = bpy.types.STATUSBAR_HT_header
+    bar.draw = getattr(bar, "_draw_orig", bar.draw)
+    bar.append(draw)
+    bar._draw_orig = bar.draw
+
+
+def reduce_status_bar(draw: Callable[[Any, Any], None]) -> None:
+    """Undo `extend_status_bar`."""
+    bar = bpy.types.STATUSBAR_HT_header
+    bar.draw = bar._draw_orig
+    bar.remove(draw)
+
+
 class Overlay:
     """A function that draws over every 3D viewport while it is registered; not in background."""
 
