@@ -500,12 +500,16 @@ def _loaded(*_):
 
 def _job_ended(_key: str) -> None:
     for root in unit_object.roots():
+        root.mu_motion.trouble = ""
         follow(root)
 
 
 def _chosen(root: Any) -> None:
     """Show a result: if none is in the unit's place yet, that of Model A."""
-    if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
+    if updates.are_paused():
+        return
+    root.mu_motion.trouble = ""
+    if root.mu_unit.show != unit_object.RESULT:
         return
     # They lie on the unit at rest, which is shown with them.
     unit_object.hide_candidates(root)
@@ -514,12 +518,20 @@ def _chosen(root: Any) -> None:
         return
     motion = motion_of(root)
     if motion is None:
-        root.mu_motion.trouble = "No motion to show: simulate this unit first"
+        fall_back(root)
         return
     root.mu_motion.on_unit = True
     if not parts(root):
         show(root, MODEL_A, MESH)
         to_largest(root, motion, bpy.context.scene)
+
+
+def fall_back(root: Any) -> None:
+    """Show the preview of a unit that has no result to show, and say so in the panel."""
+    root.mu_motion.trouble = "No result of its own to show: simulate this unit first"
+    with updates.paused():
+        root.mu_unit.show = "preview"
+    unit_object.show(root)
 
 
 def to_largest(root: Any, motion: Motion, scene: Any, jump: bool = True) -> None:

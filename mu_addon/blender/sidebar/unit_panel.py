@@ -66,6 +66,8 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row.operator("mu.preset_save", text="", icon="ADD")
         row.menu("MU_MT_more", text="", icon="DOWNARROW_HLT")
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
+        if root.mu_motion.trouble:
+            wrapped(layout, root.mu_motion.trouble, "ERROR")
         row = layout.row()
         row.enabled = root.mu_unit.show != unit_object.SOLID
         row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)

@@ -200,9 +200,7 @@ def show(root: Any) -> None:
     skinned = mesh == props.preview
     if modifier.show_viewport != skinned:
         modifier.show_viewport = modifier.show_render = skinned
-    played = in_place(root)
-    set_modifier_input(modifier, unit_group.SHOW_RESULT, bool(played))
-    for name, part in zip(unit_group.RESULTS, [*played, None, None], strict=False):
+    for name, part in zip(unit_group.RESULTS, [*in_place(root), None, None], strict=False):
         set_modifier_input(modifier, name, part)
 
 
