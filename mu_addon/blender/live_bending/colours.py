@@ -10,7 +10,7 @@ import numpy as np
 from ..preview import materials
 from ..results import field_colours
 
-_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice"}
+_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice", "before": "MU Before"}
 
 
 def ends_of(fields: dict[str, dict[str, Any]], field: str) -> tuple[float, float] | None:
@@ -23,9 +23,9 @@ def ends_of(fields: dict[str, dict[str, Any]], field: str) -> tuple[float, float
     return low, max(high, low + 1e-6)
 
 
-def plain(part: Any, region: str) -> None:
-    """Give a part the colours of the design."""
-    materials.wear(part.data, materials.material(_LOOKS[region]))
+def plain(part: Any, look: str) -> None:
+    """Give a part the colour of its region in the design or, with "before", a dim one."""
+    materials.wear(part.data, materials.material(_LOOKS[look]))
     left = part.data.color_attributes.get(field_colours.COLOUR)
     if left is not None:
         part.data.color_attributes.remove(left)

@@ -195,9 +195,6 @@ class MU_PT_motion(_OfMotion, bpy.types.Panel):
         row.operator("mu.motion_update", text="", icon="FILE_REFRESH")
         row.operator("mu.motion_clear", text="", icon="X")
         column = layout.column(align=True)
-        row = column.row()
-        row.enabled = motion.halved
-        row.prop(settings, "cut")
         column.prop(settings, "on_unit")
         column.prop(settings, "apart")
         column.prop(settings, "live")

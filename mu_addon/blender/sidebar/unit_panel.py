@@ -14,6 +14,7 @@ from ..live_bending import words as live_words
 from ..node_tree import following
 from ..printing import panel as print_panel
 from ..printing import state as printing
+from ..results import motion as motion_parts
 from ..shared import scene_units
 from ..shared.operators import linked
 from ..shared.panels import CHARACTERS, TabPanel, alert, wrapped
@@ -68,11 +69,22 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
         if root.mu_motion.trouble:
             wrapped(layout, root.mu_motion.trouble, "ERROR")
-        row = layout.row()
-        row.enabled = root.mu_unit.show != unit_object.SOLID
-        row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
+        _cut(layout, root)
         live_words.draw(layout, root)
         _head(layout, root)
+
+
+def _cut(layout, root) -> None:
+    """Draw the switch that cuts open what is shown, design or result; grey, with the reason, if it cannot."""
+    row, why = layout.row(), ""
+    motion = motion_parts.motion_of(root) if unit_object.shows_result(root) else None
+    if root.mu_unit.show == unit_object.SOLID:
+        why = ": not the solid"
+    elif motion is not None and not motion.halved:
+        why = ": its mesh has no half"
+    row.enabled, row.use_property_split = not why, False
+    of = root.mu_unit if motion is None else root.mu_motion
+    row.prop(of, "cut", text=f"Cut Open{why}", icon="MOD_BOOLEAN", toggle=True)
 
 
 def _tree(layout, root) -> None:
