@@ -131,7 +131,8 @@ def _verdict(layout, root, judged):
     row = layout.row(align=True)
     row.operator("mu.evidence_open", text="Report", icon="URL").what = "report"
     row.operator("mu.evidence_open", text="Folder", icon="FILE_FOLDER").what = "folder"
-    layout.operator("mu.evidence_apply", icon="CHECKMARK")
+    if judged.name == "named":
+        layout.operator("mu.evidence_apply", icon="CHECKMARK")
     words = evidence.applied(root)
     if words:
         wrapped(layout, f"Applied to the unit: {words}", "INFO")

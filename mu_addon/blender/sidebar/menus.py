@@ -62,7 +62,8 @@ SUBJECTS = {
     "Print Files": ["print_export", "export_stl", "print_specimens", "print_check_file"],
     "Sensor on the Bench": [
         *("sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause", "sensor_mark"),
-        *("sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_calibrate", "sensor_zero", "sensor_twin"),
+        *("sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_back", "sensor_calibrate"),
+        *("sensor_zero", "sensor_twin"),
     ],
     "Gripper": ["grasp", "grasp_show", "gripper_delete"],
 }  # fmt: skip

@@ -90,7 +90,7 @@ def test_what_changes_the_file_is_one_undo_step():
     outside |= {"print_check", "print_check_file", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
-    outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}
+    outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_back"}
     outside |= {"sensor_calibrate", "sensor_cancel", "sensor_dismiss", "sensor_zero"}
     outside |= {
         "job_cancel",
