@@ -38,6 +38,7 @@ _MODULES = (
     # Operators.
     "unit.operators",
     "unit.presets",
+    "unit.resins",
     "path.picking",
     "simulate.operators",
     "optimize.operators",

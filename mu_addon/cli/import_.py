@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..lab_files.proposal import Proposal, Question
+    from ..lab_files.draft import Question
+    from ..lab_files.proposal import Proposal
     from ..run.context import RunContext
     from .options import Commands
 

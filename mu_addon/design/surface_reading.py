@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import re
 from pathlib import PurePath
@@ -46,8 +45,8 @@ _OTHERS = (
 )
 _SOLID = re.compile(rb"(\xef\xbb\xbf)?\s*solid\s", re.IGNORECASE)
 _POINT = re.compile(rb"(?:^|[\r\n])[ \t]*v[ \t]+[-+.\d]")
-# Errors by meshio for an invalid PLY file.
-_DAMAGED = (OSError, ValueError, LookupError, TypeError, AssertionError, ArithmeticError, MemoryError)
+# Characters in which a decimal comma is searched.
+_SHOWN = 1 << 16
 
 
 def read_surface(content: bytes, name: str, most_triangles: int | None = None) -> tuple[Vertices, Triangles]:
@@ -101,6 +100,17 @@ def _malformed(name: str, why: str) -> InputError:
     return InputError(f"the file is truncated or malformed: {why}", name, "export it again, whole")
 
 
+def _require_points(text: str, name: str) -> None:
+    """Raise InputError for a text whose numbers have decimal commas."""
+    for number, line in enumerate(text[:_SHOWN].split("\n"), 1):
+        if found := re.search(r"(?<![\d,])[-+]?\d+,\d+(?![\d,])", line):
+            raise InputError(
+                f"{found[0]!r} has a decimal comma",
+                f"{name}, line {number}",
+                "export it with decimal points (set the region of the program or the computer to English)",
+            )
+
+
 def _stl(content: bytes, name: str, most: int | None) -> tuple[Vertices, Triangles]:
     count = _binary_triangles(content)
     binary = count is not None
@@ -125,6 +135,7 @@ def _text_stl(text: str, name: str) -> tuple[Vertices, Triangles]:
         if len(corners) != sum(1 for _ in _VERTEX.finditer(text)) or len(corners) % 3:
             raise ValueError("a corner without its three numbers")
     except ValueError as error:
+        _require_points(text, name)
         raise _malformed(name, str(error)) from error
     if not len(corners):
         raise InputError("the STL file holds no triangles", name, "export the part again")
@@ -152,6 +163,7 @@ def _obj(text: str, name: str) -> tuple[Vertices, Triangles]:
                     raise ValueError("a face needs three corners or more, counted from 1")
                 faces.append([c - 1 if c > 0 else len(points) + c for c in corners])
         except ValueError as error:
+            _require_points(text, name)
             raise _malformed(name, f"line {number}: {error}") from error
     at = np.array(points, float).reshape(-1, 3)
     if any(not 0 <= c < len(at) for face in faces for c in face):
@@ -182,51 +194,106 @@ def _triangles(points: Vertices, faces: list[list[int]]) -> Triangles:
 
 
 def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
-    from meshio import ReadError
-    from meshio.ply._ply import read_buffer
-
-    head = content[: 1 << 16]
-    # meshio waits for the end of the header for ever.
-    if b"end_header" not in head:
+    """Points and faces of a PLY file, whatever other elements and properties it has, in any order."""
+    end = content.find(b"end_header", 0, 1 << 16)
+    if end < 0:
         raise _malformed(name, "the header of the PLY file does not end")
-    if b"format ascii" in head:
-        content = _text(content).encode()
-    # Both names are in use.
-    content = content.replace(b" vertex_index\n", b" vertex_indices\n", 1)
+    header = _text(content[:end]).split("\n")
+    body = content[end + len(b"end_header") :].lstrip(b" ")
     try:
-        header = head[: head.index(b"end_header")]
-        if re.search(rb"element vertex +0\s", header):
-            raise ValueError("it has no points")
-        if re.search(rb"(?m)^element .*\n(comment.*\n)*(element |\Z)", header):
-            raise ValueError("an element of its header has no properties")
-        if header.count(b"property list") > 1:
-            return _ply_of_lists(content)
-        mesh = read_buffer(io.BytesIO(content))
-        corners = [np.asarray(face) for block in mesh.cells for face in block.data if len(face) > 2]
-        if any(not np.issubdtype(face.dtype, np.integer) for face in corners):
+        order = next(_ORDERS[line.split()[1]] for line in header if line.startswith("format "))
+        elements = _ply_elements(header, order or "<f8")
+        if order:
+            body = body[2 if body.startswith(b"\r\n") else 1 :]
+        else:
+            body = np.array(body.split(), dtype=bytes).astype("<f8").tobytes()
+        at, found = 0, {}
+        for element, count, properties in elements:
+            found[element], at = _ply_rows(body, at, count, properties)
+        vertex, face = found["vertex"], found["face"]
+        corners = face.get("vertex_indices", face.get("vertex_index"))
+        if not len(vertex["x"]) or corners is None:
+            raise ValueError("it has no points" if corners is not None else "its faces have no corners")
+        points = np.column_stack([np.asarray(vertex[axis], float) for axis in "xyz"])
+        faces = np.concatenate([*map(np.ravel, corners), []])
+        if not np.array_equal(faces, np.floor(faces)):
             raise ValueError("a corner of a face is not a whole number")
-        faces = [face.tolist() for face in corners]
-        points = np.asarray(mesh.points, float)
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise ValueError("a point without its three numbers")
-        if any(not 0 <= c < len(points) for face in faces for c in face):
+        if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
             raise ValueError("a face names a point that the file does not have")
-        return points, _triangles(points, faces)
-    except (*_DAMAGED, ReadError) as error:
+        return points, _triangles(points, [[int(c) for c in face] for face in corners if len(face) > 2])
+    except (KeyError, StopIteration) as error:
+        raise _malformed(name, f"its header names no {error}") from error
+    except (ValueError, IndexError, OverflowError) as error:
+        _require_points(_text(body[:_SHOWN]) if not order else "", name)
         raise _malformed(name, str(error) or "the PLY file is damaged") from error
 
 
-def _ply_of_lists(content: bytes) -> tuple[Vertices, Triangles]:
-    """Surface of a file with more lists than the corners of its faces, such as places in a picture."""
-    from trimesh.exchange.ply import load_ply
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_SIZES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+# A property: its name, the type of its count if it is a list, and its type.
+_Property = tuple[str, str, str]
 
-    # Comments may name a picture, which is not to be read.
-    header, body = content.split(b"end_header", 1)
-    content = re.sub(rb"(?m)^comment[^\n]*\n", b"", header) + b"end_header" + body
-    read = load_ply(io.BytesIO(content))
-    points, faces = np.asarray(read["vertices"], float), np.asarray(read["faces"])
-    if points.ndim != 2 or points.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
-        raise ValueError("a point or a face without its numbers")
-    if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
-        raise ValueError("a face names a point that the file does not have")
-    return points, _triangles(points, faces.tolist())
+
+def _ply_elements(header: list[str], order: str) -> list[tuple[str, int, list[_Property]]]:
+    """Elements of a PLY header: name, count and properties; order: of the bytes, or a type for all."""
+
+    def type_of(name: str) -> str:
+        return order if len(order) > 1 else order + _SIZES[name]
+
+    elements: list[tuple[str, int, list[_Property]]] = []
+    for words in map(str.split, header):
+        if words[:1] == ["element"]:
+            elements.append((words[1], int(words[2]), []))
+        elif words[:2] == ["property", "list"]:
+            if words[4].startswith("vertex_ind") and "f" in _SIZES[words[3]]:
+                raise ValueError("a corner of a face is not a whole number")
+            elements[-1][2].append((words[4], type_of(words[2]), type_of(words[3])))
+        elif words[:1] == ["property"]:
+            elements[-1][2].append((words[2], "", type_of(words[1])))
+    if not all(properties for _, _, properties in elements):
+        raise ValueError("an element of its header has no properties")
+    return elements
+
+
+def _ply_rows(body: bytes, at: int, count: int, properties: list[_Property]) -> tuple[dict[str, Any], int]:
+    """Values of an element's properties by name, lists as sequences of rows, and the byte after them."""
+    if not 0 <= count <= len(body):
+        raise ValueError(f"it ends before {count} rows of an element")
+    lengths = {}
+    place = at
+    for name, counted, type_ in properties if count else []:
+        if counted:
+            lengths[name] = int(np.frombuffer(body, counted, 1, place)[0])
+            place += np.dtype(counted).itemsize
+        place += np.dtype(type_).itemsize * lengths.get(name, 1)
+    # All rows of the first one's lengths are read at once.
+    fields: list[Any] = []
+    for name, counted, type_ in properties:
+        if counted:
+            fields.append((f"length of {name}", counted))
+        fields.append((name, type_, (lengths.get(name, 0),)) if counted else (name, type_))
+    rows = np.dtype(fields)
+    if len(body) - at >= rows.itemsize * count:
+        table = np.frombuffer(body, rows, count, at)
+        if all((table[f"length of {name}"] == length).all() for name, length in lengths.items()):
+            return {name: table[name] for name, _, _ in properties}, at + rows.itemsize * count
+    found: dict[str, list[Any]] = {name: [] for name, _, _ in properties}
+    for _ in range(count):
+        for name, counted, type_ in properties:
+            length = 1
+            if counted:
+                length = int(np.frombuffer(body, counted, 1, at)[0])
+                at += np.dtype(counted).itemsize
+            values = np.frombuffer(body, type_, length, at)
+            at += values.nbytes
+            found[name].append(values if counted else values[0])
+    return found, at

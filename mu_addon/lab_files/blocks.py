@@ -17,9 +17,9 @@ import numpy as np
 from ..errors import InputError
 from ..table_cells.clock import clock, is_clock
 from ..table_cells.dialect import BRACKET, Row, split
-from ..table_cells.notation import judged, number, unit_behind, without_units
-from .columns import Column, column, is_unit, plain
-from .source import Sheet
+from ..table_cells.notation import Numbers, is_like_number, judged, number, unit_behind, with_units
+from .columns import Column, column, is_unit, plain, unit_of
+from .sheet import Sheet
 
 Array = np.ndarray[Any, Any]
 
@@ -39,6 +39,10 @@ _JUDGED = 30
 # What begins a line that is a comment, titles included.
 _COMMENT = re.compile(r"^(#+|%+|//+|;+)\s*")
 _LONGEST_UNIT = 10
+# Cells with the other decimal sign from which these alternate; fewer are damaged cells.
+_ALTERNATING = 3
+# Readings above so many times the others were no thousands.
+_FAR = 10.0
 # Letters of a line shown in a list.
 _LONGEST_SHOWN = 50
 
@@ -103,16 +107,16 @@ class Tables:
     head: tuple[int, ...]
 
 
-def tables(sheet: Sheet) -> Tables:
-    """Records of a sheet; records side by side in one table are divided. Raises InputError."""
-    return _Finding(sheet).tables()
+def tables(sheet: Sheet, fewest: int = 2) -> Tables:
+    """Records of a sheet of `fewest` columns or more; those side by side are divided. Raises InputError."""
+    return _Finding(sheet, fewest).tables()
 
 
 class _Finding:
     """Search for the tables of a sheet."""
 
-    def __init__(self, sheet: Sheet) -> None:
-        self.sheet, self.rows = sheet, sheet.rows
+    def __init__(self, sheet: Sheet, fewest: int) -> None:
+        self.sheet, self.rows, self.fewest = sheet, sheet.rows, fewest
         self.numeric = [row.numeric for row in self.rows]
         if self._start(0) is None:
             self.numeric = [_numeric_with_units(row) for row in self.rows]
@@ -180,22 +184,22 @@ class _Finding:
         return first in self.numeric[k]
 
     def _start(self, begin: int) -> int | None:
-        """The first row from `begin` on that shares two columns of numbers with one of the next three."""
+        """The first row from `begin` on that shares its columns of numbers with one of the next three."""
         filled = [k for k in range(begin, len(self.rows)) if self.rows[k].cells]
         for at, k in enumerate(filled):
-            if len(self.numeric[k]) < 2:
+            if len(self.numeric[k]) < self.fewest:
                 continue
             for j in filled[at + 1 : at + 4]:
                 if _names_columns(self.rows[j]) and self.numeric[k]:
                     # Settings above the titles, as "range 0.0 3.0".
                     break
-                if len(self.numeric[k] & self.numeric[j]) >= 2:
+                if len(self.numeric[k] & self.numeric[j]) >= self.fewest:
                     return k
         return None
 
     def _extent(self, start: int) -> tuple[list[int], list[int], int]:
         """The rows of a table, the rows within it that lack two of its numbers, and its end."""
-        near = [m for m in self.numeric[start : start + _JUDGED] if len(m) > 1]
+        near = [m for m in self.numeric[start : start + _JUDGED] if len(m) >= self.fewest]
         counts: dict[int, int] = {}
         for m in near:
             for k in m:
@@ -274,7 +278,7 @@ class _Finding:
                 [row for row in remarks if row.filled != (self.specimen,)], "between two records"
             )
         self._leave_text(self._at(skipped), "no row of numbers, within the table")
-        blocks = _block(self.sheet, titles, self._at(members), self.facts)
+        blocks = _block(self.sheet, titles, self._at(members), self.facts, self.fewest)
         self.titles, self.titled = titles, self.usual
         read = {int(line) for block in blocks for line in block.lines}
         self._leave([row for row in self._at(members) if row.line not in read], "no two columns of numbers")
@@ -289,7 +293,7 @@ class _Finding:
             row = self._title_row(k, width)
             if not row.filled:
                 continue
-            if not _is_titles(row):
+            if not (_is_titles(row) or (self.fewest == 1 and _known(row))):
                 within = self.numeric[k] & self.usual
                 if found or len(damaged) == _MOST_BETWEEN or not (within or len(row.filled) == 1):
                     break
@@ -315,7 +319,7 @@ class _Finding:
     def _title_row(self, k: int, width: int) -> Row:
         """A row above the numbers split into its titles, also with another separator."""
         row = self.rows[k]
-        cells = (_COMMENT.sub("", row.cells[0]), *row.cells[1:]) if row.cells else row.cells
+        cells = (_COMMENT.sub("", row.cells[0]) or row.cells[0], *row.cells[1:]) if row.cells else row.cells
         if len([c for c in cells if c]) == 1 and width > 1:
             text = next(c for c in cells if c)
             for delimiter in ("\t", ";", ",", "spaces"):
@@ -353,7 +357,7 @@ def _is_units(row: Row) -> bool:
     filled = row.filled
     if all(re.fullmatch(r"[(\[].*[)\]]", cell) for cell in filled):
         return True
-    known = sum(map(is_unit, filled))
+    known = sum(is_unit(cell) and cell != "-" for cell in filled)
     return (
         2 * known >= len(filled) and all(is_unit(c) or len(c) <= _LONGEST_UNIT for c in filled) and known > 0
     )
@@ -374,6 +378,7 @@ def _block(
     titles: Sequence[Row],
     rows: Sequence[Row],
     facts: dict[str, tuple[str, ...]],
+    fewest: int,
 ) -> list[Block]:
     units = next((row for row in titles if _is_units(row)), None)
     named = [row for row in titles if row is not units]
@@ -419,10 +424,10 @@ def _block(
     unread += [Unread(_named(title, k), "no cell in it") for k, title in beyond]
     parts: list[Block] = []
     for group in _side_by_side(columns):
-        values = np.stack([read[k].values for k in group], axis=1)
+        values = np.stack([read[k].scaled for k in group], axis=1)
         # Of records side by side, the shorter ends where its cells are empty.
         filled = np.array([any(_cell(row.cells, k) for k in group) for row in rows])
-        if filled.sum() < FEWEST or len(group) < 2:
+        if filled.sum() < FEWEST or len(group) < fewest:
             continue
         places = np.cumsum(filled) - 1
         bad = {
@@ -494,6 +499,12 @@ class _Read:
     unit: str = ""
     words: str = ""
     noted: str = ""
+    factors: Array | None = None
+
+    @property
+    def scaled(self) -> Array:
+        """Values in the column's one unit, where rows have units of their own."""
+        return self.values if self.factors is None else self.values * self.factors
 
 
 def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
@@ -505,12 +516,18 @@ def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
     clocks = sum(map(is_clock, filled))
     if 2 * clocks > len(filled):
         return _clock_column(cells)
-    apart, unit = without_units(cells)
+    apart, unit, factors = _without_units(cells)
     found = judged(apart, sheet.usual, sheet.forced)
+    _require_one_sign(found, apart, lines)
     if sheet.forced:
         _require_forced(sheet, found.unreadable, apart, lines)
     if 2 * len(found.unreadable) >= len(filled):
         words = Counter(filled).most_common(1)[0][0]
+        if words.startswith("="):
+            words = (
+                f"formulas without stored values, such as {words!r}: save the values in a spreadsheet program"
+            )
+            return _Read(empty, {}, (), numbers=False, words=words)
         same = (
             " in every row" if len(set(filled)) == 1 and len(filled) == len(cells) else f", such as {words!r}"
         )
@@ -525,7 +542,61 @@ def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
         )
     bad = {i: cells[i] for i in found.unreadable}
     unsure = not found.sure and not sheet.forced
-    return _Read(found.values, bad, tuple(apart), True, found.decimal, unsure, unit=unit, noted=noted)
+    if factors is not None:
+        k = int(np.argmax(np.isfinite(factors) & (factors != 1.0)))
+        other = unit_behind(cells[k])
+        noted = f"its unit changes from {unit!r} to {other!r} at line {lines[k]}: each row is read in its own"
+    return _Read(
+        found.values, bad, tuple(apart), True, found.decimal, unsure, unit=unit, noted=noted, factors=factors
+    )
+
+
+def _without_units(cells: list[str]) -> tuple[list[str], str, Array | None]:
+    """Cells without the units behind their numbers, the unit, and factors (n,) to it where it changes."""
+    apart = with_units(cells)
+    units = Counter(unit for _, unit in apart if unit)
+    if not units:
+        return cells, "", None
+    usual = next((unit for _, unit in apart if unit_of(unit)), units.most_common(1)[0][0])
+    read, one = unit_of(usual) or ("", 1.0)
+    same = {unit: known[1] / one for unit in units if (known := unit_of(unit)) and known[0] == read} or {
+        usual: 1.0
+    }
+    if 2 * sum(units[unit] for unit in same) < sum(map(bool, cells)):
+        return cells, "", None
+    values = [text if unit in same else cell for (text, unit), cell in zip(apart, cells, strict=True)]
+    # Of a number without a unit among those of several nothing is known.
+    alone = 1.0 if len(same) == 1 else np.nan
+    factors = np.array([same.get(unit, alone) for _, unit in apart])
+    return values, usual, None if len(same) == 1 else factors
+
+
+def _require_one_sign(found: Numbers, cells: Sequence[str], lines: Array) -> None:
+    """Raise InputError for a column in which decimal points and commas alternate."""
+    other = "." if found.decimal == "," else ","
+    if not any(other in cell for cell in cells):
+        return
+    apart = [i for i in found.unreadable if number(cells[i], other) is not None]
+    single = [i for i, cell in enumerate(cells) if cell.count(found.decimal) == 1 and other not in cell]
+    usual = float(np.nanmax(np.abs(found.values[single]), initial=0.0))
+    # Read as thousands, these are far from the rest, and as decimals among it.
+    thousands = [
+        i
+        for i, cell in enumerate(cells)
+        if cell.count(other) == 1
+        and found.decimal not in cell
+        and abs(found.values[i]) > _FAR * usual > 0
+        and abs(number(cell, other) or np.inf) <= 2 * usual
+    ]
+    if len(apart) < _ALTERNATING and not thousands:
+        return
+    first, then = (single or [0])[0], (apart or thousands)[0]
+    raise InputError(
+        f"decimal points and commas alternate in a column: {cells[first]!r} in line {lines[first]}, "
+        f"{cells[then]!r} in line {lines[then]}",
+        f"line {lines[then]}",
+        "export it again with one decimal sign, or replace the other one in a text editor",
+    )
 
 
 def _require_forced(sheet: Sheet, unreadable: Sequence[int], cells: Sequence[str], lines: Array) -> None:
@@ -593,13 +664,15 @@ def _facts(rows: Sequence[Row]) -> dict[str, tuple[str, ...]]:
         if not cells:
             continue
         match = re.match(r"([^:=]{2,60})[:=]\s*(.*)$", cells[0])
-        if match:
+        if match and not (cells[1:] and is_like_number(cells[1])):
             cells = [match[1], *([match[2]] if match[2] else []), *cells[1:]]
         if len(cells) == 2:
             # A value with its unit in one cell.
             apart = re.match(r"([+-]?[\d.,]+)\s*([^\d\s].*)$", cells[1])
             if apart:
                 cells = [cells[0], apart[1], apart[2]]
+        if len(cells) == 3 and is_unit(cells[1]) and is_like_number(cells[2]):
+            cells = [cells[0], cells[2], cells[1]]
         if len(cells) >= 2 or len(cells[0]) <= _LONGEST_LINE:
             found[plain(cells[0]).strip()] = tuple(cells[1:])
     return found

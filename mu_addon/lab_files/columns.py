@@ -17,12 +17,25 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(
             ("sec", "secs", "second", "seconds", "sek", "sekunden", "\u0441", "\u0441\u0435\u043a"), 1.0
         ),
-        **dict.fromkeys(("\u79d2", "\ucd08"), 1.0),
-        **dict.fromkeys(("msec", "millis", "millisecond", "milliseconds", "\u043c\u0441"), 1e-3),
+        **dict.fromkeys(
+            ("\u79d2", "\ucd08", "segundos", "segundo", "seg", "secondes", "secondi", "sekunder"), 1.0
+        ),
+        **dict.fromkeys(
+            (
+                "msec",
+                "millis",
+                "millisecond",
+                "milliseconds",
+                "milisegundos",
+                "millisekunden",
+                "\u043c\u0441",
+            ),
+            1e-3,
+        ),
         **dict.fromkeys(("\u00b5s", "\u03bcs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
         "ns": 1e-9,
-        **dict.fromkeys(("mins", "minute", "minutes"), 60.0),
-        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), 3600.0),
+        **dict.fromkeys(("mins", "minute", "minutes", "minuten", "minutos", "minuti"), 60.0),
+        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "stunden", "horas", "heures", "ore"), 3600.0),
         **dict.fromkeys(("d", "day", "days"), 86400.0),
         # Times of day of two parts are read as the former.
         **dict.fromkeys(("h:min", "hh:mm"), 1.0),
@@ -31,17 +44,28 @@ _SPELT: dict[str, dict[str, float]] = {
     "mm": {
         **dict.fromkeys(("in", "inch", "inches"), _INCH),
         **dict.fromkeys(("\u00b5m", "\u03bcm", "micron", "microns", "\u043c\u043a\u043c"), 1e-3),
-        **dict.fromkeys(("millimeter", "millimeters", "millimetre", "\u043c\u043c"), 1.0),
+        **dict.fromkeys(
+            (
+                "millimeter",
+                "millimeters",
+                "millimetre",
+                "millimetres",
+                "milimetros",
+                "millimetri",
+                "\u043c\u043c",
+            ),
+            1.0,
+        ),
         **dict.fromkeys(("mil", "mils", "thou"), _INCH / 1000.0),
         "ft": 12.0 * _INCH,
         "nm": 1e-6,
         "\u0441\u043c": 10.0,
     },
     "N": {
-        **dict.fromkeys(("lbf", "lb", "lbs"), _POUND),
+        **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), _POUND),
         **dict.fromkeys(("kgf", "kp", "\u043a\u0433\u0441"), _KILOPOND),
-        **dict.fromkeys(("newton", "newtons", "\u043d"), 1.0),
-        "gf": _KILOPOND / 1000.0,
+        **dict.fromkeys(("newton", "newtons", "newtones", "\u043d"), 1.0),
+        **dict.fromkeys(("gf", "grf", "gram-force", "grams-force"), _KILOPOND / 1000.0),
         "ozf": _POUND / 16.0,
         "\u043a\u043d": 1e3,
         "dan": 10.0,
@@ -55,14 +79,16 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("mmHg", "Torr"), 101.325 / 760.0),
         "\u043a\u043f\u0430": 1.0,
         "atm": 101.325,
-        "cmH2O": 0.0980665,
+        **dict.fromkeys(("mmH2O", "mmWC", "mmWS"), 0.00980665),
+        **dict.fromkeys(("cmH2O", "cmWC", "cmWS"), 0.0980665),
+        "inH2O": _INCH * 0.00980665,
         "inHg": _INCH * 101.325 / 760.0,
         "ksi": 1e3 * CONVERTED["kPa"]["psi"],
         "hPa": 0.1,
     },
-    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "\u00ba"), 1.0),
+    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "grados", "gradi", "degres", "\u00ba"), 1.0),
     "": {
-        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1"), 1.0),
+        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1", "-"), 1.0),
         "%": 1e-2,
         **dict.fromkeys(
             ("\u00b5\u03b5", "\u03bc\u03b5", "ue", "microstrain", "\u00b5m/m", "\u03bcm/m"), 1e-6
@@ -73,7 +99,7 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("mm\u00b3", "mm^3", "\u00b5l", "\u03bcl"), 1.0),
         **dict.fromkeys(("cm\u00b3", "cc", "cm^3"), 1e3),
     },
-    "g": {},
+    "g": dict.fromkeys(("gram", "grams", "gramm"), 1.0),
 }
 _UNITS = {
     unicodedata.normalize("NFC", name).casefold(): (read, factor)
@@ -92,6 +118,11 @@ _BY_CASE = {
     "v": None,
     "H": None,
 }
+
+
+# A unit of pressure with the zero it counts from, such as psia, bar(g) and kPa abs, and titles that say so.
+_REFERENCE = re.compile(r"(psi|m?bar|[kmh]?pa|torr|mmhg)[ _]?[(\[]?(a|abs\.?|absolute?|g|ga|gauge)[)\]]?")
+_ABSOLUTE = re.compile(r"\babsolut\w*|\babs\b|\bgauge (?=press)")
 
 
 def plain(text: str) -> str:
@@ -113,6 +144,7 @@ _WORDS = tuple(
         ),
         ("orientation", r"orientation|\bpose\b|\broll\b|\blage\b|orientacja|orientamento|orientacion"),
         ("angle", r"angle|winkel|angolo|angulo|\bkat\b|hoek|vinkel|kulma|szog|\buhel|\baci\b|угол|角度|각도"),
+        ("stretch", r"\bstretch\b|stretch ratio|\blambda ?\d?\b|\u03bb|streckung|streckverhaltnis|etirement"),
         (
             "strain",
             r"strain|dehnung|stauchung|allongement relatif|odksztalcenie|deformacion unitaria|\brek\b|"
@@ -144,7 +176,7 @@ _WORDS = tuple(
         ("added_mass", r"added.mass|zusatzmasse"),
         (
             "displacement",
-            r"extension|displacement|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
+            r"extension|\bext\b|displacement|\bstretch\b|\bdispl?\b|standardweg|\bweg\b|verschiebung|deplacement|spostamento|desplazamiento|"
             r"przemieszczenie|stroke|\bhub\b|course|corsa|travel|verformung|deformation|deflection|elongation|"
             r"verplaatsing|deslocamento|alongamento|alargamiento|forskydning|forskyvning|forflyttning|siirtyma|"
             r"elmozdulas|\bposuv|posunuti|prodlouzeni|uzama|allongement|wydluzenie|verlangerung|"
@@ -159,12 +191,14 @@ _WORDS = tuple(
         ),
         (
             "count",
-            r"\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
+            r"^#$|\bnr\b|\bno\b|number|index|count|\bframes?\b|cycle|zyklus|schritt|\bstep\b|point|номер|序号|番号|번호",
         ),
     )
 )
-# Units that quantities are read in; a machine's position is a displacement, a count is not read.
-READ_IN = {**UNITS, "position": "mm", "count": ""}
+# Units that quantities are read in. A machine's position is a displacement, a stretch (1 at rest) a strain; a
+# count is not read.
+READ_IN = {**UNITS, "position": "mm", "stretch": "", "count": ""}
+READ_AS = {"position": "displacement", "stretch": "strain"}
 # Never concluded from a unit, which suggests a more usual quantity.
 _ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
 _UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
@@ -193,6 +227,13 @@ class Column:
     stated: str = ""
 
     @property
+    def reference(self) -> str:
+        """Whether unit or title say of a pressure that it is "absolute" or "gauge"; "" for neither."""
+        match = _REFERENCE.fullmatch(self.unit.casefold())
+        word = match[2] if match else (_ABSOLUTE.search(plain(self.title)) or [""])[0]
+        return {"a": "absolute", "g": "gauge", "": ""}[word[:1]] if self.quantity == "pressure" else ""
+
+    @property
     def name(self) -> str:
         """Its title, or its number without one, as used in answers."""
         return self.title or str(self.place)
@@ -208,14 +249,23 @@ def column(title: str, unit: str = "") -> Column:
         name, unit = _apart(title)
     unit = unit.strip().strip("()[]{}").strip()
     known = unit_of(unit) if unit else None
+    if known and known[1] == 60.0 and unit.casefold() == "min" and _meant(name, "s") != "time":
+        # A minimum, as beside a (Max).
+        name, unit, known = title, "", None
     if unit and not known and _COMPOUND.fullmatch(unit):
         return Column(title, "count", unit, None)
     meant = _meant(name)
     if meant == "count" and not (known and known[0]):
         return Column(title, "count", unit, None)
+    if known and known[0] == "g" and meant == "force":
+        return Column(title, meant, unit, known_in("force", unit))
     quantity = _meant(name, known[0]) if known else meant
     if quantity == "count" or (not known and quantity == "strain" and not unit):
         return Column(title, quantity, unit, None)
+    if quantity == "stretch":
+        return Column(title, quantity, unit, known[1] if known else 1.0)
+    if not quantity and _REFERENCE.fullmatch(unit.casefold()):
+        quantity = "pressure"
     if quantity or not known or not known[0]:
         return Column(title, quantity, unit, known[1] if known else None)
     # The unit says it, where only one quantity has it, or the title speaks of another one of a test.
@@ -233,7 +283,22 @@ def unit_of(text: str) -> tuple[str, float] | None:
     text = unicodedata.normalize("NFC", text.strip().strip("()[]{}").strip())
     if text in _BY_CASE:
         return _BY_CASE[text]
-    return _UNITS.get(text.casefold()) or (_UNITS.get(text[:-1].casefold()) if text.endswith(".") else None)
+    if match := _REFERENCE.fullmatch(text.casefold()):
+        return unit_of(text[: match.end(1)])
+    return _UNITS.get(text.casefold()) or _UNITS.get(
+        plain(text).removesuffix(".") if text[:-1].isalpha() else ""
+    )
+
+
+def known_in(quantity: str, text: str) -> float | None:
+    """Factor from a unit to that in which a quantity is read, None for the unit of another quantity.
+
+    A force in g or kg is the weight of that mass.
+    """
+    known = unit_of(text) if text else None
+    if known and quantity == "force" and known[0] == "g":
+        return known[1] * _KILOPOND / 1000.0
+    return known[1] if known and known[0] == READ_IN[quantity] else None
 
 
 def is_unit(cell: str) -> bool:
@@ -255,8 +320,8 @@ def _apart(title: str) -> tuple[str, str]:
             return _BRACKETED.sub(" ", title).strip(), text
     for sign in _BEFORE_UNIT.finditer(title):
         name, unit = title[: sign.start()], title[sign.end() :]
-        if name and is_unit(unit) and not unit.isdigit():
-            return name, unit
+        if name and ((is_unit(unit) and not unit.isdigit()) or (unit == "S" and _meant(name) == "time")):
+            return name, unit.lower() if unit == "S" else unit
     # Names of a program's variables, such as millis.
     return title, title if is_unit(title) and len(title) > 4 else ""
 

@@ -127,7 +127,13 @@ class Kind:
         return column in self.columns or (self.marked and _MARKER.fullmatch(column) is not None)
 
 
-_LOAD = (("strain", "stress_kPa"), ("displacement_mm", "force_N"))
+# Section and length of the specimen turn force and displacement into stress and strain.
+_LOAD = (
+    ("strain", "stress_kPa"),
+    ("displacement_mm", "force_N"),
+    ("strain", "force_N"),
+    ("displacement_mm", "stress_kPa"),
+)
 _BENT = (
     ("pressure_kPa", "angle_deg"),
     ("pressure_kPa", "marker1_y_mm", "marker1_z_mm"),

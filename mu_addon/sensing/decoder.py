@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Iterator
 from typing import Any
 
 from .byte_accounts import Accounts, Counters, Reject
@@ -37,6 +39,9 @@ class Decoder:
         self._timeline = Timeline(self._accounts)
         self._last_format: str | None = None
         self._buffer = bytearray()
+        # Bytes before the buffer, and end and host time of each arrival that reaches into it.
+        self._taken = 0
+        self._arrivals: deque[tuple[int, float]] = deque()
         # Whether the next piece may lack its beginning.
         self._first = True
         self._bad_in_a_row = 0
@@ -47,6 +52,7 @@ class Decoder:
         self._names = ChannelNames()
         self._line = 0
         self._pending: Pairs = {}
+        self._pending_at = 0.0
         self._unnamed: list[Row] = []
         self._unnamed_since = math.inf
 
@@ -70,6 +76,8 @@ class Decoder:
         """Samples in bytes that arrived at host time `at` in s, a group for each run with one layout."""
         self.counters.bytes += len(data)
         self._buffer += data
+        if data:
+            self._arrivals.append((self.counters.bytes, at))
         self._mend_line_ends(data)
         self._at = at
         if self.format is None:
@@ -112,8 +120,7 @@ class Decoder:
 
     def _flush_buffer(self) -> None:
         """Empty the buffer: whole lines of no known format are unreadable, the rest was cut."""
-        rest = bytes(self._buffer)
-        self._buffer.clear()
+        rest = self._remove(len(self._buffer))
         if self.format is None:
             *lines, rest = rest.split(b"\n")
             self._accounts.reject_lines(lines)
@@ -129,8 +136,7 @@ class Decoder:
         excess = len(self._buffer) - _MOST_UNREAD_BYTES // 2
         end = self._buffer.rfind(b"\n", 0, excess) + 1
         if end:
-            self._accounts.reject_lines(bytes(self._buffer[: end - 1]).split(b"\n"))
-            del self._buffer[:end]
+            self._accounts.reject_lines(self._remove(end)[:-1].split(b"\n"))
         else:
             self._drop(excess)
         self._first = not end
@@ -143,15 +149,23 @@ class Decoder:
             self._bad_in_a_row = _LOST_THREAD
 
     def _drop(self, count: int) -> None:
-        self._accounts.drop(bytes(self._buffer[:count]))
-        del self._buffer[:count]
+        self._accounts.drop(self._remove(count))
 
-    def _pieces(self, end: bytes) -> list[bytes]:
-        """Whole pieces, their ends included."""
-        *pieces, rest = bytes(self._buffer).split(end)
-        if pieces:
-            self._buffer = bytearray(rest)
-        return [piece + end for piece in pieces]
+    def _remove(self, count: int) -> bytes:
+        """The first bytes of the buffer, removed; `_at` becomes the host time at which the last came."""
+        removed = bytes(self._buffer[:count])
+        del self._buffer[:count]
+        self._taken += count
+        while len(self._arrivals) > 1 and self._arrivals[0][0] < self._taken:
+            self._arrivals.popleft()
+        if self._arrivals and removed:
+            self._at = self._arrivals[0][1]
+        return removed
+
+    def _pieces(self, end: bytes) -> Iterator[bytes]:
+        """Whole pieces, their ends included, each with `_at` as the time at which its end came."""
+        while (count := self._buffer.find(end) + 1) > 0:
+            yield self._remove(count)
 
     def _mend_line_ends(self, data: bytes) -> None:
         """Take CR for the end of a line once several have come, and neither LF nor the end of a frame."""
@@ -325,6 +339,7 @@ class Decoder:
         if self._pending.keys() & found.keys():
             self._flush_pending()
         self._pending |= found
+        self._pending_at = self._at
         if known and known <= self._pending.keys():
             self._flush_pending(piece)
         return True
@@ -332,7 +347,7 @@ class Decoder:
     def _flush_pending(self, piece: bytes = b"") -> None:
         pending, self._pending = self._pending, {}
         if pending:
-            self._take_pairs(pending, piece)
+            self._take_pairs(pending, piece, self._pending_at)
 
     def _take_csv(self, line: str, piece: bytes, first: bool) -> bool:
         pairs = self._csv.take(line, piece, first)
@@ -343,8 +358,11 @@ class Decoder:
             self._take_pairs(pairs, piece)
         return pairs is not None
 
-    def _take_pairs(self, found: Pairs, piece: bytes) -> None:
-        """A sample of the present layout, with number and clock separated from its values."""
+    def _take_pairs(self, found: Pairs, piece: bytes, at: float | None = None) -> None:
+        """A sample of the present layout, with number and clock separated from its values.
+
+        at: host time of its arrival, that of the present piece if None.
+        """
         pairs = dict(found)
         number = next((pairs.pop(name) for name in NUMBERS if name in pairs), None)
         ticks, numbering = None, self._timeline.numbering
@@ -360,7 +378,7 @@ class Decoder:
         values = [pairs.get(name, math.nan) for name in self.layout.channels]
         if len(pairs) < len(values):
             self.counters.incomplete += 1
-        self._number(Row(number, ticks, values, self._at, piece))
+        self._number(Row(number, ticks, values, self._at if at is None else at, piece))
 
     def _number(self, row: Row) -> None:
         assert self.layout is not None

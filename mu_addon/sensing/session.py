@@ -35,6 +35,8 @@ Derive = Callable[[tuple[str, ...], Array], tuple[tuple[str, ...], Array]]
 STATUS = "status.json"
 SWEEP = "sweep"
 """Mark of the start of a guided sweep: earlier marks in a recording no longer count."""
+BACK = "back"
+"""Mark that takes back the last angle of a guided sweep."""
 LOSSES = {
     "lost": "lost",
     "crc_errors": "wrong CRC",

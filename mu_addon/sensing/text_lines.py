@@ -36,12 +36,12 @@ _TO_VOLT = {"mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "kV": 1e3}
 _UNITS = (
     *_TO_VOLT, "V", "mA", "uA", "µA", "A", "mW", "W", "kOhm", "kohm", "Ohm", "ohm", "kΩ", "Ω", "%RH", "%",
     "°C", "°F", "degC", "degF", "deg", "°", "rad", "kPa", "MPa", "hPa", "Pa", "mbar", "bar", "psi", "mmHg",
-    "mm", "cm", "m", "kN", "mN", "N", "kg", "g", "lux", "lx", "kHz", "Hz", "us", "µs", "ms", "s",
-    "K", "C", "F",
+    "mm", "cm", "m", "kN", "mN", "N", "kg", "g", "lbs", "lb", "lux", "lx", "kHz", "Hz", "us", "µs", "ms",
+    "s", "K", "C", "F",
 )  # fmt: skip
 # Of Greek letters and signs both that Unicode has; before a unit blanks, behind it no word and no other pair.
 _UNIT = rf"(?:\s*+({'|'.join(_UNITS)})(?![\w%°/]|\s*+[:=]))?"
-_END = r"(?:\s*+[,;]|\s++|$)"
+_END = r"(?:\s*+[,;|]|\s++|$)"
 _PAIR = re.compile(rf"\s*+({_LABEL}+)\s*+[:=]\s*+({_NUMBER}){_UNIT}{_END}")
 # Letters alone: with a digit it may be a number that was damaged, as infinities are.
 _WORD_PAIR = re.compile(rf"\s*+{_LABEL}+\s*+[:=]\s*+(?!(?i:inf|infinity|nan)\b)[A-Za-z][A-Za-z_-]++{_END}")
@@ -101,8 +101,10 @@ def why_unread(line: str) -> str:
         if found:
             return "a number in it is too large"
         return f"{rest[:40]!r} is not a `label:value` pair" if found is None else "no value in it is a number"
-    cell = next((cell for cell in _cells(line) if not _VALUE.match(cell)), "")
-    return f"{cell[:40]!r} is not a number, and has no label before it" if cell else "a number is too large"
+    cell = next((cell for cell in _cells(line) if not _VALUE.match(cell)), None)
+    if cell is None:
+        return "a number is too large"
+    return f"{cell[:40]!r} is not a number, and has no label before it" if cell else "a value is missing"
 
 
 def json_of(line: str) -> Pairs | None:
@@ -166,13 +168,16 @@ def row_of(line: str) -> list[float] | None:
 
 
 def _cells(line: str) -> list[str]:
-    """Cells between semicolons, commas or tabs, or between blanks where there is none of these.
+    """Cells between semicolons, commas, tabs or bars, or between blanks where there is none of these.
 
-    Between semicolons a comma is decimal.
+    Brackets around a line and one separator at its end are no part of it. Between semicolons a comma is
+    decimal.
     """
-    if ";" in line:
-        return [_DECIMAL_COMMA.sub(".", cell.strip()) for cell in line.split(";")]
-    for separator in ",\t":
+    if line[:1] + line[-1:] in ("()", "[]"):
+        line = line[1:-1]
+    for separator in ";,\t|":
         if separator in line:
-            return [cell.strip() for cell in line.split(separator)]
+            line = line.removesuffix(separator)
+            cells = [cell.strip() for cell in line.split(separator)]
+            return [_DECIMAL_COMMA.sub(".", cell) for cell in cells] if separator == ";" else cells
     return line.split()

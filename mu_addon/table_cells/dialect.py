@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 from collections.abc import Sequence
 
@@ -21,6 +22,7 @@ _SPACES = re.compile(r"\s{2,}|\t")
 BRACKET = re.compile(r"(?<=[^\s)\]])\s+(?=[(\[])")
 # As loggers write a cell that a spreadsheet shall not change.
 _TEXT_FORMULA = re.compile(r'="+([^"]*)"*')
+_HALVES = re.compile(r"\s*([-+]?\d+),(\d+)\s*")
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
 
@@ -85,7 +87,18 @@ def delimiter_of(lines: Sequence[str]) -> str:
     """The separator that leaves the largest share of numbers in most lines."""
     middle = max(0, len(lines) // 2 - _JUDGED // 2)
     sample = [*lines[:_JUDGED], *lines[max(_JUDGED, middle) : max(_JUDGED, middle) + _JUDGED]]
+    if _has_decimal_commas(sample):
+        return "\t"
     return max(DELIMITERS, key=lambda delimiter: sum(_worth(line, delimiter) for line in sample))
+
+
+def _has_decimal_commas(lines: Sequence[str]) -> bool:
+    """True for one column such as 20,51: as many digits behind each comma, and no count or time before it."""
+    halves = [found.groups() for line in lines if (found := _HALVES.fullmatch(line))]
+    if 2 * len(halves) < len(lines) or len({len(tail) for _, tail in halves}) > 1:
+        return False
+    heads = [int(head) for head, _ in halves]
+    return not all(a < b for a, b in itertools.pairwise(heads))
 
 
 def _worth(line: str, delimiter: str) -> float:

@@ -149,15 +149,7 @@ def _simple(cells: Sequence[str]) -> Numbers | None:
     return Numbers(values, ".", sure, ())
 
 
-def without_units(cells: Sequence[str]) -> tuple[list[str], str]:
-    """Cells such as "12.5 N" without the unit that most of them share, and that unit, "" if there is none."""
-    found = [_WITH_UNIT.fullmatch(plain_signs(cell)) for cell in cells]
-    units = [match[2] for match in found if match]
-    filled = sum(1 for cell in cells if cell)
-    unit = max(set(units), key=units.count) if units else ""
-    if not unit or units.count(unit) < 0.5 * filled:
-        return list(cells), ""
-    return [
-        match[1].strip() if match and match[2] == unit else cell
-        for match, cell in zip(found, cells, strict=True)
-    ], unit
+def with_units(cells: Sequence[str]) -> list[tuple[str, str]]:
+    """Number and unit of cells such as "12.5 N", the cell itself and "" where it has none."""
+    found = [(cell, _WITH_UNIT.fullmatch(plain_signs(cell))) for cell in cells]
+    return [(match[1].strip(), match[2]) if match else (cell, "") for cell, match in found]

@@ -426,7 +426,7 @@ def while_bending():
         yield 0.05
     gesture("a wall while bent")
     root.mu_unit.chambers.wall_mm = 0.98
-    yield from until(lambda: bending.of(only()).shape is None)
+    yield from until(lambda: bending.of(only()).current is None)
     yield from bent(root)
     gesture("Bend off")
     root.mu_live.on = False
@@ -435,7 +435,7 @@ def while_bending():
 
 def bent(root):
     def is_bent():
-        shape = bending.of(root).shape
+        shape = bending.of(root).current
         return shape is not None and len(shape.pressure_kPa) > 4
 
     yield from until(is_bent)

@@ -50,6 +50,23 @@ def ply(form="ascii", faces="vertex_indices"):
     return head.encode() + body + b"".join(struct.pack(f"<B{len(f)}i", len(f), *f) for f in FACES)
 
 
+def rich_ply(form):
+    """Other elements first and between, normals before places, doubles, scalars before a list."""
+    head = (
+        f"ply\nformat {form} 1.0\nobj_info by hand\nelement material 2\nproperty uchar red\n"
+        f"property list uchar ushort names\nelement vertex {2 * N}\nproperty float nx\nproperty float64 x\n"
+        f"property double y\nproperty float64 z\nproperty uint8 red\nelement edge 1\nproperty int vertex1\n"
+        f"element face {len(FACES)}\nproperty uchar material\nproperty list int8 uint32 vertex_indices\n"
+        "property short flags\nend_header\n"
+    )
+    rows = [("BB2H", 1, 2, 5, 6), ("BB", 1, 0), *(("fdddB", 0.5, *p, 255) for p in POINTS), ("i", 3)]
+    rows += [(f"Bb{len(f)}Ih", 1, len(f), *f, -1) for f in FACES]
+    if form == "ascii":
+        return (head + "\n".join(" ".join(map(str, row[1:])) for row in rows)).encode()
+    order = "<" if "little" in form else ">"
+    return head.encode() + b"".join(struct.pack(order + row[0], *row[1:]) for row in rows)
+
+
 def from_the_end():
     lines = obj().split("\n")
     count = len(POINTS)
@@ -85,6 +102,7 @@ FILES = {
     "windows.ply": ply().replace(b"\n", b"\r\n"),
     "index.ply": ply(faces="vertex_index"),
     "binary.ply": ply("binary_little_endian"),
+    **{f"rich {form}.ply": rich_ply(form) for form in ("ascii", "binary_little_endian", "binary_big_endian")},
 }
 
 
@@ -110,6 +128,11 @@ def test_every_dialect_brings_the_same_column(name):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a point that the file does not have"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "a point that the file does not have"),
         ("a.stl", stl(CORNERS)[:-60], "corner"),
+        ("a.stl", stl(CORNERS).replace(".", ","), "has a decimal comma"),
+        ("a.obj", obj().replace("v 3 0 0", "v 3,5 0,0 0,0"), "'3,5' has a decimal comma"),
+        ("a.ply", ply().decode().replace("3 0 0\n", "3,5 0,0 0,0\n"), "'3,5' has a decimal comma"),
+        ("a.ply", ply().decode().replace("float z", "float w"), "names no 'z'"),
+        ("a.ply", ply().decode().replace("element face", "element tristrips"), "names no 'face'"),
         ("a.stl", "triangles of mine", "not that of an STL file"),
         ("a.ply", ply().decode()[:-20], "truncated or malformed"),
         ("a.ply", ply().decode().replace("element face", "element edge 2\nelement face"), "no properties"),

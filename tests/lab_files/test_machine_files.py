@@ -18,6 +18,8 @@ from mu_addon.lab_files.source import read_sheets, sheet_of_text
 from mu_addon.usecases.import_data.report import terminal_lines
 from mu_addon.usecases.import_data.understood import understand
 
+from .test_cells import workbook
+
 COUPON = {"kind": "coupon", "mode": "uniaxial", "section_mm": "10x1", "length_mm": "100"}
 TITLES = "Time (s),Load (N),Extension (mm)"
 COUNT = int(os.environ.get("MUTANTS", "15"))
@@ -562,3 +564,254 @@ def test_a_stray_quote_among_titles_joins_no_two_of_them(tmp_path):
     (proposal,) = understand([tmp_path / "a.csv"], COUPON).proposals
     assert "displacement_mm" in proposal.columns
     assert proposal.columns["displacement_mm"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+RAMP = np.arange(120.0)
+SLIPPED = np.where(RAMP < 50, RAMP, -157.0 - 0.05 * RAMP)
+SPIKED = np.where(RAMP == 60, -9000.0, RAMP)
+CYCLE = 100.0 * np.sin(RAMP / 119 * 4 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mm", "newton", "signs", "named"),
+    [
+        ("coupon", SLIPPED, RAMP, (1, 1), ("displacement_mm", 52)),
+        ("coupon", RAMP, SPIKED, (1, 1), ("force_N", 62)),
+        ("coupon", RAMP, -SPIKED, (1, -1), ("force_N", 62)),
+        ("coupon", -SPIKED, -RAMP, (1, 1), ("displacement_mm", 62)),
+        ("coupon", RAMP, RAMP - 110, (1, 1), None),
+        ("coupon", CYCLE, -2 * CYCLE, (-1, 1), None),
+        ("coupon", CYCLE, np.where(CYCLE < 0, 3, 1) * CYCLE, (1, 1), None),
+        ("coupon", np.minimum(RAMP, 60), np.minimum(RAMP, 60) - 100 * (RAMP > 60), (1, 1), ("force_N", 63)),
+        ("coupon", RAMP, np.where(RAMP < 12, RAMP, -157.0 - 0.05 * RAMP), (1, 1), ("force_N", 14)),
+        ("coupon", RAMP, np.where(RAMP == 2, -9000.0, RAMP), (1, 1), ("force_N", 4)),
+        ("coupon", 90.0 * (RAMP > 5), 80 * (RAMP > 5) * np.exp(-RAMP / 30), (1, 1), None),
+        ("coupon", 0 * RAMP + 90, 80 * (RAMP > 5) * np.exp(-RAMP / 30), (1, 1), ("force_N", 8)),
+        ("lattice_compression", -RAMP, SPIKED, (-1, 1), ("force_N", 62)),
+        ("lattice_compression", -np.where(RAMP < 3, 0, 100), -np.where(RAMP < 3, 0, 90), (-1, -1), None),
+    ],
+)
+def test_the_sign_of_a_column_is_that_of_its_course_not_of_one_reading(
+    tmp_path, kind, mm, newton, signs, named
+):
+    body = [
+        f"{0.1 * i:.1f},{0.1 * f:.3f},{0.01 * x:.4f}" for i, (x, f) in enumerate(zip(mm, newton, strict=True))
+    ]
+    keys = COUPON | {"kind": kind}
+    p, _ = one(tmp_path, lines(TITLES, *body), keys | {"zero": "as_read"})
+    assert p.columns["displacement_mm"] == pytest.approx(signs[0] * 0.01 * mm, abs=1e-4)
+    assert p.columns["force_N"] == pytest.approx(signs[1] * 0.1 * newton, abs=1e-3)
+    told = [words for words in p.concluded if "jumps" in words]
+    assert not told if named is None else told[0].startswith(named[0]) and f"line {named[1]} " in told[0]
+    kept, _ = one(tmp_path, lines(TITLES, *body), keys | {"zero": "as_read", "sign": "as_read"})
+    assert kept.columns["force_N"] == pytest.approx(0.1 * newton, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("titles", "cells", "answers", "column", "last"),
+    [
+        ("Load (g),Extension (mm)", "{i},{i}", {}, "force_N", 49 * 9.80665e-3),
+        ("Kraft [kg],Weg [mm]", "{i},{i}", {}, "force_N", 49 * 9.80665),
+        ("Weight (g),Extension (mm)", "{i},{i}", {}, "force_N", 49 * 9.80665e-3),
+        ("W,Weg (mm)", "{i},{i}", {"column.W": "force", "unit.W": "g"}, "force_N", 49 * 9.80665e-3),
+        ("Load (g),Tip deflection (mm)", "{i},{i}", {"kind": "beam_deadweight"}, "added_mass_g", 49),
+        ("Stretch,Nominal stress (kPa)", "1.{i:02d},{i}", {}, "strain", 0.49),
+        ("lambda [-],Stress [kPa]", "1.{i:02d},{i}", {}, "strain", 0.49),
+        ("Stretch [%],Stress [kPa]", "1{i:02d},{i}", {}, "strain", 0.49),
+        ("Stretch [%],Stress [kPa]", "{i},{i}", {}, "strain", 0.49),
+        ("Stretch (mm),Force (N)", "{i},{i}", {}, "displacement_mm", 49),
+        ("Strain [-],Stress [kPa]", "1.{i:02d},{i}", {"column.Strain [-]": "stretch"}, "strain", 0.49),
+        ("Strain [-],Stress [kPa]", "1.{i:02d},{i}", {"column.Strain [-]": "strain"}, "strain", 1.49),
+    ],
+)  # fmt: skip
+def test_what_a_title_means_beside_its_unit_and_its_first_reading(
+    tmp_path, titles, cells, answers, column, last
+):
+    body = [cells.format(i=i) for i in range(50)]
+    p, _ = one(tmp_path, lines(titles, *body), COUPON | answers)
+    assert p.columns[column][-1] == pytest.approx(last)
+
+
+def test_a_strain_that_begins_at_one_is_asked_for(tmp_path):
+    text = lines("Strain [-],Stress [kPa]", *(f"1.{i:02d},{i}" for i in range(50)))
+    assert [(q.key, q.proposed) for _, q in understood(tmp_path, text).open] == [
+        ("column.Strain [-]", "stretch")
+    ]
+    text = lines("Reading,Force (N),Signal(Min)", *(f"{i},{i},4{i}" for i in range(12)))
+    asked = {q.key: q.proposed for _, q in understood(tmp_path, text, {}).asked}
+    assert "time" not in asked.values()
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "Frequency,Temperature,Oscillation strain,Oscillation stress,Storage modulus",
+        "Zeit,Temp,Dehnung,Spannung,Speichermodul E'",
+        "Freq,Temp,Strain,Stress,Tan(delta)",
+        "t,T,Strain,Stress,G''",
+    ],
+)
+def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
+    text = lines(titles, "Hz,\u00b0C,%,kPa,kPa", *(f"1,{25 + i},0.1,{80 - i},{80 - i}" for i in range(40)))
+    with pytest.raises(InputError, match="oscillation"):
+        understood(tmp_path, text)
+    said = {f"column.{titles.split(',')[k]}": "none" for k in (0, 4)}
+    if "Oscillation" in titles:
+        said |= {"column.Oscillation strain": "strain", "column.Oscillation stress": "stress"}
+    assert len(understood(tmp_path, text, COUPON | said).proposals[0].lines) == 40
+
+
+def test_a_unit_that_changes_within_a_column_is_that_of_each_row(tmp_path):
+    body = [f"{i}, {'%g mN' % (100 * i) if i < 40 else '%g N' % (0.1 * i)}, {i} mm" for i in range(80)]
+    p, told = one(tmp_path, lines("Time (s),Load,Extension", *body))
+    assert p.columns["force_N"] == pytest.approx(0.1 * np.arange(80))
+    assert told == []
+    assert any("changes from 'mN' to 'N' at line 42" in words for words in p.concluded)
+
+
+@pytest.mark.parametrize("written", ["{i},5", "{i},125", "0,{i:03d}"])
+def test_decimal_signs_that_alternate_are_named_with_their_lines(tmp_path, written):
+    cells = [written.format(i=10 + i) for i in range(40)]
+    body = [f"{i};{c if i % 2 else c.replace(',', '.')};{i}" for i, c in enumerate(cells)]
+    with pytest.raises(InputError, match="alternate") as caught:
+        understood(tmp_path, lines("Time (s);Load (N);Extension (mm)", *body))
+    assert re.search(r"line \d", caught.value.where)
+
+
+@pytest.mark.parametrize(
+    ("head", "length", "section"),
+    [
+        ('Strain : Tensile strain (Displacement) gauge length,"80.00000",mm', 80.0, None),
+        ("Gauge length;80;mm\nWidth;10;mm\nThickness;2;mm", 80.0, [10.0, 2.0]),
+        ("Gauge length [mm]: 80\nWidth [mm]: 10\nThickness [mm]: 2", 80.0, [10.0, 2.0]),
+        ("Width,mm,10\nThickness,mm,2\nGauge length,cm,8", 80.0, [10.0, 2.0]),
+        ("Specimen of width 10 mm, thickness 2 mm and gauge length 80 mm", 80.0, [10.0, 2.0]),
+        ("Cross section: 10 x 2 mm", None, [10.0, 2.0]),
+        ("Area (mm2);20", None, [20.0**0.5, 20.0**0.5]),
+        ("width and thickness were 10 mm and 2 mm", None, None),
+    ],
+)
+def test_dimensions_in_the_head_of_a_file(tmp_path, head, length, section):
+    found = understood(tmp_path, lines(head, "", TITLES, *rows()), {"kind": "coupon", "mode": "uniaxial"})
+    keys = found.proposals[0].keys
+    assert keys.get("length_mm") == length
+    assert keys.get("section_mm") == (section and pytest.approx(section, abs=1e-5))
+
+
+PRESSED = {"kind": "unit_pressure"}
+CLOCKED = {"column.2": "pressure", "column.3": "angle", "unit.2": "kPa", "unit.3": "deg"}
+HELD = {"kind": "pressure_hold", "interval_s": "0.5", "column.1": "pressure", "unit.1": "kPa"}
+LABELLED = {"unit.t": "s", "unit.Pressure": "bar", "unit.Angle": "deg"}
+WRAP = 2**32
+
+
+def many(row, *head, count=60):
+    """Text of lines above `count` rows."""
+    return lines(*head, *map(row, range(count)))
+
+
+@pytest.mark.parametrize(
+    ("text", "answers", "column", "last"),
+    [
+        (many(lambda i: f"14:02:{i / 10 + 1:06.3f} -> {i},{2 * i}"), CLOCKED, "time_s", 5.9),
+        (
+            many(lambda i: f"1:02:{i:02d} -> {i}\t{i}", "1:01:59 -> Pressure (kPa)\tAngle (deg)"),
+            {},
+            "angle_deg",
+            59,
+        ),
+        (
+            many(lambda i: f"23:59:{i:02d} -> Pressure: {i}.5 kPa, Angle: {i}"),
+            {"unit.Angle": "deg"},
+            "pressure_kPa",
+            59.5,
+        ),
+        (many(lambda i: f"t:{i}\tPressure={i}.5\tAngle=-{i}", "boot"), LABELLED, "pressure_kPa", 5950),
+        (many(lambda i: f"{20 - 0.01 * i:.2f}", "# kPa"), HELD, "time_s", 29.5),
+        (many(lambda i: f"{2000 - i}", "Pressure (Pa)"), {"interval_s": "0.5"}, "pressure_kPa", 1.941),
+        (
+            many(
+                lambda i: f"{(65000 + 20 * i) % 65536},{14.7 + i / 10:.1f},{i}", "t_ms,P (psia),Angle (deg)"
+            ),
+            PRESSED | {"column.P (psia)": "pressure"},
+            "time_s",
+            1.18,
+        ),
+        (
+            many(lambda i: f"{(WRAP - 3000 + 1000 * i) % WRAP},{i},{i}", "t_us,Pressure (mmH2O),Angle (deg)"),
+            PRESSED,
+            "pressure_kPa",
+            59 * 9.80665e-3,
+        ),
+        (
+            many(
+                lambda i: f"{(WRAP - 3000 + 1000 * i) % WRAP / 1e6},{i},{i}", "t_s,Pressure (kPa),Angle (deg)"
+            ),
+            PRESSED,
+            "time_s",
+            0.059,
+        ),
+        (many(lambda i: f"{i / 100},{1000 * i}", "strain [-],force [mN]"), COUPON, "force_N", 59),
+        (many(lambda i: f"{i / 100},{i}", "Weg (mm),Spannung (MPa)"), COUPON, "stress_kPa", 59000),
+    ],
+)
+def test_what_boards_and_loggers_write(tmp_path, text, answers, column, last):
+    p, _ = one(tmp_path, text, answers)
+    assert p.columns[column][-1] == pytest.approx(last)
+    assert len(p.lines) == 60
+
+
+@pytest.mark.parametrize(
+    ("titles", "first", "reference", "asked"),
+    [
+        ("Pressure (kPa abs)", 101.3, "absolute", []),
+        ("Pressure (psia)", 14.7, "absolute", []),
+        ("Absolutdruck [kPa]", 101.3, "absolute", []),
+        ("Pressure (barg)", 1.0, "gauge", []),
+        ("Pressure (kPa)", 101.3, None, [("pressure", "absolute")]),
+        ("Pressure (kPa)", 0.0, None, []),
+    ],
+)
+def test_absolute_pressures_are_known_by_their_unit_or_asked_for(tmp_path, titles, first, reference, asked):
+    text = lines(f"Time (s),{titles},Angle (deg)", *(f"{i},{first + 0.1 * i:.2f},{i}" for i in range(60)))
+    found = understood(tmp_path, text, {"column." + titles: "pressure"})
+    assert [(q.key, q.proposed) for _, q in found.open] == asked
+    assert found.proposals[0].keys.get("pressure") == reference
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (
+            many(lambda i: f"{i},{100 + i},50,{200 + i},50", "Time (ms),a X,a Y,b X,b Y"),
+            "tracked markers: a, b",
+        ),
+        (
+            many(lambda i: f"0.{i:02d} {100 + i} {i}", "#Kinovea Trajectory data export", "#T X Y"),
+            "tracked markers: path 1",
+        ),
+        (
+            many(lambda i: f"{i},{i},90,0.9", "scorer,n,n,n", "bodyparts,a,a,a", "coords,x,y,likelihood"),
+            "tracked markers: a",
+        ),
+        (
+            many(lambda i: f"{i},=B{i}*2,{i}", "Time (s),Load,Extension (mm)"),
+            "formulas without stored values",
+        ),
+        (many(lambda i: f"{i}.5"), "one column of numbers.*time"),
+        (lines("a 1 2", "b c 3 4", "5 d e f 6"), "line 1 is 'a 1 2'"),
+        (many(lambda i: f"{60 - i},{i},{i}", TITLES), "time runs backward"),
+        (many(lambda i: f"{20 * (i % 30)},{i},{i}", TITLES), "time runs backward"),
+    ],
+)
+def test_what_is_refused_says_why(tmp_path, text, what):
+    with pytest.raises(InputError, match=what) as caught:
+        understood(tmp_path, text, COUPON)
+    assert caught.value.remedy
+
+
+def test_formulas_of_a_workbook_without_stored_values_are_named(tmp_path):
+    rows = [["Time (s)", "Load (N)", "Extension (mm)"], *([i, f"=A{i + 2}*2", i] for i in range(20))]
+    workbook(tmp_path / "a.xlsx", {"b & c": rows})
+    with pytest.raises(InputError, match=r"'Load \(N\)': formulas without stored values, such as '=A"):
+        understand([tmp_path / "a.xlsx"], COUPON)

@@ -134,6 +134,11 @@ def test_a_device_that_starts_anew() -> None:
         ("csv", "{0},7.5\n"),
         ("csv", "{0} 7.5\r\n"),
         ("csv", "{0};7.5\n"),
+        ("csv", "{0},7.5,\n"),
+        ("csv", "({0}, 7.5)\r\n"),
+        ("csv", "[{0}, 7.5]\r\n"),
+        ("csv", "{0} | 7.5\n"),
+        ("labels", "light:\t{0}\t| dark:\t7.5\r\n"),
     ],
 )
 def test_text_is_told_apart(name: str, line: str) -> None:
@@ -339,3 +344,25 @@ def test_a_session_without_a_sample_fails_with_what_to_do(tmp_path):
     with pytest.raises(MuError, match="text in no format"):
         require_samples(unread, tmp_path)
     require_samples(silent | {"rows": 1}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        # The first line may lack its beginning.
+        ([f"{500 + k}\n" for k in range(5)], [1, 2, 3, 4]),
+        (["note\n", "light,dark\n", *(f"{k},7\n" for k in range(5))], [2, 3, 4, 5, 6]),
+        ([f"{'ab'[k % 2]}:{k}\n" for k in range(10)], [2, 4, 6, 8, 9]),
+        ([f'{{"a": {k}}}\n' for k in range(2)], [1]),
+    ],
+    ids=["values", "header", "a label a line", "format known at the end"],
+)
+def test_samples_have_the_time_at_which_they_came_not_that_at_which_the_format_was_known(
+    lines: list[str], expected: list[float]
+) -> None:
+    decoder, groups = Decoder(), []
+    for k, line in enumerate(lines):
+        # The end of a line comes a little after its beginning.
+        groups += decoder.feed(line[:-1].encode(), k - 0.25) + decoder.feed(line[-1:].encode(), float(k))
+    groups += decoder.finish(60.0)
+    assert all_of(groups, "host_s") == pytest.approx(expected, abs=1e-4)

@@ -42,7 +42,7 @@ def run(*arguments: object) -> int:
 
 
 def test_a_sweep_that_failed_does_not_poison_the_next_one_of_the_recording(tmp_path: Path) -> None:
-    """The cable was loose, or the angles were others: marks before the last "sweep" no longer count."""
+    """Marks before the last "sweep" no longer count, nor does the angle that a mark "back" takes back."""
     time_s = np.arange(0.0, 10.0, 0.1)
 
     class Kept:
@@ -50,11 +50,16 @@ def test_a_sweep_that_failed_does_not_poison_the_next_one_of_the_recording(tmp_p
             {"event": "mark", "time_s": 0.0, "text": "angle 30"},
             {"event": "mark", "time_s": 4.0, "text": "sweep"},
             {"event": "mark", "time_s": 5.0, "text": "angle 0"},
+            {"event": "mark", "time_s": 6.5, "text": "angle 15"},
+            {"event": "mark", "time_s": 7.0, "text": "back"},
+            {"event": "mark", "time_s": 8.0, "text": "angle 15"},
         )
 
     angle = _marked(Kept, time_s)
     assert np.isnan(angle[time_s < 4.9]).all()
     assert 0.0 in angle
+    assert 8.0 <= time_s[angle == 15.0].min() < 8.2
+    assert np.isnan(angle[(time_s > 6.4) & (time_s < 7.9)]).all()
 
 
 @pytest.mark.parametrize("marked", [False, True])

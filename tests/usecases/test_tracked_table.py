@@ -74,8 +74,19 @@ def test_a_row_for_each_marker_and_frame(tmp_path):
             ("A", "B"),
             None,
         ),
+        (
+            "#Kinovea Trajectory data export\n#T X Y\n\n# A\n0 1.5 2 \n0.04 1.5 2 \n\n# B\n0 3 4\n0.04 3 4\n",
+            ("A", "B"),
+            [0.0, 0.04],
+        ),
+        (
+            "#Kinovea Trajectory data export\n#T X Y\n0:00:00:00 1,50 2,00\n0:00:01:03 1,50 2,00\n\n\n"
+            "0:00:00:00 3,00 4,00\n0:00:01:03 3,00 4,00\n",
+            ("path 1", "path 2"),
+            [0.0, 1.03],
+        ),
     ],
-    ids=["kinovea", "tracker", "sleap"],
+    ids=["kinovea", "tracker", "sleap", "kinovea text", "kinovea text with a clock"],
 )
 def test_columns_for_each_marker(tmp_path, text, names, time_s):
     read = read_pixels(table(tmp_path, text))
@@ -91,6 +102,16 @@ def test_columns_for_each_marker(tmp_path, text, names, time_s):
         (TRACKMATE.replace("(pixel)", "(micron)"), "'POSITION_X' is in micron", "line 1", "in pixels"),
         ("t,A x (mm),A y (mm)\n0,1,2\n1,1,2\n", "'A x (mm)' is in mm", "line 1", "in pixels"),
         ("t,A x,A y\n0,1,-20\n1,1,-30\n", "positions are negative", "a.csv", "upper left corner"),
+        ("t,A X,A Y,A Z\n0,10,20,1\n1,10,30,2\n", "'A Z' varies", "a.csv", "bending plane"),
+        ("Frame,Time,X,Y,Z,X,Y,Z\n0,0,1,2,3,4,5,6\n1,1,1,2,3,4,5,6\n", "three axes", "line 1", "plane"),
+        (
+            f"type,net\n{',,a,a,a,b,b,b'}\nFrame,Time,X,Y,Z,X,Y,Z\n0,0,1,2,3,4,5,6\n1,1,1,2,3.5,4,5,6\n",
+            "'Z' varies",
+            "a.csv",
+            "bending plane",
+        ),
+        (",,A,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n1,0,9,2,3\n2,0,8,2,3\n", "in mm", "line 2", "plane"),
+        ("t,A x,A y\n0,0.1,0.2\n1,0.1,0.25\n", "within 0.05: they are not in pixels", "a.csv", "pixels"),
         ("frame,A x,A y\n0,1,2\n1,1,lost\n", "not a number", "row 3", "correct"),
         ("frame,A x,A y\n0,1,2\n0,1,2\n", "does not increase", "row 3", "one animal or track"),
         ("frame,id,x,y\n0,1,1,2\n0,1,1,2\n", "two rows for one frame", "row 3", "keep the row"),

@@ -13,15 +13,13 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
-from ...design.parameters import SECTIONS
-from ...design.quantity import describe
 from ...errors import InputError
 from ...reading import parse_json
 from ..preview import materials
-from ..shared import displays, updates
+from ..shared import displays
 from ..shared.operators import linked, reports_errors
 from ..shared.registration import add_handlers, remove_handlers
-from ..unit import drawing
+from ..unit import drawing, resins
 from ..unit import object as unit_object
 
 RESIN, PRINTER = "mu_resin", "mu_printer"
@@ -59,13 +57,7 @@ class MU_OT_take_asset(bpy.types.Operator):
 
 
 def _take_resin(root: Any, resin: Any) -> None:
-    given = parse_json(resin[RESIN], f"{resin.name}, {RESIN}")
-    with updates.paused():
-        for section in SECTIONS:
-            group, values = getattr(root.mu_unit, section.section), given.get(section.section, {})
-            for d in describe(section):
-                if d.name in values:
-                    setattr(group, d.name, values[d.name])
+    resins.take(root, resin.name, parse_json(resin[RESIN], f"{resin.name}, {RESIN}"))
     _restore_slots(root)
     unit_object.rebuild(root)
 

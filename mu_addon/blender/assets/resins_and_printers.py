@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import attrs
 import bpy
 import numpy as np
 
 from ...design.assets import asset_names
-from ...design.parameters import Unit
 from ...design.printing.printer import load_printer
 from ..preview import materials
 from ..shared import scene_units
+from ..unit.resins import parameters as resin_parameters
 from .dropped import PRINTER, RESIN
 from .surface_picture import surface_pixels
 
@@ -43,10 +42,7 @@ def resins() -> list[Any]:
     for resin in _resins():
         found = bpy.data.materials.new(resin.name)
         found.diffuse_color = materials.COLOURS["MU Membrane"]
-        unit = resin.in_unit(Unit())
-        of_wall = ("membrane_modulus_kPa", "membrane_poisson")
-        material = {name: getattr(unit.material, name) for name in of_wall}
-        found[RESIN] = json.dumps({"material": material, "wall": attrs.asdict(unit.wall)})
+        found[RESIN] = json.dumps(resin_parameters(resin))
         found.asset_mark()
         found.asset_data.description = f"Resin of a unit's wall: {resin.about}"
         made.append(found)

@@ -57,7 +57,9 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
             why = "Diagnose the measured data first"
         elif found.stale:
             why = f"The diagnosis is stale: {found.stale}"
-        elif found.name not in ("named", "ambiguous"):
+        elif found.name == "ambiguous":
+            why = "Several effects explain the data equally well: measure first what tells them apart"
+        elif found.name != "named":
             why = "No effect was named that could be applied"
         else:
             why = "This model is already applied: undo removes it" if evidence.applied(root) else ""

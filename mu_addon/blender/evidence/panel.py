@@ -48,7 +48,8 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
             return
         _experiments(layout, context, root, found.measured)
         child = evidence.DIAGNOSIS.child(root)
-        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM", text=start_words(root, "Diagnose"))
+        words = start_words(root)
+        start_button(layout, child, "mu.evidence_diagnose", "VIEWZOOM", root=root, text=words)
         job_state(layout, child, "see below", JOB)
         judged = evidence.diagnosis(root)
         if judged is None or not judged.name:
@@ -59,9 +60,9 @@ class MU_PT_evidence(UnitPanel, bpy.types.Panel):
         _verdict(layout, root, judged)
 
 
-def start_words(root, name: str) -> str:
+def start_words(root) -> str:
     """Label of the button that starts the diagnosis, with what it takes once measured on this machine."""
-    return timed_if_measured(name, evidence.announced(root))
+    return timed_if_measured("Diagnose", evidence.announced(root))
 
 
 def _experiments(layout, context, root, measured):
@@ -130,7 +131,8 @@ def _verdict(layout, root, judged):
     row = layout.row(align=True)
     row.operator("mu.evidence_open", text="Report", icon="URL").what = "report"
     row.operator("mu.evidence_open", text="Folder", icon="FILE_FOLDER").what = "folder"
-    layout.operator("mu.evidence_apply", icon="CHECKMARK")
+    if judged.name == "named":
+        layout.operator("mu.evidence_apply", icon="CHECKMARK")
     words = evidence.applied(root)
     if words:
         wrapped(layout, f"Applied to the unit: {words}", "INFO")

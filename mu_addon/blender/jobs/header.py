@@ -159,12 +159,12 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 def register() -> None:
     """Register operators, the menu, and the bar."""
     _register_classes()
-    bpy.types.STATUSBAR_HT_header.append(draw)
+    viewports.extend_status_bar(draw)
     bpy.types.VIEW3D_HT_header.append(draw_in_view)
 
 
 def unregister() -> None:
     """Unregister them."""
     bpy.types.VIEW3D_HT_header.remove(draw_in_view)
-    bpy.types.STATUSBAR_HT_header.remove(draw)
+    viewports.reduce_status_bar(draw)
     _unregister_classes()

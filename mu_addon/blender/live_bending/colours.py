@@ -9,9 +9,8 @@ import numpy as np
 
 from ..preview import materials
 from ..results import field_colours
-from ..shared import viewports
 
-_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice"}
+_LOOKS = {"membrane": "MU Membrane", "lattice": "MU Lattice", "before": "MU Before"}
 
 
 def ends_of(fields: dict[str, dict[str, Any]], field: str) -> tuple[float, float] | None:
@@ -24,9 +23,9 @@ def ends_of(fields: dict[str, dict[str, Any]], field: str) -> tuple[float, float
     return low, max(high, low + 1e-6)
 
 
-def plain(part: Any, region: str) -> None:
-    """Give a part the colours of the design."""
-    materials.wear(part.data, materials.material(_LOOKS[region]))
+def plain(part: Any, look: str) -> None:
+    """Give a part the colour of its region in the design or, with "before", a dim one."""
+    materials.wear(part.data, materials.material(_LOOKS[look]))
     left = part.data.color_attributes.get(field_colours.COLOUR)
     if left is not None:
         part.data.color_attributes.remove(left)
@@ -44,11 +43,3 @@ def coloured(root: Any, part: Any, field: str, values: Any, ends: tuple[float, f
     attribute = part.data.attributes.get(field) or part.data.attributes.new(field, "FLOAT", "POINT")
     attribute.data.foreach_set("value", np.ascontiguousarray(values, np.float32))
     field_colours.write_colours(root, part.data, values, ends)
-
-
-def show(on: bool) -> None:
-    """Let 3D views in solid shading show colours of fields, or those of materials."""
-    for area in viewports.areas():
-        shading = area.spaces.active.shading
-        if shading.type == "SOLID":
-            shading.color_type = "VERTEX" if on else "MATERIAL"

@@ -43,9 +43,13 @@ TICK_S = 0.1
 class Shape:
     """The unit's shapes (s, v, 3) in mm by region at pressures (s,), its triangles, and its angles (s,).
 
-    fields: by region and name, (s, v), where they were asked for.
+    fields: by region and name, (s, v), where they were asked for; design: that it is a shape of.
     """
 
+    design: str
+    cut: bool
+    motion: Motion
+    answer: dict[str, Any]
     pressure_kPa: Any
     angle_deg: Any
     vertices: dict[str, Any]
@@ -68,7 +72,7 @@ class Shape:
 
 @attrs.define(eq=False)
 class Live:
-    """A unit's live bending: its process, the latest request, and the shape that answers it.
+    """A unit's live bending: its process, the design to bend, and the latest shape, maybe of an earlier one.
 
     arrived: a shape that is shown at the next tick, so that the window draws between its reading and that.
     """
@@ -82,6 +86,11 @@ class Live:
     arrived: Shape | None = None
     trouble: str = ""
     _read_ns: int = 0
+
+    @property
+    def current(self) -> Shape | None:
+        """The shape of the present design, or None while it is computed."""
+        return self.shape if self.shape is not None and self.shape.design == self.design else None
 
     def end(self) -> None:
         """End the process."""
@@ -127,6 +136,8 @@ def _switched(root: Any) -> None:
     if not uuid:
         return
     if root.mu_live.on:
+        # Solid and result have shapes of their own.
+        root.mu_unit.show = "preview"
         live = _every.setdefault(uuid, Live(studies.folder_of(root) / "live"))
         live.design = ""
         _changed(root)
@@ -141,19 +152,23 @@ def _switched(root: Any) -> None:
 
 
 def _changed(root: Any) -> None:
-    """Show the design at rest once its parameters have changed, and bend it as soon as they rest."""
+    """Dim the shape once the parameters have changed, and bend the unit anew as soon as they rest."""
     live = of(root)
     if live is None:
         if root.mu_live.on and root.mu_unit.uuid:  # a duplicate
             _switched(root)
         return
-    design = studies.design_of(root)
-    if design == live.design:
+    design, shape = studies.design_of(root), live.shape
+    if shape is not None and shape.cut != root.mu_unit.cut:
+        shape = live.shape = _shape(root, shape.motion, shape.answer, shape.design)
+    elif design == live.design:
         return
-    live.design, live.shape, live.arrived, live.trouble = design, None, None, ""
-    live.due_s = time.monotonic() + RESTS_S if design else None
-    _seen(root, False)
-    _tick_soon()
+    if design != live.design:
+        live.design, live.arrived, live.trouble = design, None, ""
+        live.due_s = time.monotonic() + RESTS_S if design else None
+        _tick_soon()
+    if shape is not None:
+        place(root)
 
 
 def _pressed(root: Any) -> None:
@@ -161,8 +176,9 @@ def _pressed(root: Any) -> None:
     live = of(root)
     if live is None or live.shape is None:
         return
-    pose(root, live.shape)
-    if root.mu_live.pressure_kPa > live.shape.pressure_kPa[-1] and live.shape.finished:
+    pose(root, live)
+    shape = live.current
+    if shape is not None and shape.finished and root.mu_live.pressure_kPa > shape.pressure_kPa[-1]:
         live.due_s = time.monotonic() + RESTS_S
         _tick_soon()
 
@@ -170,11 +186,12 @@ def _pressed(root: Any) -> None:
 def _coloured(root: Any) -> None:
     """Show the chosen colours; a field that was not found yet is asked for."""
     live, wanted = of(root), root.mu_live.colour != PLAIN
-    colours.show(wanted)
+    if wanted:
+        viewports.show_colours()
     if live is None or live.shape is None:
         return
-    pose(root, live.shape)
-    if wanted and not live.shape.fields:
+    pose(root, live)
+    if wanted and live.current is not None and not live.current.fields:
         live.due_s = time.monotonic()
         _tick_soon()
 
@@ -205,18 +222,17 @@ def _tick() -> float | None:
 def _follow(root: Any, live: Live) -> None:
     """Send the process due requests, and show its answers."""
     if live.arrived is not None:
-        first = live.shape is None
+        before = viewports.corners([root])
         live.shape, live.arrived = live.arrived, None
         place(root)
-        if first:
-            _keep_in_view(root, live.shape)
+        _keep_in_view(root, before, live.shape)
         viewports.redraw()
         return
     if start_child.is_busy():
         if live.child is not None:
             live.end()
             # What was not found yet is asked for after that job.
-            if live.shape is None or not live.shape.finished:
+            if live.current is None or not live.current.finished:
                 live.due_s = time.monotonic()
         return
     if live.due_s is not None and time.monotonic() >= live.due_s:
@@ -268,11 +284,11 @@ def _answered(root: Any, live: Live) -> bool:
     if answer["trouble"]:
         live.trouble = answer["trouble"]
         return True
-    live.arrived = _shape(root, read_motion(live.folder / answer["folder"]), answer)
+    live.arrived = _shape(root, read_motion(live.folder / answer["folder"]), answer, live.design)
     return True
 
 
-def _shape(root: Any, motion: Motion, answer: dict[str, Any]) -> Shape:
+def _shape(root: Any, motion: Motion, answer: dict[str, Any], design: str) -> Shape:
     cut = bool(root.mu_unit.cut and motion.halved)
     vertices, triangles, fields = {}, {}, {}
     for region in REGIONS:
@@ -282,7 +298,19 @@ def _shape(root: Any, motion: Motion, answer: dict[str, Any]) -> Shape:
         fields[region] = {name: skin.of_surface(v) for name, v in motion.fields[region].items()}
     pressure, angle = np.array(answer["states"]).T
     fields = fields if any(fields.values()) else {}
-    return Shape(pressure, angle, vertices, triangles, fields, answer["error"], answer["finished"])
+    return Shape(
+        design,
+        root.mu_unit.cut,
+        motion,
+        answer,
+        pressure,
+        angle,
+        vertices,
+        triangles,
+        fields,
+        answer["error"],
+        answer["finished"],
+    )
 
 
 def place(root: Any) -> None:
@@ -300,15 +328,18 @@ def place(root: Any) -> None:
         if part.data.get("mu_triangles") != len(triangles):
             skeletons.write(part.data, skeletons.Skeleton(live.shape.vertices[region][0], faces=(triangles,)))
             part.data["mu_triangles"] = len(triangles)
-    pose(root, live.shape)
+    pose(root, live)
     _seen(root, True)
 
 
-def pose(root: Any, shape: Shape) -> None:
-    """Bend the shown parts to the pressure of the slider, and colour them as chosen."""
+def pose(root: Any, live: Live) -> None:
+    """Bend the shown parts to the pressure of the slider; they are dim if of an earlier design."""
+    shape = live.shape
+    if shape is None:
+        return
     share = shape.share(root.mu_live.pressure_kPa).astype(np.float32)
     field = root.mu_live.colour
-    ends = shape.ends(field)
+    ends = shape.ends(field) if shape is live.current else None
     for part in parts(root):
         region = part[LIVE]
         now = _mean(share, shape.vertices[region])
@@ -319,17 +350,17 @@ def pose(root: Any, shape: Shape) -> None:
             values = _mean(share, shape.fields[region][field])
             colours.coloured(root, part, field, values, ends)
         else:
-            colours.plain(part, region)
+            colours.plain(part, region if shape is live.current else "before")
         part.data.update()
 
 
-def _keep_in_view(root: Any, shape: Shape) -> None:
-    """A view that holds the unit at rest holds it bent: pressure lengthens it."""
+def _keep_in_view(root: Any, before: Any, shape: Shape) -> None:
+    """A view that held the unit as it was seen, its corners (8, 3), holds it bent: pressure lengthens it."""
     reached = np.concatenate([v.reshape(-1, 3) for v in shape.vertices.values()])
     low, high = reached.min(axis=0), reached.max(axis=0)
     box = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     placed = np.array(root.matrix_world)
-    viewports.keep_in_view(viewports.corners([root]), box @ placed[:3, :3].T + placed[:3, 3])
+    viewports.keep_in_view(before, box @ placed[:3, :3].T + placed[:3, 3])
 
 
 def _mean(share: Any, values: Any) -> Any:

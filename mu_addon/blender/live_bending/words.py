@@ -21,7 +21,6 @@ def draw(layout: Any, root: Any) -> None:
     """Draw the switch, the slider next to it, and the result, with the same height in every state."""
     row = layout.row(align=True)
     row.use_property_split = False
-    row.active = root.mu_unit.show == "preview"
     row.prop(root.mu_live, "on", toggle=True, icon="MOD_SIMPLEDEFORM", text="Bend")
     right = row.row(align=True)
     right.active = root.mu_live.on
@@ -44,13 +43,14 @@ def words(root: Any) -> str:
         return "After the running job"
     if live.trouble:
         return live.trouble[:1].upper() + live.trouble[1:]
-    if live.shape is None:
-        return "Bending..."
-    kPa = min(root.mu_live.pressure_kPa, float(live.shape.pressure_kPa[-1]))
-    angle = state.angle_at(live.shape, kPa)
-    if live.shape.finished:
+    shape = live.current
+    if shape is None:
+        return "Bending..." if live.shape is None else "Bending... (dim: the shape before)"
+    kPa = min(root.mu_live.pressure_kPa, float(shape.pressure_kPa[-1]))
+    angle = state.angle_at(shape, kPa)
+    if shape.finished:
         return f"{angle:.1f}° at {kPa:.4g} kPa, as simulated"
-    error = max(live.shape.error * abs(angle), LEAST_DEG)
+    error = max(shape.error * abs(angle), LEAST_DEG)
     return f"{angle:.1f} ± {error:.1f}° at {kPa:.4g} kPa, refining"
 
 
@@ -62,7 +62,7 @@ def _draw() -> None:
     scale = bpy.context.preferences.system.ui_scale
     left = legend.beside_tools(bpy.context.area) + legend.LEFT * scale
     legend.write(words(root), left, legend.BOTTOM * scale / 2.0, round(14 * scale))
-    ends = None if live.shape is None else live.shape.ends(root.mu_live.colour)
+    ends = None if live.current is None else live.current.ends(root.mu_live.colour)
     if ends is not None and state.is_seen(root):
         # Beside the legend of motions that stand apart.
         left += 0.0 if legend.subject(bpy.context) is None else BESIDE * scale

@@ -10,8 +10,8 @@ import bpy
 from ...design.printing.finding import counted
 from ...run.child import FAILED
 from ..jobs.panel import job_state, timed_if_measured
-from ..shared.panels import alert, large_button, wrapped
-from ..shared.wording import path_symbol
+from ..shared.panels import alert, fold, large_button, wrapped
+from ..shared.wording import in_panel, path_symbol
 from ..unit import object as unit_object
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
 from . import layer, marks
@@ -22,6 +22,8 @@ JOB = "print_"
 ICONS = {"error": "CANCEL", "warning": "ERROR", "info": "INFO", "pass": "CHECKMARK"}
 DIRECTIONS = 3
 """Number of build directions that are shown; the report has them all."""
+TRADE = "None of these is best in all: choose what matters most. Rough figures; a check is finer"
+INSIDE = "supports there cannot be removed"
 NOT_PRINTABLE = 6
 """Exit status of a completed check that found an error."""
 
@@ -41,27 +43,25 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
         return "" if files is None else OUTDATED if files.stale else DONE
 
     def show(self, layout, context, root):
-        large_button(layout, "mu.solid", "MESH_DATA")
+        large_button(layout, "mu.solid", "MESH_DATA", root=root)
         solid = root.mu_unit.solid
         if solid is None:
             wrapped(layout, "No solid built yet", "INFO")
         else:
             _gates(layout, root, solid)
-        child = printing.PRINTING.child(root)
-        refused = child is not None and child.state == FAILED
-        if refused and (child.error or {}).get("status") == NOT_PRINTABLE:
-            of_file = child.folder.parent.name == printing.FILE_CHECK
-            words = child.error["what"] if of_file else "Checked: not printable, see Check"
-            box = alert(layout, words)
-            box.operator("mu.print_dismiss")
-        else:
-            where = {
-                printing.CHECK: "see Check",
-                printing.FILE_CHECK: "see STL File",
-                printing.EXPORT: "see Files",
-            }
-            name = child.folder.parent.name if child is not None else ""
-            job_state(layout, child, where.get(name, "its folder opens below"), JOB)
+
+
+def _state(layout, root, *commands: str) -> None:
+    """Draw the progress and the end of a job for the printer below the button of its command."""
+    child = printing.PRINTING.child(root)
+    if child is None or child.folder.parent.name not in commands:
+        return
+    if child.state == FAILED and (child.error or {}).get("status") == NOT_PRINTABLE:
+        of_file = printing.FILE_CHECK in commands
+        words = in_panel(str(child.error["what"])) if of_file else "Checked: not printable, as found below"
+        alert(layout, words).operator("mu.print_dismiss")
+    else:
+        job_state(layout, child, "see below", JOB)
 
 
 def _gates(layout, root, solid) -> None:
@@ -103,9 +103,9 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
             layout.prop(settings, "printer_file")
         layout.prop(settings, "limits_file")
         layout.prop(settings, "up")
-        large_button(
-            layout, "mu.print_check", "VIEWZOOM", text=start_words(root, "Check Print", printing.CHECK)
-        )
+        words = start_words(root, "Check Print", printing.CHECK)
+        large_button(layout, "mu.print_check", "VIEWZOOM", root=root, text=words)
+        _state(layout, root, printing.CHECK)
         found = printing.checked(root)
         if found is None:
             wrapped(layout, "Not checked yet", "INFO")
@@ -114,6 +114,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
             alert(layout, f"Stale: {found.stale}. Check again")
         column = layout.column()
         column.active = not found.stale
+        _verdict(column, found, "mend before printing")
         _findings(column, settings, found)
         row = layout.row(align=True)
         row.operator("mu.print_marks", icon="EMPTY_AXIS")
@@ -182,13 +183,13 @@ def _directions(layout, settings, found) -> None:
     builds = found.found["orientation"]
     if not builds:
         return
-    header, body = layout.panel("MU_directions", default_closed=False)
-    header.label(text="Build Directions")
+    body = fold(layout, "MU_directions", "Build Directions", False)
     if not body:
         return
     chosen = [build for build in builds if _is_up(build, settings)]
     choice = [build for build in builds if build["best_among"]][:DIRECTIONS]
-    wrapped(body, "None is better than another in every figure, on a coarser grid than above", "INFO")
+    if len(choice) > 1:
+        wrapped(body, TRADE, "INFO")
     for build in choice + [build for build in chosen if build not in choice]:
         box = body.box()
         row = box.split(factor=0.66)
@@ -199,7 +200,9 @@ def _directions(layout, settings, found) -> None:
         column = box.column(align=True)
         cups = _ml(build["cup_ml"])
         column.label(text=f"{build['islands']} islands, cups {cups if 'below' in cups else f'of {cups}'}")
-        column.label(text=f"{build['support_mm2']:.0f} mm² to support, {build['inner_mm2']:.0f} in chambers")
+        column.label(text=f"{build['support_mm2']:.0f} mm² to support")
+        if build["inner_mm2"] >= 0.5:
+            wrapped(column, f"{build['inner_mm2']:.0f} mm² of it in chambers: {INSIDE}", "ERROR")
 
 
 def _ml(volume: float) -> str:
@@ -239,6 +242,7 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
         layout.prop(settings, "repair")
         layout.prop(settings, "against_unit")
         large_button(layout, "mu.print_check_file", "VIEWZOOM")
+        _state(layout, root, printing.FILE_CHECK)
         found = printing.checked_file(root)
         if found is None:
             return
@@ -317,12 +321,17 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             "INFO",
         )
         _check_state(layout, found)
-        large_button(layout, "mu.print_export", "EXPORT", text=start_words(root, "Export", printing.EXPORT))
+        words = start_words(root, "Export", printing.EXPORT)
+        large_button(layout, "mu.print_export", "EXPORT", root=root, text=words)
+        _state(layout, root, printing.EXPORT)
         _written(layout, printing.exported(root))
         layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
-        row = layout.row(align=True)
-        row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
-        row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
+        body = fold(layout, "MU_specimens", "Specimens", False)
+        if body:
+            row = body.row(align=True)
+            row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
+            row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
+            _state(body, root, printing.SPECIMENS)
         folded_place(layout, root, "print", "Print Offsets")
 
 
@@ -330,14 +339,15 @@ def _check_state(layout, found) -> None:
     """Result of the check of the unit that is to be exported."""
     if found is None or found.stale:
         wrapped(layout, f"Not checked: {found.stale}" if found else "Not checked", "QUESTION")
-        return
+    else:
+        _verdict(layout, found, "export asks first")
+
+
+def _verdict(layout, found, then: str) -> None:
+    """Draw what a check found, in a line; then: what follows from errors."""
     count = {s: sum(f["severity"] == s for f in found.findings) for s in marks.FAULTS}
     if count["error"]:
-        alert(
-            layout,
-            f"The check found {counted(count['error'], 'error', 'errors')}: export asks first",
-            "CANCEL",
-        )
+        alert(layout, f"The check found {counted(count['error'], 'error', 'errors')}: {then}", "CANCEL")
     else:
         doubts = (
             f", {counted(count['warning'], 'warning', 'warnings')} to decide on" if count["warning"] else ""

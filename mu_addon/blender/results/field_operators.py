@@ -14,7 +14,7 @@ from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from . import field_colours, places, run_motions
 from . import motion as motion_parts
-from .operators import MotionOperator, show_colours
+from .operators import MotionOperator
 
 OPEN = Quaternion((0.5, 0.5, 0.5, 0.5))
 """View from +x, for a body that is cut open."""
@@ -66,11 +66,7 @@ class MU_OT_field_show(MotionOperator, bpy.types.Operator):
             self.report({level}, run_motions.difference_words(root))
             if level == "ERROR":
                 return {"CANCELLED"}
-        context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
-        peak = motion_parts.peak_frame(root, context.scene)
-        if self.jump and peak is not None:
-            context.scene.frame_set(peak)
-        show_colours(context)
+        motion_parts.to_largest(root, motion, context.scene, self.jump)
         if self.frame:
             frame_in_view(context, root)
         return {"FINISHED"}

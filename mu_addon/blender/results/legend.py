@@ -6,6 +6,7 @@ legend is in the scene (`legend_object`), only names are drawn.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import blf
@@ -16,6 +17,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..shared import viewports
 from ..shared.displays import LEGEND
 from ..shared.viewports import Overlay
 from ..simulate import study_folder as studies
@@ -26,6 +28,7 @@ from . import motion as motion_parts
 PIECES = 48
 """Number of flat pieces of the drawn ramp."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 60
+NO_COLOURS = ("This view's shading shows no colours:", "press Show Colours in its header")
 TEXT = (0.92, 0.92, 0.92, 1.0)
 
 
@@ -82,11 +85,11 @@ def _draw() -> None:
     _names(context, root, motion, size)
 
 
-def above(texts: list[str], scale: float, left: float) -> None:
-    """Write lines above the ramp."""
+def above(texts: Sequence[str], scale: float, left: float, bottom: float = BOTTOM + HEIGHT + 14) -> None:
+    """Write lines above the ramp, or above another height."""
     size = round(12 * scale)
     for line, text in enumerate(reversed(texts)):
-        write(text, left, (BOTTOM + HEIGHT + 14) * scale + 1.5 * size * line, size)
+        write(text, left, bottom * scale + 1.5 * size * line, size)
 
 
 def subject(context: Any) -> Any | None:
@@ -105,7 +108,9 @@ def beside_tools(area: Any) -> float:
 def field_ramp(root: Any, ends: tuple[float, float], scale: float, left: float) -> None:
     """Draw a unit's ramp with the values of a range, `left` pixels from the view's left."""
     low, high = ends
-    if high > low:
+    if not viewports.shows_colours(bpy.context):
+        above(NO_COLOURS, scale, left, BOTTOM + HEIGHT - 30)
+    elif high > low:
         marks = [((value - low) / (high - low), f"{value:.4g}") for value in ticks(low, high)]
         ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1), ends), marks, scale, left)
 

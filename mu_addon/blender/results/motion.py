@@ -30,7 +30,7 @@ from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..printing.state import solid_of
-from ..shared import displays, updates
+from ..shared import displays, updates, viewports
 from ..shared.displays import MOTION
 from ..shared.registration import add_handlers, remove_handlers
 from ..shared.updates import Signal
@@ -402,6 +402,7 @@ def refresh(root: Any) -> None:
             with updates.paused():
                 settings.low, settings.high = low, high
     colour(root)
+    viewports.show_colours()
 
 
 def _refresh(uuid: str) -> None:
@@ -499,23 +500,46 @@ def _loaded(*_):
 
 def _job_ended(_key: str) -> None:
     for root in unit_object.roots():
+        root.mu_motion.trouble = ""
         follow(root)
 
 
 def _chosen(root: Any) -> None:
     """Show a result: if none is in the unit's place yet, that of Model A."""
-    if updates.are_paused() or root.mu_unit.show != unit_object.RESULT:
+    if updates.are_paused():
+        return
+    root.mu_motion.trouble = ""
+    if root.mu_unit.show != unit_object.RESULT:
         return
     # They lie on the unit at rest, which is shown with them.
     unit_object.hide_candidates(root)
     if displays.on_unit(root):
+        viewports.show_colours()
         return
-    if motion_of(root) is None:
-        root.mu_motion.trouble = "No motion to show: simulate this unit first"
+    motion = motion_of(root)
+    if motion is None:
+        fall_back(root)
         return
     root.mu_motion.on_unit = True
     if not parts(root):
         show(root, MODEL_A, MESH)
+        to_largest(root, motion, bpy.context.scene)
+
+
+def fall_back(root: Any) -> None:
+    """Show the preview of a unit that has no result to show, and say so in the panel."""
+    root.mu_motion.trouble = "No result of its own to show: simulate this unit first"
+    with updates.paused():
+        root.mu_unit.show = "preview"
+    unit_object.show(root)
+
+
+def to_largest(root: Any, motion: Motion, scene: Any, jump: bool = True) -> None:
+    """End the timeline with the protocol and go to the frame of the field's largest value, if known."""
+    scene.frame_end = last_frame(motion, scene)
+    peak = peak_frame(root, scene) if jump else None
+    if peak is not None:
+        scene.frame_set(peak)
 
 
 _HANDLERS = {"frame_change_pre": _before_frame, "load_post": _loaded}

@@ -7,20 +7,14 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
 from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
+from ..shared import viewports
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
-from . import legend_object
+from . import legend_object, places
 from . import motion as motion_parts
 
 NO_MOTION = "No motion yet: simulate this unit first"
-
-
-def show_colours(context) -> None:
-    """Let 3D views in solid shading show colour attributes, which hold the field's colours."""
-    for area in context.screen.areas if context.screen else ():
-        if area.type == "VIEW_3D" and area.spaces.active.shading.type == "SOLID":
-            area.spaces.active.shading.color_type = "VERTEX"
 
 
 class MotionOperator(UnitOperator):
@@ -53,11 +47,6 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
     timeline: BoolProperty(
         name="Fit Timeline", description="End the scene's timeline where the protocol ends", default=True
     )
-    shade: BoolProperty(
-        name="Show Colours",
-        description="Have viewports in solid shading show attributes, which hold the field's colours",
-        default=True,
-    )
 
     def act(self, context, root):
         motion = motion_parts.motion_of(root)
@@ -75,8 +64,6 @@ class MU_OT_motion(MotionOperator, bpy.types.Operator):
         motion_parts.show(root, self.name, self.what)
         if self.timeline:
             context.scene.frame_end = motion_parts.last_frame(motion, context.scene)
-        if self.shade:
-            show_colours(context)
         return {"FINISHED"}
 
 
@@ -130,6 +117,33 @@ class MU_OT_motion_legend(MotionOperator, bpy.types.Operator):
         legend_object.show(root) if self.on else legend_object.hide(root)
 
 
+class MU_OT_colours(bpy.types.Operator):
+    """Let this 3D view show the colours of results: solid shading by attribute"""
+
+    bl_idname = "mu.colours"
+    bl_label = "Show Colours"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Press it in the header of a 3D view")
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+    def execute(self, context):
+        context.space_data.shading.type = "SOLID"
+        viewports.show_colours()
+        viewports.redraw()
+        return {"FINISHED"}
+
+
+def draw_colours(self, context) -> None:
+    """Draw, in the header of a 3D view that cannot show the colours that are there, the button for it."""
+    if not viewports.shows_colours(context) and any(map(places.coloured, unit_object.roots())):
+        row = self.layout.row()
+        row.alert = True
+        row.operator("mu.colours", icon="COLOR")
+
+
 class MU_OT_picture(UnitOperator, bpy.types.Operator):
     """Open a picture of the study in a new image editor"""
 
@@ -160,8 +174,19 @@ CLASSES = (
     MU_OT_motion_update,
     MU_OT_motion_range,
     MU_OT_motion_legend,
+    MU_OT_colours,
     MU_OT_picture,
 )
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+def register() -> None:
+    """Register operators, and the button in the headers of 3D views."""
+    _register_classes()
+    bpy.types.VIEW3D_MT_editor_menus.append(draw_colours)
+
+
+def unregister() -> None:
+    """Unregister them."""
+    bpy.types.VIEW3D_MT_editor_menus.remove(draw_colours)
+    _unregister_classes()

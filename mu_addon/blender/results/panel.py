@@ -185,8 +185,6 @@ class MU_PT_motion(_OfMotion, bpy.types.Panel):
         if not motion.paths:
             wrapped(layout, "Paths: simulate with Place the Sensor", "INFO")
         settings = root.mu_motion
-        if settings.trouble:
-            wrapped(layout, settings.trouble, "ERROR")
         for part in motion_parts.parts(root):
             if part.get("mu_outside"):
                 wrapped(layout, f"{part.name}: {part['mu_outside']}", "INFO")
@@ -197,9 +195,6 @@ class MU_PT_motion(_OfMotion, bpy.types.Panel):
         row.operator("mu.motion_update", text="", icon="FILE_REFRESH")
         row.operator("mu.motion_clear", text="", icon="X")
         column = layout.column(align=True)
-        row = column.row()
-        row.enabled = motion.halved
-        row.prop(settings, "cut")
         column.prop(settings, "on_unit")
         column.prop(settings, "apart")
         column.prop(settings, "live")

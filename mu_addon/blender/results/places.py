@@ -10,6 +10,8 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
+from ..unit import object as unit_object
+from . import field_colours
 from . import motion as motion_parts
 
 
@@ -30,6 +32,12 @@ class Place:
 def seen(root: Any) -> list[Any]:
     """Visible parts of a unit's motion."""
     return [part for part in motion_parts.parts(root) if motion_parts.is_seen(root, part)]
+
+
+def coloured(root: Any) -> bool:
+    """Return True if a unit shows colours of a field: of a study's motion, or of live bending."""
+    live = unit_object.in_place(root) if root.visible_get() else []
+    return any(field_colours.COLOUR in part.data.color_attributes for part in [*seen(root), *live])
 
 
 def moved(part: Any) -> Any:

@@ -102,6 +102,7 @@ def show(root, key: str) -> bool:
     motion_parts.follow(root)
     # Candidate paths have their J from the shown run.
     unit_object.rebuild(root)
+    viewports.show_colours()
     viewports.redraw()
     return True
 

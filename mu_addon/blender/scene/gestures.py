@@ -19,6 +19,7 @@ from ..gripper import object as gripper_object
 from ..path.candidates import CANDIDATE
 from ..preview import nodes
 from ..preview.nodes import unit as unit_group
+from ..results import motion
 from ..shared import displays, scene_units, updates, viewports
 from ..shared.registration import add_handlers, remove_handlers
 from ..unit import broken, preview_update
@@ -61,6 +62,8 @@ def look() -> None:
         _follow(shown)
         _bring_into_view(new & _true_sizes([*roots, *overrides], touched))
         for root in roots:
+            if root.mu_unit.show == unit_object.RESULT and not unit_object.shows_result(root):
+                motion.fall_back(root)
             if root in copies or _damaged(root):
                 _rebuild(root)
     finally:

@@ -71,15 +71,14 @@ class MU_OT_sensor_connect(UnitOperator, bpy.types.Operator):
 
     @classmethod
     def trouble(cls, root):
-        session = sensor.of(root)
+        session, settings = sensor.of(root), root.mu_sensor
         if sensor.missing():
             return f"Not in this Blender: {', '.join(sensor.missing())}"
+        if settings.source == "replay" and not settings.replay:
+            return "Choose the folder of a recording first"
         return "The sensor is connected" if session is not None and session.running else ""
 
     def act(self, context, root):
-        settings = root.mu_sensor
-        if settings.source == "replay" and not settings.replay:
-            raise InputError("no recording is chosen", "Recording", "choose the folder of one")
         sensor.connect(root)
         viewports.redraw()
 
@@ -214,6 +213,23 @@ class MU_OT_sensor_hold(SessionOperator, bpy.types.Operator):
         viewports.redraw()
 
 
+class MU_OT_sensor_back(SessionOperator, bpy.types.Operator):
+    """Take back the last angle of the guided sweep, to hold it again"""
+
+    bl_idname = "mu.sensor_back"
+    bl_label = "Back"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def trouble(cls, root):
+        guide = None if super().trouble(root) else sensor.of(root).guide
+        return super().trouble(root) or ("" if guide is not None and guide.held else "No angle was held yet")
+
+    def act(self, context, root):
+        sensor.back(sensor.of(root))
+        viewports.redraw()
+
+
 class MU_OT_sensor_calibrate(UnitOperator, bpy.types.Operator):
     """Calibrate from the last sweep of a recording or from measured data, in a child process"""
 
@@ -293,6 +309,7 @@ CLASSES = (
     MU_OT_sensor_channel,
     MU_OT_sensor_sweep,
     MU_OT_sensor_hold,
+    MU_OT_sensor_back,
     MU_OT_sensor_calibrate,
     MU_OT_sensor_zero,
     MU_OT_sensor_twin,

@@ -11,7 +11,7 @@ from ...design.printing.finding import counted
 from ...run.child import FAILED
 from ...sensing.session import LOSSES
 from ..jobs.panel import job_state
-from ..shared.panels import large_button, wrapped
+from ..shared.panels import alert, large_button, wrapped
 from ..shared.wording import in_panel
 from ..simulate import study_folder as studies
 from ..unit.base_classes import UnitPanel
@@ -199,7 +199,10 @@ def _calibration(layout, root, session):
         _guide(body, guide)
     column = body.column(align=True)
     column.prop(settings, "data")
-    column.operator("mu.sensor_calibrate", icon="CHECKMARK")
+    row = column.row()
+    # An error's popup would cover the field that it asks for.
+    row.enabled = bool(settings.data or session is not None)
+    row.operator("mu.sensor_calibrate", icon="CHECKMARK")
     row = body.row(align=True)
     row.prop(settings, "known_deg")
     row.operator("mu.sensor_zero", icon="PIVOT_CURSOR")
@@ -213,10 +216,16 @@ def _guide(layout, guide):
     elif guide.held < len(guide.angles):
         angle = guide.angles[guide.held]
         wrapped(box, f"Bend to {angle:g}°, hold it there, then press", "FORWARD")
-    row = box.row()
+    odd = guide.odd
+    if odd is not None:
+        # It stands where it was pressed: no popup covers the buttons.
+        words = f"Number {odd + 1}, {guide.angles[odd]:g}°, breaks the order of the light"
+        alert(box, f"{words}: go back to it and repeat it")
+    row = box.row(align=True)
     row.scale_y = 1.6
     text = f"At {guide.angles[guide.held]:g}°" if guide.held < len(guide.angles) else "Done"
     row.operator("mu.sensor_hold", text=text, icon="PINNED")
+    row.operator("mu.sensor_back", icon="LOOP_BACK")
     box.progress(factor=guide.held / len(guide.angles), text=f"{guide.held} of {len(guide.angles)}")
     box.operator("mu.sensor_sweep", text="Stop", icon="CANCEL").on = False
 

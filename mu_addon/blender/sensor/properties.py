@@ -31,7 +31,7 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
     """Connection, calibration and display of a unit's sensor."""
 
     source: EnumProperty(
-        name="From",
+        name="Sensor",
         description="Source of the samples",
         items=[
             ("port", "Serial Port", "The sensor at a port of this computer"),
@@ -82,8 +82,8 @@ class MU_PG_sensor(bpy.types.PropertyGroup):
         update=_again,
     )
     hidden: StringProperty(options={"HIDDEN"})
-    sweep_from: FloatProperty(name="From (deg)", description="Where a sweep begins and ends", default=0.0)
-    sweep_to: FloatProperty(name="To (deg)", description="Where a sweep turns", default=45.0)
+    sweep_from: FloatProperty(name="First (deg)", description="Where a sweep begins and ends", default=0.0)
+    sweep_to: FloatProperty(name="Last (deg)", description="Where a sweep turns", default=45.0)
     sweep_step: FloatProperty(
         name="Step (deg)", description="From one held angle to the next", default=15.0, min=0.5
     )

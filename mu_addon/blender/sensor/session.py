@@ -18,6 +18,8 @@ BINS = 600
 """Number of time steps across the plot."""
 MEAN_S = 0.1
 """Averaging time of the twin and the figures: it removes noise and keeps bends of 2 Hz."""
+CLOSE = 0.1
+"""Share of the light's range by which a sweep's angles may stand in the wrong order."""
 ANGLES = ("angle_deg", "angle_low_deg", "angle_high_deg")
 
 
@@ -37,11 +39,15 @@ class Reading:
 
 @attrs.define(eq=False)
 class Guide:
-    """A guided sweep: angles in their order, the number already held, and the end of the present one."""
+    """A guided sweep: angles in their order, the number already held, and the end of the present one.
+
+    light_V: the light at each angle that was held.
+    """
 
     angles: list[float]
     held: int = 0
     until: float = 0.0
+    light_V: list[float] = attrs.field(factory=list)
 
     @property
     def holding(self) -> bool:
@@ -52,6 +58,21 @@ class Guide:
     def finished(self) -> bool:
         """True if every angle was held."""
         return self.held == len(self.angles) and not self.holding
+
+    @property
+    def odd(self) -> int | None:
+        """Number, from 0, of the held angle that breaks the order of the light, the latest if several do.
+
+        The light falls or rises with the angle. The odd one contradicts most others; of a pair that differs
+        by less than a share CLOSE of the light's range, which a sensor with hysteresis may do, neither does.
+        """
+        light, angle = np.array(self.light_V), np.array(self.angles[: len(self.light_V)])
+        if len(light) < 3 or np.isnan(light).any():
+            return None
+        rise = np.subtract.outer(light, light) * np.sign(np.subtract.outer(angle, angle))
+        wrong = rise * np.sign(np.median(rise[rise != 0.0])) < -CLOSE * np.ptp(light)
+        count = wrong.sum(axis=1)[::-1]
+        return len(light) - 1 - int(count.argmax()) if count.any() else None
 
 
 @attrs.define(eq=False)

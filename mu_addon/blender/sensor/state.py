@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
 from ...run.child import DONE, FAILED, RUNNING
 from ...run.folder import write_run
+from ...sensing.session import BACK
 from ...usecases.sensor.watch import Watched
 from ..jobs import start_child
 from ..jobs.start_child import JobKind
@@ -209,6 +211,15 @@ def hold(session: Session) -> None:
         guide.until = time.monotonic() + HOLD_S
 
 
+def back(session: Session) -> None:
+    """Take back the guided sweep's last angle, also while it is held."""
+    guide = session.guide
+    if guide is not None and guide.held:
+        session.child.send(f"mark {BACK}")
+        guide.held, guide.until = guide.held - 1, 0.0
+        del guide.light_V[guide.held :]
+
+
 def poll() -> tuple[bool, bool]:
     """Update every session; return True if samples came, and True if panels have to be redrawn."""
     sampled = news = False
@@ -225,8 +236,11 @@ def poll() -> tuple[bool, bool]:
         if guide is not None and guide.until and not guide.holding:
             guide.until = 0.0
             news = True
-            if guide.finished and root is not None:
-                news |= _finish(root, session)
+            if root is not None:
+                session.read(found, *chosen(root))
+                guide.light_V.append(session.reading.light_V if session.reading is not None else np.nan)
+                if guide.finished and guide.odd is None:
+                    news |= _finish(root, session)
         now = time.monotonic()
         if root is not None and now - session.read_at >= TWIN_S:
             session.read_at = now

@@ -13,7 +13,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...design.quantity import Description
-from .wording import label, tooltip
+from .wording import choice_label, label, tooltip
 
 MILLIMETRES = "DISTANCE_CAMERA"
 """Subtype of a property that is in millimetres in any scene."""
@@ -35,9 +35,7 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
         "options": {"ANIMATABLE", *options},
     }
     if d.choices or items:
-        items = items or [
-            (name, name.replace("-", " ").capitalize(), textwrap.shorten(d.text, 60)) for name in d.choices
-        ]
+        items = items or [(name, choice_label(name), textwrap.shorten(d.text, 60)) for name in d.choices]
         return EnumProperty(items=items, default=d.default, **shared)
     if d.type is str:
         return StringProperty(default=d.default, **more, **shared)

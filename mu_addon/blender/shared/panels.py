@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import textwrap
 
+from .updates import Signal
+
 CHARACTERS = 34
 """Letters in one line of a panel of usual width: labels do not wrap."""
 _AMOUNT = re.compile(r"(?<=\d) (?=%|(?:mm|kPa|N|s|min|h|MB|GB)\b)")
@@ -57,9 +59,16 @@ def alert(layout, text: str, icon: str = "ERROR"):
     return box
 
 
-def large_button(layout, operator: str, icon: str, **settings) -> None:
-    """Draw the main button of a panel."""
+NEXT_STEP = Signal()
+"""Asked with a unit: the operator that the top of the sidebar offers as its next step, or ""."""
+
+
+def large_button(layout, operator: str, icon: str, root=None, **settings) -> None:
+    """Draw the main button of a panel or, where the top of the sidebar offers it for `root`, say so."""
     row = layout.row()
+    if root is not None and operator in NEXT_STEP.answers(root):
+        row.label(text="The button is at the top", icon="TRIA_UP")
+        return
     row.scale_y = 1.4
     row.operator(operator, icon=icon, **settings)
 

@@ -89,6 +89,24 @@ def frame_selected(context: Any) -> None:
         frame(context.selected_objects, area)
 
 
+def shows_colours(context: Any) -> bool:
+    """Return True if a 3D view's shading shows the colours of fields, by attribute or by material."""
+    shading = context.space_data.shading
+    if shading.type == "RENDERED" and context.scene.render.engine == "BLENDER_WORKBENCH":
+        return bool(context.scene.display.shading.color_type == "VERTEX")
+    return shading.type in ("MATERIAL", "RENDERED") or (shading.type, shading.color_type) == (
+        "SOLID",
+        "VERTEX",
+    )
+
+
+def show_colours() -> None:
+    """Let 3D views in solid shading show colour attributes; what has none keeps its material's colour."""
+    for area in areas():
+        if area.spaces.active.shading.type == "SOLID":
+            area.spaces.active.shading.color_type = "VERTEX"
+
+
 def redraw() -> None:
     """Redraw every 3D view and its panels."""
     for area in areas():
@@ -125,6 +143,25 @@ def redraw_status() -> None:
         for region in area.regions:
             if region.type == "HEADER":
                 region.tag_redraw()
+
+
+def extend_status_bar(draw: Callable[[Any, Any], None]) -> None:
+    """Append a function to what the status bar draws, for good.
+
+    Blender keeps what the bar draws at its first status text, such as that of an installation, and draws it
+    again after each text: that is extended, too.
+    """
+    bar = bpy.types.STATUSBAR_HT_header
+    bar.draw = getattr(bar, "_draw_orig", bar.draw)
+    bar.append(draw)
+    bar._draw_orig = bar.draw
+
+
+def reduce_status_bar(draw: Callable[[Any, Any], None]) -> None:
+    """Undo `extend_status_bar`."""
+    bar = bpy.types.STATUSBAR_HT_header
+    bar.draw = bar._draw_orig
+    bar.remove(draw)
 
 
 class Overlay:

@@ -31,8 +31,23 @@ _NAMES = {
     "elongation_at_break": "Break Strain",
     "offset_xy_mm": "Offset XY",
     "inclusion_radius_mm": "Inclusion R",
+    "law": "Wall's Law",
+    "c2_over_c1": "Yeoh C2/C1",
+    "c3_over_c1": "Yeoh C3/C1",
+    "layers_excess": "Layers Stiffer by",
+    "friction_share": "Dry Friction",
+    "friction_yield_kPa": "Slides at (kPa)",
 }
 """Parameters whose own names are too vague beside a field, or too long for it."""
+
+
+_CHOICES = {"neo-hooke": "Neo-Hooke", "yeoh": "Yeoh", "prony": "Prony", "ogden-roxburgh": "Ogden-Roxburgh"}
+"""Choices that are people's names."""
+
+
+def choice_label(name: str) -> str:
+    """Name of a choice of a parameter for a panel."""
+    return _CHOICES.get(name, name.replace("-", " ").capitalize())
 
 
 def label(d: Description) -> str:

@@ -52,7 +52,9 @@ SUBJECTS = {
     "Body": ["body", "body_check", "body_repair", "body_remove"],
     "Cell Painting": ["paint_struts", "paint_struts_apply", "paint_struts_discard"],
     "Obstacles": ["obstacle", "obstacle_box", "obstacle_check"],
-    "Result": ["motion", "motion_range", "motion_legend", "motion_update", "motion_clear", "probe"],
+    "Result": [
+        *("motion", "motion_range", "motion_legend", "motion_update", "motion_clear", "colours", "probe"),
+    ],
     "Run": ["open", "run_restore", "run_remove", "cancel"],
     "Optimize": ["optimize"],
     "Evidence": ["import_files", "evidence_diagnose", "evidence_apply", "evidence_remove"],
@@ -60,7 +62,8 @@ SUBJECTS = {
     "Print Files": ["print_export", "export_stl", "print_specimens", "print_check_file"],
     "Sensor on the Bench": [
         *("sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause", "sensor_mark"),
-        *("sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_calibrate", "sensor_zero", "sensor_twin"),
+        *("sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_back", "sensor_calibrate"),
+        *("sensor_zero", "sensor_twin"),
     ],
     "Gripper": ["grasp", "grasp_show", "gripper_delete"],
 }  # fmt: skip

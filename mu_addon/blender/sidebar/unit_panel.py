@@ -14,9 +14,10 @@ from ..live_bending import words as live_words
 from ..node_tree import following
 from ..printing import panel as print_panel
 from ..printing import state as printing
+from ..results import motion as motion_parts
 from ..shared import scene_units
 from ..shared.operators import linked
-from ..shared.panels import CHARACTERS, TabPanel, alert, wrapped
+from ..shared.panels import CHARACTERS, NEXT_STEP, TabPanel, alert, wrapped
 from ..shared.wording import path_symbol
 from ..simulate import study_folder as studies
 from ..simulate.job import SIMULATION
@@ -27,6 +28,7 @@ from ..unit.base_classes import NO_UNIT, UnitPanel, fix_button, folded_section, 
 from ..unit.broken import broken
 from . import figures
 
+JOBS = SIMULATION, evidence.DIAGNOSIS, printing.PRINTING
 LETTERS = 14
 """Letters of a running stage's name; a longer one is numbered."""
 GRADED = "Factors on the struts' diameters; they multiply, and 1 leaves struts as they are"
@@ -66,11 +68,24 @@ class MU_PT_unit(TabPanel, bpy.types.Panel):
         row.operator("mu.preset_save", text="", icon="ADD")
         row.menu("MU_MT_more", text="", icon="DOWNARROW_HLT")
         layout.row(align=True).prop(root.mu_unit, "show", expand=True)
-        row = layout.row()
-        row.enabled = root.mu_unit.show != unit_object.SOLID
-        row.prop(root.mu_unit, "cut", icon="MOD_BOOLEAN", toggle=True)
+        if root.mu_motion.trouble:
+            wrapped(layout, root.mu_motion.trouble, "ERROR")
+        _cut(layout, root)
         live_words.draw(layout, root)
         _head(layout, root)
+
+
+def _cut(layout, root) -> None:
+    """Draw the switch that cuts open what is shown, design or result; grey, with the reason, if it cannot."""
+    row, why = layout.row(), ""
+    motion = motion_parts.motion_of(root) if unit_object.shows_result(root) else None
+    if root.mu_unit.show == unit_object.SOLID:
+        why = ": not the solid"
+    elif motion is not None and not motion.halved:
+        why = ": its mesh has no half"
+    row.enabled, row.use_property_split = not why, False
+    of = root.mu_unit if motion is None else root.mu_motion
+    row.prop(of, "cut", text=f"Cut Open{why}", icon="MOD_BOOLEAN", toggle=True)
 
 
 def _tree(layout, root) -> None:
@@ -129,41 +144,44 @@ def _head(layout, root) -> None:
 
 
 def _draw_next_step(row, root) -> None:
-    """Draw the button of the next action on a unit, or the running job's progress, of the same height."""
-    for kind in (SIMULATION, evidence.DIAGNOSIS, printing.PRINTING):
+    """Draw the button of the next action on a unit or, while a job runs, its progress in words."""
+    for kind in JOBS:
         if kind.is_running(root):
-            fraction, text = whole(kind.child(root), LETTERS)
-            row.progress(factor=fraction, text=text)
+            # Its bar is in the status bar, and in its panel.
+            row.label(text=whole(kind.child(root), LETTERS)[1], icon="TIME")
             return
+    operator, text, icon, given = _next_step(root)
+    button = row.operator(operator, text=text, icon=icon)
+    for name, value in given.items():
+        setattr(button, name, value)
+
+
+def _next_step(root) -> tuple[str, str, str, dict[str, str]]:
+    """Operator of the next action on a unit, with its label, icon and settings."""
     data = evidence.measured_data(root)
     if data is not None and data.measured is not None and evidence.diagnosis(root) is None:
-        words = evidence_panel.start_words(root, "Diagnose the Data")
-        row.operator("mu.evidence_diagnose", text=words, icon="VIEWZOOM")
-        return
+        return "mu.evidence_diagnose", evidence_panel.start_words(root), "VIEWZOOM", {}
     found = studies.findings(root)
     if found is None or found.stale or not found.run.complete:
-        row.operator("mu.simulate", text=start_words(root), icon="PLAY")
-        return
+        return "mu.simulate", start_words(root), "PLAY", {}
     best = found.ranking[0][0] if found.ranking else ""
     if best and root.mu_unit.path not in (best, *(found.summary.get("tied_with_chosen") or ())):
-        row.operator("mu.path", text=f"Use Path {path_symbol(best)}", icon="CON_FOLLOWPATH").name = best
-    elif not unit_object.solid_is_current(root):
-        row.operator("mu.solid", text="Build Solid", icon="MESH_DATA")
-    else:
-        _draw_print_step(row, root)
-
-
-def _draw_print_step(row, root) -> None:
-    """Draw the next action on the way from a solid to its files."""
+        return "mu.path", f"Use Path {path_symbol(best)}", "CON_FOLLOWPATH", {"name": best}
+    if not unit_object.solid_is_current(root):
+        return "mu.solid", "Build Solid", "MESH_DATA", {}
     check, files = printing.checked(root), printing.exported(root)
     if check is None or check.stale:
-        words = print_panel.start_words(root, "Check the Print", printing.CHECK)
-        row.operator("mu.print_check", text=words, icon="VIEWZOOM")
-    elif files is None or files.stale:
-        words = print_panel.start_words(root, "Export the Files", printing.EXPORT)
-        row.operator("mu.print_export", text=words, icon="EXPORT")
-    else:
-        row.operator("mu.print_open", text="Open the Files", icon="FILE_FOLDER").what = printing.EXPORT
+        return "mu.print_check", print_panel.start_words(root, "Check Print", printing.CHECK), "VIEWZOOM", {}
+    if files is None or files.stale:
+        return "mu.print_export", print_panel.start_words(root, "Export", printing.EXPORT), "EXPORT", {}
+    return "mu.print_open", "Open the Files", "FILE_FOLDER", {"what": printing.EXPORT}
+
+
+def _offered(root) -> str:
+    """Operator that the top offers as the next step, or ""."""
+    found = broken(root) if root.mu_unit.trouble else None
+    mends = found is not None and any(repair.value is not None for repair in found.repairs)
+    return "" if mends or any(kind.is_running(root) for kind in JOBS) else _next_step(root)[0]
 
 
 class MU_PT_design(UnitPanel, bpy.types.Panel):
@@ -227,5 +245,16 @@ def _painting(layout, root) -> None:
 
 CLASSES = (MU_PT_unit, MU_PT_design, MU_PT_lattice)
 
+_register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
 
-register, unregister = bpy.utils.register_classes_factory(CLASSES)
+
+def register() -> None:
+    """Register the panels, and tell the others what the top offers."""
+    _register_classes()
+    NEXT_STEP.connect(_offered)
+
+
+def unregister() -> None:
+    """Unregister them."""
+    NEXT_STEP.disconnect(_offered)
+    _unregister_classes()

@@ -8,6 +8,7 @@ from ...design.printing.finding import counted
 from ..jobs import start_child
 from ..jobs.panel import job_state, start_button, timed
 from ..shared.panels import wrapped
+from ..unit import resins
 from ..unit.base_classes import DONE, OUTDATED, UnitPanel, folded_place
 from . import effects
 from . import study_folder as studies
@@ -49,14 +50,16 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         layout.prop(study, "protocol")
         _effects(layout, root)
         child = SIMULATION.child(root)
-        start_button(layout, child, "mu.simulate", "PLAY", text=start_words(root))
+        start_button(layout, child, "mu.simulate", "PLAY", root=root, text=start_words(root))
         if child is None and not announced(root)[1]:
             wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")
         others = [key for key in start_child.running() if key != SIMULATION.key(root)]
         if others:
             wrapped(layout, counted(len(others), "other job runs", "other jobs run"), "INFO")
-        folded_place(layout, root, "simulate", "Material")
+        text = resins.name_of(root)
+        layout.operator_menu_enum("mu.resin", "name", text=text, icon="MATERIAL")
+        folded_place(layout, root, "simulate", "Constants of the Resin")
         header, body = layout.panel("MU_computing", default_closed=True)
         header.label(text="Device and Folder")
         if body:

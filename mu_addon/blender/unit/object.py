@@ -200,15 +200,18 @@ def show(root: Any) -> None:
     skinned = mesh == props.preview
     if modifier.show_viewport != skinned:
         modifier.show_viewport = modifier.show_render = skinned
-    played = []
-    if props.show == RESULT:
-        played = displays.on_unit(root)
-    elif mesh == props.preview and not props.candidates:
-        # Candidates lie on the unit at rest.
-        played = displays.on_unit(root, displays.LIVE)
-    set_modifier_input(modifier, unit_group.SHOW_RESULT, bool(played))
-    for name, part in zip(unit_group.RESULTS, [*played, None, None], strict=False):
+    for name, part in zip(unit_group.RESULTS, [*in_place(root), None, None], strict=False):
         set_modifier_input(modifier, name, part)
+
+
+def in_place(root: Any) -> list[Any]:
+    """Objects that a unit shows in place of its design: a study's motion, or its shape bent live."""
+    props = root.mu_unit
+    if props.show == RESULT:
+        return displays.on_unit(root)
+    # Candidates lie on the unit at rest.
+    at_rest = props.candidates or (props.show == SOLID and props.solid is not None)
+    return [] if at_rest else displays.on_unit(root, displays.LIVE)
 
 
 def hide_candidates(root: Any) -> None:

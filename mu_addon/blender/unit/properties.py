@@ -149,6 +149,8 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         "study": PointerProperty(type=MU_PG_study, description="Stages of the next simulation"),
         "stack": CollectionProperty(type=MU_PG_step, description="Steps of the design, in their order"),
         "step": IntProperty(name="Step", description="The step whose parameters are shown"),
+        # Name and values of the resin that was chosen, see `resins`.
+        "resin": StringProperty(options={"HIDDEN"}),
         "path": StringProperty(
             name="Sensor Path", description="Window of anchors that the waveguide follows", update=_changed
         ),

@@ -5,13 +5,15 @@ Missing information is asked for; without it only the page on the read files is 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
-from ...lab_files.proposal import Proposal, Question
+from ...lab_files.draft import Question
+from ...lab_files.proposal import Proposal
 from ...measured.table import Remark
 from ...measured.writing import csv_text, file_stem, put, require_free, tried
 from ...run.context import RunContext
@@ -110,12 +112,26 @@ def write(
         try:
             remarks += tried(block, file, text)
         except InputError as error:
-            raise InputError(f"{p.name}: {error.what}", f"{p.where} ({error.where})", error.remedy) from error
+            raise InputError(
+                f"{p.name}: {error.what}{_changes(p)}", _at(p, text, error), error.remedy
+            ) from error
         require_free(folder, p.name, block, file)
         ready.append((block, file, text))
     for entry in ready:
         put(folder, *entry)
     return remarks
+
+
+def _at(p: Proposal, text: str, error: InputError) -> str:
+    """Place in the imported file of an error in the table that was made of it."""
+    row = re.search(r"\brow (\d+)", error.where)
+    k = int(row[1]) - text.split("\n")[: int(row[1])].index(",".join(p.columns)) - 2 if row else -1
+    return f"{p.file}, line {p.lines[k]}" if 0 <= k < len(p.lines) else f"{p.where} ({error.where})"
+
+
+def _changes(p: Proposal) -> str:
+    """Conclusions on units that change within a column, for an error."""
+    return "".join(f" ({words})" for words in p.concluded if "its unit changes" in words)
 
 
 def _table(p: Proposal) -> str:

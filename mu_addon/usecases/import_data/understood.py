@@ -8,22 +8,27 @@ from pathlib import Path
 import attrs
 
 from ...errors import InputError
-from ...lab_files.blocks import Block, tables
-from ...lab_files.proposal import NoExperiment, Proposal, Question, answers_for, propose
-from ...lab_files.source import Sheet, read_sheets
+from ...lab_files.blocks import FEWEST, Block, tables
+from ...lab_files.draft import NoExperiment, Question
+from ...lab_files.proposal import Proposal, answers_for, propose
+from ...lab_files.sheet import Sheet
+from ...lab_files.source import read_sheets
 from ...measured.kinds import ACCURACIES
 from ...table_cells.notation import DECIMALS
+from ..track_video.tracked_table import NO_MARKERS, read_pixels
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
+_INTERVAL = "interval_s"
 # Keys that answer a question or change a conclusion; others are mistakes.
 KEYS = (
     "kind",
     "mode",
     "section_mm",
     "length_mm",
-    "interval_s",
+    _INTERVAL,
     "zero",
+    "sign",
     "specimen",
     "role",
     "plates",
@@ -81,6 +86,8 @@ def understand(
         before = len(proposals)
         refused: InputError | None = None
         known_tables, unknown = _tables(path, decimal, left_out)
+        if not (known_tables or unknown) and any(k.rpartition(".")[2] == _INTERVAL for k in answers):
+            known_tables, unknown = _tables(path, decimal, left_out, 1)
         for sheet, number, count, block in known_tables or unknown:
             parts = [path.stem, sheet.name if count == 1 else "", block.label]
             if count > 1 and not block.label:
@@ -105,37 +112,73 @@ def understand(
                 f"{path}, line {block.lines[0]}: a table without two known quantities was left out"
                 for _, _, _, block in unknown
             ]
-        if len(proposals) == before:
+        new = proposals[before:]
+        unknown_columns = all(any(q.key.startswith("column.") for q in p.questions) for p in new)
+        if unknown_columns and not any(key.startswith("column.") for key in answers):
+            _require_untracked(path)
+        if not new:
             raise refused or _no_table(path, decimal)
         read(count_read)
     _require_used(answers, proposals)
     return Understood(tuple(proposals), tuple(left_out))
 
 
+def _require_untracked(path: Path) -> None:
+    """Raise InputError for a file of tracked markers, which another command reads."""
+    try:
+        names = read_pixels(path).names
+    except InputError as error:
+        if error.what == NO_MARKERS or error.what.startswith("cannot read"):
+            return
+        names = ()
+    raise InputError(
+        "the file holds positions of tracked markers" + (f": {', '.join(names[:4])}" if names else ""),
+        str(path),
+        f"`track {path.name} --markers bench.toml --pressure ladder.csv` makes an experiment of them",
+    )
+
+
 def _no_table(path: Path, decimal: str | None) -> InputError:
     """Error for a file without a table, with its content."""
-    rows = [row for sheet in read_sheets(path, decimal) for row in sheet.rows if row.filled]
-    pairs = sum(len(row.numeric) > 1 for row in rows)
-    shown = " ".join(rows[0].filled)[:60] if rows else ""
+    sheets = read_sheets(path, decimal)
+    rows = [row for sheet in sheets for row in sheet.rows if row.filled]
+    where = f"{path}, line {rows[0].line}" if rows else str(path)
+    single = next((block for sheet in sheets for block in tables(sheet, 1).blocks), None)
+    if single is not None:
+        unread = "".join(f"; {one.words}" for one in single.unread)
+        return InputError(
+            "the file holds no table of measured data: "
+            f"lines {single.lines[0]} to {single.lines[-1]} have one column of numbers, and a second one, "
+            f"such as the time, is missing{unread}",
+            where,
+            f"export it as well, or give the time from row to row: --set {_INTERVAL}=SECONDS --set "
+            "column.1=QUANTITY",
+        )
+    pairs = [row for row in rows if len(row.numeric) > 1]
+    shown = " ".join((pairs or rows)[0].filled)[:60] if rows else ""
+    line = (pairs or rows)[0].line if rows else 0
     return InputError(
-        f"the file holds no table of measured data: {pairs} of its {len(rows)} lines have two numbers; "
-        f"it begins with {shown!r}",
-        f"{path}, line {rows[0].line}" if rows else str(path),
-        "give a file with two columns of numbers or more, and their names above them",
+        f"the file holds no table of measured data: {len(pairs)} of its {len(rows)} lines have two numbers "
+        f"or more, and no {FEWEST} of them have these in the same columns; line {line} is {shown!r}",
+        where,
+        "give a file with two columns of numbers or more, and their names above them, divided by tabs, "
+        "semicolons or commas",
     )
 
 
 _Table = tuple[Sheet, int, int, Block]
 
 
-def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[_Table], list[_Table]]:
-    """Tables of a file with two known quantities, and the others; lines in none go to left_out."""
+def _tables(
+    path: Path, decimal: str | None, left_out: list[str], fewest: int = 2
+) -> tuple[list[_Table], list[_Table]]:
+    """Tables of a file with `fewest` known quantities, and the others; lines in none go to left_out."""
     known_tables: list[_Table] = []
     unknown: list[_Table] = []
     for sheet in read_sheets(path, decimal):
         where = f"{path}, sheet {sheet.name!r}" if sheet.name else str(path)
         try:
-            found = tables(sheet)
+            found = tables(sheet, fewest)
         except InputError as error:
             raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error
         left_out += [f"{where}, {one.words}" for one in found.unread]
@@ -143,7 +186,7 @@ def _tables(path: Path, decimal: str | None, left_out: list[str]) -> tuple[list[
             known = [c for c in block.columns if c.quantity not in ("", "count")]
             untitled = not any(c.title for c in block.columns)
             table = (sheet, number, len(found.blocks), block)
-            (known_tables if len(known) > 1 or untitled else unknown).append(table)
+            (known_tables if len(known) >= fewest or untitled else unknown).append(table)
     return known_tables, unknown
 
 

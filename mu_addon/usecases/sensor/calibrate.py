@@ -25,7 +25,7 @@ from ...run.inputs import FORMAT, digest, named_path, read_inputs, structured
 from ...run.usecase import UseCase
 from ...sensing.calibration import Calibration, CalibrationSweep, calibrate, sweeps_of, write_calibration
 from ...sensing.recording import INDEX, Recording, read_recording
-from ...sensing.session import SWEEP
+from ...sensing.session import BACK, SWEEP
 from ...table_cells.own_tables import own_lines, own_rows, own_text
 from ...toml_writer import toml_text
 
@@ -266,14 +266,18 @@ def _of_recording(
 def _marked(recording: Recording, time_s: Array) -> Array:
     """Angles (n,) in degrees held after marks that state them, nan elsewhere.
 
-    Only those after the last mark "sweep", which starts a guided sweep: earlier, failed sweeps are left out.
+    Only those after the last mark "sweep", which starts a guided sweep: earlier, failed sweeps are left out,
+    and angles that a mark "back" takes back.
     """
     angle = np.full(len(time_s), math.nan)
     marks = [m for m in recording.messages if m.get("event") == "mark"]
     begun = [k for k, mark in enumerate(marks) if mark.get("text") == SWEEP]
     marks = marks[begun[-1] if begun else 0 :]
+    kept: list[tuple[float, float, float]] = []
     for k, mark in enumerate(marks):
         word, _, value = str(mark.get("text", "")).partition(" ")
+        if word == BACK and kept:
+            kept.pop()
         try:
             held = float(value)
         except ValueError:
@@ -282,6 +286,8 @@ def _marked(recording: Recording, time_s: Array) -> Array:
             continue
         start = float(mark["time_s"])
         end = min(start + _HOLD_S, float(marks[k + 1]["time_s"]) if k + 1 < len(marks) else math.inf)
+        kept.append((start, end, held))
+    for start, end, held in kept:
         angle[(time_s >= start) & (time_s < end)] = held
     return angle
 

@@ -39,7 +39,7 @@ _ABOVE, _BELOW = 6, 4
 _OWN = {"right": 0, "down": 1}
 _OWN_TITLE = re.compile(r"(?P<name>.+) (?P<axis>right|down)_px")
 _TITLE = re.compile(
-    r"(?:(?P<name>.+?)[\s_.:/-]+)?(?P<axis>[xy])(?:[\s_]*(?:[(\[](?P<unit>[^)\]]*)[)\]]|(?P<plain>px|pixels?|mm)))?",
+    r"(?:(?P<name>.+?)[\s_.:/-]+)?(?P<axis>[xyz])(?:[\s_]*(?:[(\[](?P<unit>[^)\]]*)[)\]]|(?P<plain>px|pixels?|mm)))?",
     re.IGNORECASE,
 )
 _NO_NAMES = ("position", "pos", "center", "centroid", "coord", "image")
@@ -49,22 +49,32 @@ _IDS = (
     "object", "id",
 )  # fmt: skip
 _FRAMES = ("frame", "frame idx", "frame id", "frame number", "frame nr", "frames", "slice", "slice n°")
+NO_MARKERS = "the file contains no tracked markers"
+# What Kinovea's text of paths begins with.
+_KINOVEA = "#Kinovea Trajectory"
 _LAYOUTS = (
     "name the columns `NAME right_px` and `NAME down_px`, a row a frame; or export, in pixels, NAME x and "
     "NAME y for each marker, frame, id, x and y in each row, or DeepLabCut's CSV"
 )
+_PLANE = (
+    "write the two axes of the bending plane of each marker as `NAME right_px` (y) and `NAME down_px` (-z), "
+    "in mm, with mm_per_pixel = 1 in the description"
+)
+# The markers of a picture extend over more pixels than this; in m they do not.
+_LEAST_PX = 1.0
 
 
 @attrs.frozen
 class _Layout:
     """Position of everything in a table.
 
-    heading: row of the titles; markers: columns of x and y by name, "" if the rows have names; likelihood:
-    its column by name; own: True for this program's layout.
+    heading: row of the titles; markers: columns of x and y by name, "" if the rows have names; depth: columns
+    of z; likelihood: its column by name; own: True for this program's layout.
     """
 
     heading: int
     markers: Mapping[str, tuple[int, int]]
+    depth: Sequence[int]
     likelihood: Mapping[str, int]
     titles: Sequence[str]
     frame: int | None
@@ -79,7 +89,8 @@ def read_pixels(path: Path) -> Tracks:
     time_s, if present, is the time of each. Tables of other trackers need x to the right and y downward.
     """
     try:
-        lines = own_lines(own_text(path))
+        text = own_text(path)
+        lines = _lines_of_kinovea(text) if text.startswith(_KINOVEA) else own_lines(text)
         require_rows(len(lines) - 1, str(path))
         layout = _layout(lines, str(path))
         heading, *body = own_rows(lines[layout.heading :])
@@ -92,9 +103,40 @@ def read_pixels(path: Path) -> Tracks:
     units, body = _below(layout, body)
     layout = _in_pixels(layout, units, f"{path}, line {heading[0]}")
     if len(body) < 2:
-        raise InputError("the file contains no tracked markers", str(path), _LAYOUTS)
+        raise InputError(NO_MARKERS, str(path), _LAYOUTS)
     table = _Table(layout, units, body, str(path))
     return table.of_rows() if layout.id is not None else table.of_columns()
+
+
+def _lines_of_kinovea(text: str) -> list[Line]:
+    """Lines of a table with a row a moment, of Kinovea's text with lines `T X Y` below each other's paths."""
+    paths: dict[str, dict[float, str]] = {}
+    begun: dict[float, int] = {}
+    name, apart = "", True
+    for number, line in enumerate(text.split("\n"), 1):
+        words = line.replace(",", ".").split()
+        if line.startswith("#") or not words:
+            name, apart = line.strip("# \t") if words else name, True
+        elif len(words) == 3 and all(map(is_like_number, words[1:])):
+            if apart and (name in paths or name in ("", "T X Y")):
+                name = f"path {len(paths) + 1}"
+            apart = False
+            *above, seconds = words[0].split(":")[:3]
+            time = sum(60.0 ** (len(above) - k) * float(part) for k, part in enumerate(above)) + float(
+                seconds
+            )
+            # Its clock is h:mm:ss:hh, with hundredths of a second.
+            time += 0.01 * float((words[0].split(":")[3:] or ["0"])[0])
+            paths.setdefault(name, {})[time] = ",".join(words[1:])
+            begun.setdefault(time, number)
+    times = sorted(begun)
+    whole = ":" not in text and all(time == int(time) for time in times)
+    title = "Time (s)" if not whole else "Time (ms)" if np.diff(times[:2]).min(initial=2) > 1 else "Frame"
+    lines = [(1, ",".join([title, *(f"{name} X,{name} Y" for name in paths)]).replace('"', ""))]
+    for time in times:
+        cells = (places.get(time, ",") for places in paths.values())
+        lines.append((begun[time], ",".join([f"{time:.10g}", *cells])))
+    return lines
 
 
 def _layout(lines: Sequence[Line], where: str) -> _Layout:
@@ -112,13 +154,14 @@ def _layout(lines: Sequence[Line], where: str) -> _Layout:
             if plain[0] == "coords":
                 frame = 0
             id_ = next((places[name] for name in _IDS if name in places), None)
-            return _Layout(n, markers, likelihood, titles, frame, id_ if "" in markers else None, own)
+            depth = [k for _, axis, k in found if axis == 2]
+            return _Layout(n, markers, depth, likelihood, titles, frame, id_ if "" in markers else None, own)
         above.append(titles)
-    raise InputError("the file contains no tracked markers", where, _LAYOUTS)
+    raise InputError(NO_MARKERS, where, _LAYOUTS)
 
 
 def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tuple[str, int, int]]:
-    """Name, axis (0 or 1) and column of each position that these titles name."""
+    """Name, axis (0, 1 or 2) and column of each position that these titles name."""
     found = []
     for k, title in enumerate(titles):
         if match := _OWN_TITLE.fullmatch(title):
@@ -126,8 +169,8 @@ def _markers(titles: Sequence[str], above: Sequence[Sequence[str]]) -> list[tupl
         elif match := _TITLE.fullmatch(title):
             name = match["name"] or ""
             name = "" if name.casefold() in _NO_NAMES else name
-            found.append((name, "xy".index(match["axis"].casefold()), k))
-    if len({axis for _, axis, _ in found}) < 2 and not any(_OWN_TITLE.fullmatch(t) for t in titles):
+            found.append((name, "xyz".index(match["axis"].casefold()), k))
+    if len({axis for _, axis, _ in found} - {2}) < 2 and not any(_OWN_TITLE.fullmatch(t) for t in titles):
         return []
     if above and not any(name for name, _, _ in found):
         # DeepLabCut names individuals, too, where there are several.
@@ -148,8 +191,13 @@ def _paired(
 ) -> tuple[dict[str, tuple[int, int]], dict[str, int]]:
     """Columns of x and y by name, and of the likelihood; raises InputError for one without the other."""
     columns: dict[str, dict[int, int]] = {}
+    spatial = any(axis == 2 for _, axis, _ in found)
     for name, axis, k in found:
+        if axis == 2:
+            continue
         if axis in columns.setdefault(name, {}):
+            if spatial:
+                raise InputError("the table has three axes, with several columns for one", where, _PLANE)
             raise InputError(
                 f"two columns hold the {'xy'[axis]} of {name or 'a marker without a name'}",
                 where,
@@ -200,8 +248,7 @@ def _in_pixels(layout: _Layout, units: Sequence[str], where: str) -> _Layout:
         else:
             other = other or f"column {layout.titles[pair[0]]!r} is in {found[0]}, not in pixels"
     if not kept:
-        remedy = "export the positions in pixels; the description of the video gives the scale"
-        raise InputError(other, where, remedy)
+        raise InputError(other, where, f"export the positions in pixels, or {_PLANE}")
     return attrs.evolve(layout, markers=kept)
 
 
@@ -285,6 +332,15 @@ class _Table:
 
     def _tracks(self, names: tuple[str, ...], pixels: Array, time_s: Array | None) -> Tracks:
         if not self.layout.own:
+            self._require_plane()
+            seen = pixels[np.isfinite(pixels).all(axis=2)]
+            extent = np.ptp(seen, axis=0).max() if len(seen) else np.inf
+            if extent < _LEAST_PX:
+                raise InputError(
+                    f"the positions of all markers lie within {extent:.3g}: they are not in pixels",
+                    self.where,
+                    f"export pixels, or {_PLANE}",
+                )
             if np.nanmin(pixels, initial=0.0) < -1.0:
                 raise InputError(
                     "positions are negative: its coordinates are not those of the picture",
@@ -299,6 +355,17 @@ class _Table:
                 )
             )
         return Tracks(names, pixels, time_s=time_s, remarks=tuple(self.remarks))
+
+    def _require_plane(self) -> None:
+        """Raise InputError for markers that move along a third axis; a tracker of pictures writes 0."""
+        for k in self.layout.depth:
+            depth = self._numbers(k)
+            if len(np.unique(depth[np.isfinite(depth)])) > 1:
+                raise InputError(
+                    f"column {self.layout.titles[k]!r} varies: the table has three axes, as motion capture",
+                    self.where,
+                    _PLANE,
+                )
 
     def _time(self, units: Sequence[str]) -> tuple[int | None, float]:
         """Column of the time, and seconds of its unit; None without one."""

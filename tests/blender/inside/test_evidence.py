@@ -8,6 +8,7 @@ import re
 import shutil
 from pathlib import Path
 
+import attrs
 import bpy
 import numpy as np
 import pytest
@@ -99,6 +100,15 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path, monkeypat
     assert abs(printed.offset_xy_mm - offset) < 1e-6
     assert not unit_object.behind(root)
     assert "Applied to the unit: every printed surface moves outward" in drawn().replace("  ", " ")
+    assert "evidence_apply" in drawn()
+    # The same verdict, had it been ambiguous: nothing to apply before what separates the rivals is measured.
+    with monkeypatch.context() as given:
+        doubtful = attrs.evolve(evidence.diagnosis(root), verdict={**found, "verdict": "ambiguous"})
+        assert doubtful.name == "ambiguous"
+        given.setattr(evidence, "diagnosis", lambda root: doubtful)
+        given.setattr(evidence, "applied", lambda root: "")
+        assert "evidence_apply" not in drawn()
+        assert "Several effects explain the data equally well" in refused(bpy.ops.mu.evidence_apply)
     assert not bpy.ops.mu.evidence_apply.poll(), "given twice it would count twice"
     bpy.ops.ed.undo()
     root = unit_object.active_root(bpy.context)

@@ -325,6 +325,34 @@ def test_appended_it_is_a_unit_of_its_own(tmp_path):
     assert len({root.mu_unit.uuid for root in unit_object.roots()}) == 2
 
 
+@pytest.mark.parametrize("way", ["appended", "linked", "made local", "overridden"])
+def test_taken_from_a_file_where_it_shows_its_result_it_is_seen_at_rest_and_says_so(way, study, tmp_path):
+    root = add(preset="mu-0.75x")
+    root.name, root.mu_unit.study.folder = "stored", str(study)
+    show()
+    assert root.mu_unit.show == "result"
+    file = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    root = fetched(file, "stored", link=way != "appended")
+    if way == "overridden":
+        root = root.override_create(remap_local_usages=True)
+    elif way == "made local":
+        select(root)
+        bpy.ops.object.make_local(type="ALL")
+    for _ in range(2):
+        bpy.context.view_layer.update()
+        gestures.look()
+    root = next(o for o in bpy.context.scene.objects if o.name == "stored")
+    seen = root.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert len(seen.data.vertices) > 500
+    select(root)
+    assert ("No result of its own to show" in drawn(unit_panel.CLASSES)) == (way == "appended")
+    if way == "appended":
+        assert root.mu_unit.show == "preview"
+        assert len(seen.data.vertices) > 20_000, "the skinned struts"
+
+
 def test_appended_beside_another_it_has_one_skin(tmp_path):
     file, *_ = library(tmp_path / "there")
     first = add(preset="mu-0.75x")

@@ -5,7 +5,9 @@ from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
+import pytest
 
+import mu_addon
 from mu_addon.blender.jobs import header, preferences, start_child
 from mu_addon.blender.jobs.panel import rounded
 from mu_addon.blender.simulate import timings
@@ -77,6 +79,21 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert said() == ""
     assert SIMULATION.child(second) is None, "and its panel says no more of it"
     assert "is not running" in refused(bpy.ops.mu.job_cancel)
+
+
+@pytest.mark.own_process
+def test_the_bar_is_there_in_the_session_that_installs_the_extension():
+    """The installer sets a status text before it registers; Blender then restores what it drew before."""
+    bar, workspace = bpy.types.STATUSBAR_HT_header, bpy.context.workspace
+    workspace.status_text_set("Install: mu_addon")
+    before = bar.draw
+    mu_addon.register()
+    workspace.status_text_set(None)
+    assert header.draw in bar.draw._draw_funcs
+    assert before in (bar.draw, *bar.draw._draw_funcs), "and what Blender draws stays"
+    mu_addon.unregister()
+    workspace.status_text_set(None)
+    assert header.draw not in bar.draw._draw_funcs
 
 
 def test_what_waits_can_be_taken_out_of_the_queue(monkeypatch):

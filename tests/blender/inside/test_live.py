@@ -25,7 +25,7 @@ from .jobs import PATIENCE_S
 def bent(root, states):
     """Wait as a window does, until the unit is bent and so many states are there."""
     end = time.monotonic() + PATIENCE_S
-    while live.of(root).shape is None or len(live.of(root).shape.pressure_kPa) < states:
+    while live.of(root).current is None or len(live.of(root).current.pressure_kPa) < states:
         assert time.monotonic() < end, words.words(root)
         live._tick()
         assert not live.of(root).trouble, live.of(root).trouble
@@ -80,12 +80,24 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     assert handles.usable(root, handles.PRESSURE)
     handles.to_pressure(root, bpy.context.scene, 25.0)
     assert handles.pressure_of(root, bpy.context.scene) == root.mu_live.pressure_kPa == 25.0
-    # At rest at once, then bent anew, by the same process.
+    # What is bent is cut open, too, at once and whatever else runs.
     root.mu_live.pressure_kPa = 40.0
+    root.mu_unit.cut = True
+    assert np.ptp(lattice(root)[:, 0]) < 0.6 * np.ptp(at_40[:, 0])
+    root.mu_unit.cut = False
+    assert np.allclose(lattice(root), at_40, atol=1e-4)
+    # Dimmed at once, then bent anew, by the same process; broken rules and running jobs leave it as it is.
     pid = live.of(root).child.pid
     root.mu_unit.chambers.wall_mm = 1.2
-    assert not live.is_seen(root)
+    assert live.is_seen(root)
+    assert np.allclose(lattice(root), at_40, atol=1e-4), "the last bend stays"
+    assert {part.data.materials[0].name for part in live.parts(root)} == {"MU Before"}
+    assert words.words(root) == "Bending... (dim: the shape before)"
+    root.mu_live.pressure_kPa = 20.0
+    assert np.allclose(lattice(root), at_20, atol=1e-4)
+    root.mu_live.pressure_kPa = 40.0
     bent(root, 5)
+    assert {part.data.materials[0].name for part in live.parts(root)} == {"MU Membrane", "MU Lattice"}
     assert live.of(root).child.pid == pid
     assert live.angle_at(live.of(root).shape, 40.0) < angle
     # Another view of it is no other design.
@@ -119,6 +131,10 @@ def test_a_unit_bends_at_the_sliders_pressure_and_anew_after_a_change(tmp_path):
     assert not live.parts(root)
     assert not folder.exists()
     assert child.state == "failed" or child.state == "cancelled"
+    root.mu_unit.show = "solid"
+    root.mu_live.on = True
+    assert root.mu_unit.show == "preview", "the bend that was asked for is shown"
+    root.mu_live.on = False
 
 
 def test_a_real_job_comes_first(monkeypatch, tmp_path):

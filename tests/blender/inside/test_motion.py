@@ -8,10 +8,13 @@ from mu_addon.blender.path import candidates, hover, picking, ranking
 from mu_addon.blender.path import legend as path_legend
 from mu_addon.blender.path import panel as path_panel
 from mu_addon.blender.results import field_colours as fields
-from mu_addon.blender.results import legend, legend_object, run_motions
+from mu_addon.blender.results import legend, legend_object, run_motions, runs
 from mu_addon.blender.results import motion as motion_parts
+from mu_addon.blender.results import operators as result_operators
 from mu_addon.blender.results import panel as results_panel
+from mu_addon.blender.shared import viewports
 from mu_addon.blender.shared.compat import modifier_input
+from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.unit import drawing
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit import preview_update as live
@@ -176,6 +179,54 @@ def test_colours_and_their_legend_go_together_when_another_unit_is_active(study)
     assert legend.lines(root, motion, bpy.context.scene)[0] == "the first"
     root.hide_set(True)
     assert legend.subject(bpy.context) is None
+
+
+def test_every_way_into_a_result_shows_its_colours_or_says_that_this_view_cannot(study, tmp_path):
+    root = started(study)
+    (window,) = bpy.context.window_manager.windows
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    shading = area.spaces.active.shading
+
+    def offered():
+        """Whether the view's header has the button."""
+        header = type(
+            "Header", (), {"draw": lambda self, context: result_operators.draw_colours(self, context)}
+        )
+        with bpy.context.temp_override(window=window, area=area):
+            assert viewports.shows_colours(bpy.context) == (shading.color_type == "VERTEX")
+            return "mu.colours" in drawn([header])
+
+    shading.color_type = "MATERIAL"
+    assert not offered(), "nothing is coloured"
+    peak = bpy.context.scene.frame_end
+    root.mu_unit.show = "result"
+    assert shading.color_type == "VERTEX"
+    assert bpy.context.scene.frame_current not in (1, peak), "where the field is largest, not at rest"
+    for gesture in (
+        lambda: setattr(root.mu_motion, "field", "largest_stretch"),
+        lambda: runs.show(root, studies.shown_run(root).key),
+        lambda: setattr(root.mu_unit, "show", "preview") or setattr(root.mu_unit, "show", "result"),
+    ):
+        shading.color_type = "MATERIAL"
+        assert offered()
+        gesture()
+        assert shading.color_type == "VERTEX"
+        assert not offered()
+    root.mu_live.colour = "largest_stretch"
+    root.mu_live.colour = "plain"
+    assert shading.color_type == "VERTEX", "the colours of live bending are not the only ones"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    shading.color_type = "MATERIAL"
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"), load_ui=False)
+    (window,) = bpy.context.window_manager.windows
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    shading = area.spaces.active.shading
+    for shading.type, shading.color_type in (("SOLID", "MATERIAL"), ("WIREFRAME", "MATERIAL")):
+        assert offered()
+        with bpy.context.temp_override(window=window, area=area):
+            assert bpy.ops.mu.colours() == {"FINISHED"}
+        assert (shading.type, shading.color_type) == ("SOLID", "VERTEX")
+        assert not offered()
 
 
 def test_a_field_of_few_spots_has_a_range_of_what_it_is_there():

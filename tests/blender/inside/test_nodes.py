@@ -1,5 +1,6 @@
 """Node groups: built in code, usable on anyone's geometry, renewed in place when they are old."""
 
+import attrs
 import bmesh
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from mu_addon.blender.preview import nodes
 from mu_addon.blender.shared.compat import modifier_input, set_modifier_input
 from mu_addon.blender.sidebar.unit_panel import MU_PT_unit
 from mu_addon.blender.unit import object as unit_object
+from mu_addon.blender.unit import resins
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.assets import asset_names
 from mu_addon.design.parameters import load_preset, preset_names
@@ -232,6 +234,21 @@ def test_a_surface_is_lit_and_the_nearer_triangle_hides_the_other():
     assert np.array_equal(turned, pixels)
 
 
+def test_a_resin_is_chosen_by_its_name_and_one_of_your_own_is_said_to_be():
+    root = add()
+    assert resins.name_of(root) == "Resin of Your Own"
+    assert bpy.ops.mu.resin(name="flexible-80a") == {"FINISHED"}
+    got, want = to_unit(root.mu_unit), load_material("flexible-80a").in_unit(to_unit(root.mu_unit))
+    assert got.wall == want.wall
+    assert attrs.asdict(got.material) == pytest.approx(attrs.asdict(want.material))
+    assert got.material.elongation_at_break == 1.2
+    assert resins.name_of(root) == "Flexible 80A"
+    root.mu_unit.material.membrane_modulus_kPa *= 1.1
+    assert resins.name_of(root) == "Resin of Your Own"
+    assert bpy.ops.mu.resin(name="elastic-50a-v1") == {"FINISHED"}
+    assert resins.name_of(root) == "Elastic 50A V1"
+
+
 def test_a_resin_and_a_printer_dropped_on_a_unit_become_its_parameters():
     assert bpy.ops.mu.assets() == {"FINISHED"}
     file = str(library.user_folder("assets") / library.MADE_FILE)
@@ -349,7 +366,7 @@ def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
         "tree": lambda: [n for t in trees.trees() for n in t.nodes],
     }[scene]
     assert made()
-    first = {"measured": "Diagnose the Data", "gripper": ""}.get(scene, "Simulate, perhaps")
+    first = {"measured": "Diagnose", "gripper": ""}.get(scene, "Simulate, perhaps")
     assert first in drawn_by([MU_PT_unit]), "the step at the top is what the scene is about"
     area = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D")
     view = area.spaces.active.region_3d

@@ -67,6 +67,8 @@ def test_operators_without_a_unit_say_what_is_missing():
             assert "Add > Mesh > Monolithic Gripper" in refused(operator), name
         elif name.startswith(("node_", "tree_")) and name not in ("tree_of_unit", "tree_show"):
             assert "Open a node tree of the kind Monolithic Unit" in refused(operator), name
+        elif name == "colours":
+            assert "in the header of a 3D view" in refused(operator)
         elif name == "skin":
             assert "Select a curve or a mesh" in refused(operator)
         else:
@@ -80,7 +82,7 @@ def test_what_changes_the_file_is_one_undo_step():
 
     # What these do is in files, processes or preferences, and no undo takes it back.
     outside = {"simulate", "cancel", "dismiss", "open", "export_stl", "preset_save", "preset_remove"}
-    outside |= {"assets", "assets_remove", "picture", "probe", "run_remove"}
+    outside |= {"assets", "assets_remove", "picture", "probe", "run_remove", "colours"}
     outside |= {"evidence_diagnose", "evidence_cancel", "evidence_dismiss", "evidence_open"}
     outside |= {"optimize", "optimize_cancel", "optimize_dismiss", "optimize_open"}
     outside |= {"tree_evaluate", "tree_save", "tree_cancel", "tree_dismiss", "tree_open", "tree_show"}
@@ -88,7 +90,7 @@ def test_what_changes_the_file_is_one_undo_step():
     outside |= {"print_check", "print_check_file", "print_export", "print_specimens"}
     outside |= {"print_cancel", "print_dismiss", "print_open"}
     outside |= {"sensor_ports", "sensor_connect", "sensor_disconnect", "sensor_pause"}
-    outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold"}
+    outside |= {"sensor_mark", "sensor_freeze", "sensor_sweep", "sensor_hold", "sensor_back"}
     outside |= {"sensor_calibrate", "sensor_cancel", "sensor_dismiss", "sensor_zero"}
     outside |= {
         "job_cancel",

@@ -260,18 +260,19 @@ def test_the_next_step_goes_from_the_ranking_to_the_files(home, tmp_path, monkey
     assert "Use Path" not in step(), "a tied path is as good"
     assert "Build Solid" in step()
     assert bpy.ops.mu.solid() == {"FINISHED"}
-    assert "Check the Print" in step()
-    assert "about" not in step().partition("Check the Print")[2], "nothing was measured yet"
+    assert "Check Print" in step()
+    assert "about" not in step().partition("Check Print")[2], "nothing was measured yet"
     timings.note("check", {"part": 9.0, "report": 11.0})
-    assert "Check the Print, about 20 s" in step()
-    assert "Check Print, about 20 s" in drawn()
+    assert "Check Print, about 20 s" in step()
+    assert "Check Print" not in drawn(), "one button of each: the panel points to the top"
+    assert "The button is at the top" in drawn()
 
     write_check(root, [finding("drain", "warning")])
-    assert "Export the Files" in step()
+    assert "Export" in step()
     timings.note(f"export {root.mu_print.quality}", {"solid": 21.0, "stl": 2.0, "3mf": 7.0, "step": 100.0})
-    assert "Export the Files, about 30 s" in step(), "of the chosen formats alone"
+    assert "Export, about 30 s" in step(), "of the chosen formats alone"
     root.mu_print.formats = {"stl", "txt"}
-    assert "Export the Files about" not in step().replace(",", ""), "a format was never written here"
+    assert "Export about" not in step().replace(",", ""), "a format was never written here"
 
     folder = printing.folder_of(root, "export")
     write_unit(to_unit(root.mu_unit), folder / "unit.toml")
@@ -429,7 +430,7 @@ def test_jobs_that_fail_and_one_that_is_stopped():
         "reported_error": "thicker wall",
         "crash": "SIGSEGV",
         "wordless": "without a message",
-        "good": "see Check",
+        "good": "see below",
     }.items():
         child = start(how)
         ended(child)

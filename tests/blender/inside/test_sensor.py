@@ -27,6 +27,7 @@ from mu_addon.blender.sensor import plot as sensor_plot
 from mu_addon.blender.sensor import session as sensor_session
 from mu_addon.blender.sensor import state as sensor
 from mu_addon.blender.sensor import twin
+from mu_addon.blender.sensor.session import Guide
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.sensing.calibration import CalibrationSweep, calibrate, write_calibration
 from mu_addon.sensing.recording import read_recording
@@ -149,7 +150,7 @@ def test_a_killed_reader_and_a_folder_that_is_gone(tmp_path, monkeypatch):
     watch(lambda: not s.running)
     drawn()
     root.mu_sensor.source = "replay"
-    assert "no recording is chosen" in refused(bpy.ops.mu.sensor_connect)
+    assert "Choose the folder of a recording" in refused(bpy.ops.mu.sensor_connect)
     root.mu_sensor.replay = str(tmp_path / "study" / "none")
     assert bpy.ops.mu.sensor_connect() == {"FINISHED"}
     assert ended(sensor.of(root)) == "failed"
@@ -214,6 +215,20 @@ def test_garbage_on_the_line_is_counted_and_shown():
     assert ended(s) == "done"
 
 
+def test_the_odd_angle_of_a_sweep_is_the_one_that_contradicts_the_others():
+    angles = [0.0, 15.0, 30.0, 45.0, 30.0, 15.0, 0.0]
+    light = [2.0, 1.7, 1.5, 1.3, 1.52, 1.74, 2.01]
+    assert Guide(angles, light_V=light).odd is None, "hysteresis is no fault"
+    assert Guide(angles, light_V=[-v for v in light]).odd is None, "nor is light that rises"
+    for k in range(7):
+        wrong = [*light]
+        wrong[k] = 1.3 if light[k] > 1.6 else 2.0
+        assert Guide(angles, light_V=wrong).odd == k
+    assert Guide(angles, light_V=[2.0, 1.7, 1.9]).odd == 2, "of two that contradict each other the latest"
+    assert Guide(angles, light_V=[2.0, 1.9]).odd is None
+    assert Guide(angles, light_V=[1.0, 1.0, 1.0]).odd is None
+
+
 def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path, monkeypatch):
     """A bench that bends as it is told: the light follows the angle of the last press of the button."""
     master, slave = os.openpty()
@@ -247,6 +262,23 @@ def test_a_guided_sweep_calibrates_and_a_zero_mends_weaker_light(tmp_path, monke
     assert bpy.ops.mu.sensor_sweep() == {"FINISHED"}
     angles = list(s.guide.angles)
     assert angles == [0, 15, 30, 45, 30, 15, 0, 15, 30, 45, 30, 15, 0]
+    assert not bpy.ops.mu.sensor_back.poll(), "nothing to take back"
+
+    def held():
+        assert bpy.ops.mu.sensor_hold() == {"FINISHED"}
+        watching(lambda: not s.guide.holding and len(s.guide.light_V) == s.guide.held)
+
+    # A wrong step is seen at once and undone: pressed at 30 before the unit was bent that far.
+    for bent in (0, 15, 5):
+        bench["angle"] = bent
+        arrived()
+        assert "breaks the order" not in drawn()
+        held()
+    assert "Number 3, 30°, breaks the order of the light: go back to it and repeat it" in drawn()
+    for left in (2, 1, 0):
+        assert bpy.ops.mu.sensor_back() == {"FINISHED"}
+        assert s.guide.held == left
+        assert "breaks the order" not in drawn()
     for angle in angles:
         assert f"Bend to {angle:g}" in drawn()
         bench["angle"] = angle

@@ -10,11 +10,10 @@ from .groups import BALLS, TUBES, Group
 from .wiring import Wiring
 
 NAME = "MU Unit"
-_VERSION = 3
+_VERSION = 4
 _TEXT = "The mesh of a Monolithic Unit: the point attribute `mu_skin` says what becomes a tube or a ball"
 RESULTS = ("Result 1", "Result 2")
-"""Inputs for the objects shown in place of the mesh, if any is given."""
-SHOW_RESULT = "Show Result"
+"""Inputs for the objects shown in place of the mesh, if any is given that has a shape."""
 SKIN = "mu_skin"
 PLAIN, TUBE, BALL, NODE = 0, 1, 2, 3
 """A point attribute and its values; a node is a coarser ball of the struts' material."""
@@ -28,7 +27,6 @@ def _build(tree, tube_group, ball_group) -> None:
     w.socket("Detail", "Int", 3, 1, 6, "Subdivisions of an anchor's ball")
     w.socket("Struts", "Material", text="Material of the struts")
     w.socket("Anchors", "Material", text="Material of the anchors")
-    w.socket(SHOW_RESULT, "Bool", False, text="Show the results in place of the design")
     for name in RESULTS:
         w.socket(name, "Object", text="Object that plays a study's motion")
     kind = w.node("GeometryNodeInputNamedAttribute", {"data_type": "INT"}, Name=SKIN).outputs[0]
@@ -66,7 +64,15 @@ def _build(tree, tube_group, ball_group) -> None:
             "GeometryNodeObjectInfo", {"transform_space": "ORIGINAL"}, Object=w.given(name), As_Instance=False
         )
         tree.links.new(found.outputs["Geometry"], played.inputs[0])
-    chosen = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=w.given(SHOW_RESULT))
+    # Brought into another file it may have lost them: then the design is seen, and never nothing.
+    size = w.node("GeometryNodeAttributeDomainSize", {"component": "MESH"}, Geometry=played.outputs[0])
+    there = w.node(
+        "FunctionNodeCompare",
+        {"data_type": "INT", "operation": "GREATER_THAN"},
+        A=size.outputs["Point Count"],
+        B=0,
+    )
+    chosen = w.node("GeometryNodeSwitch", {"input_type": "GEOMETRY"}, Switch=there.outputs["Result"])
     tree.links.new(both.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "False"))
     tree.links.new(played.outputs[0], next(s for s in chosen.inputs if s.enabled and s.name == "True"))
     w.output(chosen.outputs[0])

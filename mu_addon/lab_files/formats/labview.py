@@ -6,19 +6,24 @@ from collections.abc import Sequence
 
 import attrs
 
-from ..table_cells.dialect import Row
-from ..table_cells.notation import number
-from .columns import column, is_unit
+from ...table_cells.dialect import Row
+from ...table_cells.notation import number
+from ..columns import column, is_unit
+from ..sheet import Content, Sheet
+from . import text_table
 
 _MAGIC, _TITLES = "LabVIEW Measurement", "X_Value"
 
 
-def is_labview(rows: Sequence[Row]) -> bool:
-    """Return True for the rows of a measurement file of LabVIEW."""
-    return bool(rows) and rows[0].cells[:1] == (_MAGIC,)
+def read(content: Content) -> tuple[Sheet, ...] | None:
+    """The one sheet of a measurement file of LabVIEW."""
+    if not content.text.startswith(_MAGIC):
+        return None
+    (sheet,) = text_table.read(content)
+    return (attrs.evolve(sheet, rows=_with_times(sheet.rows)),)
 
 
-def rows_of_labview(rows: Sequence[Row]) -> tuple[Row, ...]:
+def _with_times(rows: Sequence[Row]) -> tuple[Row, ...]:
     """The rows with headers as lines of text, units in the titles, and a time in each row."""
     found: list[Row] = []
     header: dict[str, tuple[str, ...]] = {}

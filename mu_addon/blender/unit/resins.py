@@ -1,0 +1,74 @@
+"""The resin of a unit, by its name: the parameters that it sets, and whether they still are those."""
+
+# Blender reads the annotations themselves: no `from __future__ import annotations` here.
+
+import json
+from typing import Any
+
+import attrs
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ...design.assets import asset_names
+from ...design.parameters import SECTIONS, Unit
+from ..shared import updates
+from . import object as unit_object
+from .base_classes import UnitOperator
+
+OF_WALL = ("membrane_modulus_kPa", "membrane_poisson", "elongation_at_break")
+OWN = "Resin of Your Own"
+
+
+def parameters(resin: Any) -> dict[str, dict[str, Any]]:
+    """Parameters of a unit that a resin of the core sets, by section and name."""
+    unit = resin.in_unit(Unit())
+    material = {name: getattr(unit.material, name) for name in OF_WALL}
+    return {"material": material, "wall": attrs.asdict(unit.wall)}
+
+
+def take(root: Any, name: str, given: dict[str, dict[str, Any]]) -> None:
+    """Give a unit a resin's parameters, and remember its name with them."""
+    with updates.paused():
+        for section in SECTIONS:
+            group = getattr(root.mu_unit, section.section)
+            for key, value in given.get(section.section, {}).items():
+                setattr(group, key, value)
+        root.mu_unit.resin = json.dumps({"name": name, "values": given})
+
+
+def name_of(root: Any) -> str:
+    """Name of the unit's resin, or that its constants are no longer those of one."""
+    kept = json.loads(root.mu_unit.resin or "{}")
+    for section, values in kept.get("values", {}).items():
+        group = getattr(root.mu_unit, section)
+        for key, value in values.items():
+            now = getattr(group, key)
+            if now != value and not (isinstance(value, float) and np.isclose(now, value, rtol=1e-6)):
+                return OWN
+    return str(kept.get("name", OWN))
+
+
+class MU_OT_resin(UnitOperator, bpy.types.Operator):
+    """Give the unit the constants of this resin: its wall's modulus, law and break strain"""
+
+    bl_idname = "mu.resin"
+    bl_label = "Resin"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: EnumProperty(
+        name="Resin",
+        description="Resin of the unit's wall; its file says where each constant is from",
+        items=[(name, name.replace("-", " ").title(), "") for name in asset_names("materials")],
+    )
+
+    def act(self, context, root):
+        # Imported late, with the solver's packages.
+        from ...materials import load_material
+
+        resin = load_material(self.name)
+        take(root, resin.name, parameters(resin))
+        unit_object.rebuild(root)
+
+
+register, unregister = bpy.utils.register_classes_factory((MU_OT_resin,))

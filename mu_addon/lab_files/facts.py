@@ -1,0 +1,85 @@
+"""Sizes and names of a specimen in the lines above its table."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from ..table_cells.notation import number
+from .columns import unit_of
+
+LENGTH = re.compile(
+    r"gau?ge length|grip separation|messlange|einspannlange|anfangslange|initial length|specimen length|"
+    r"\bheight\b|\bhohe\b|probenhohe|longueur|lunghezza|longitud|\bl0\b"
+)
+WIDTH = re.compile(r"width|breite|largeur|larghezza|anchura|szerokosc|\bb0\b")
+THICKNESS = re.compile(r"thickness|dicke|epaisseur|spessore|espesor|grubosc|\ba0\b")
+DIAMETER = re.compile(r"diameter|durchmesser|diametre|diametro|srednica|\bd0\b")
+AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
+SECTION = re.compile(r"section|querschnitt")
+NAME = re.compile(
+    r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
+)
+# In a line of text a number and its unit follow its name at once.
+_NUMBER = r"([-+]?\d[\d.,]*)"
+_BRACKET = r"[(\[]([^()\[\]]+)[)\]]"
+_BEHIND = re.compile(
+    rf"[\s:;=,]*(?:[a-z]\d?\b[\s:;=]*)?(?:of |is |{_BRACKET}[\s:;=]*)?{_NUMBER}[\s;]*([^\s\d,;.)]+\d?)?"
+)
+_PAIR = re.compile(rf"\D{{0,20}}?{_NUMBER}\s*[x\u00d7*]\s*{_NUMBER}\s*(\w+)\s*$")
+
+Facts = Mapping[str, tuple[str, ...]]
+
+
+def named(facts: Facts, pattern: re.Pattern[str]) -> str:
+    """Text that a line gives for a name, "" without one."""
+    return next((cells[0] for key, cells in facts.items() if cells and pattern.search(key)), "")
+
+
+def size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | None:
+    """A positive length in mm, or area in mm2, that the lines state; None without it or its unit."""
+    for key, cells in facts.items():
+        text = " ".join((key, *cells))
+        found = pattern.search(text)
+        if not found:
+            continue
+        value = None
+        if cells and found.end() <= len(key):
+            unit = cells[1] if len(cells) > 1 else (re.search(_BRACKET, key) or ["", ""])[1]
+            value = _in_mm(cells[0], unit, decimal)
+        behind = _BEHIND.match(text, found.end())
+        if value is None and behind:
+            value = _in_mm(behind[2].rstrip(".,"), behind[3] or behind[1] or "", decimal)
+        if value is not None:
+            return value
+    return None
+
+
+def pair_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> list[float] | None:
+    """Two lengths in mm as in "section: 10 x 2 mm"; None without them."""
+    for key, cells in facts.items():
+        text = " ".join((key, *cells))
+        found = pattern.search(text)
+        both = _PAIR.match(text, found.end()) if found else None
+        values = [_in_mm(text, both[3], decimal) for text in both.group(1, 2)] if both else [None]
+        if None not in values:
+            return [value for value in values if value is not None]
+    return None
+
+
+def square_mm(area: float | None, diameter: float | None) -> float | None:
+    """Side in mm of the square with a section's area, by its area in mm2 or its diameter in mm."""
+    if area:
+        return round(math.sqrt(area), 6)
+    return round(0.5 * math.sqrt(math.pi) * diameter, 6) if diameter else None
+
+
+def _in_mm(text: str, unit: str, decimal: str) -> float | None:
+    value = number(text, decimal)
+    unit = unit.strip().replace("\u00b2", "2")
+    squared = unit.endswith("2")
+    known = unit_of(unit.removesuffix("2").removesuffix("^")) if unit else None
+    if value is None or not value > 0 or not known or known[0] != "mm":
+        return None
+    return float(value * (known[1] ** 2 if squared else known[1]))

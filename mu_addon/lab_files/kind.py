@@ -1,0 +1,157 @@
+"""Kind of experiment that a table is: by its quantities and the words of its file, else asked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from ..measured.kinds import KINDS, named
+from .columns import READ_IN, plain, unit_of
+from .draft import Draft, NoExperiment
+from .quantities import ask_column, may_hold
+
+Array = np.ndarray[Any, Any]
+
+_TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione|traccion|rozciagan")
+_COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")
+# Titles of a table of amplitudes, by frequency or temperature.
+_OSCILLATION = re.compile(
+    r"oscillat|\bosz|amplitud|(storage|loss|complex) mod|speichermod|verlustmod|module de (conservation|"
+    r"perte)|modulo (elastico|viscoso)|tan ?\W?(delta|d\b|\u03b4)|loss factor|verlustfaktor|"
+    r"\b[eg]['\u2032\"\u2033]|\bfrequen|\bfreq\b|\bf ?[/\[(] ?hz|phase angle|phasenwinkel"
+)
+# Columns that are asked for at most.
+_MOST_ASKED = 12
+# A pressure that goes this share of its range within that share of a record, read so many times a second.
+_STEP, _WITHIN, _CAMERA_Hz = 0.6, 0.02, 20.0
+_LOADED = ("coupon", "lattice_compression")
+# Quantities of each kind that is known by them alone, the more particular first, and what is concluded.
+_KNOWN_BY = (
+    ("unit_pose", {"pressure_kPa", "orientation_deg", "angle_deg"}, ""),
+    ("blocked_force", {"pressure_kPa", "force_N"}, "a force beside a pressure (kind=... for another)"),
+    ("unit_pressure", {"pressure_kPa", "angle_deg"}, ""),
+    ("unit_pressure", {"pressure_kPa", "volume_mm3"}, ""),
+    ("waveguide_bending", {"angle_deg", "voltage_V"}, ""),
+    ("beam_deadweight", {"added_mass_g", "tip_deflection_mm"}, ""),
+)
+
+
+def with_kind(draft: Draft) -> Draft:
+    """The draft with its kind, "" where it must be asked; raises InputError, NoExperiment."""
+    asked = any(question.key.startswith("column.") for question in draft.questions)
+    answer = draft.choice("kind", tuple(KINDS))
+    if answer is not None:
+        return attrs.evolve(draft, kind="" if asked else answer)
+    have = set(draft.columns)
+    for kind, needed, why in _KNOWN_BY:
+        if needed <= have:
+            if needed == {"pressure_kPa", "angle_deg"} and _is_stepped(draft.columns):
+                kind = "pressure_step"
+                why = (
+                    "the pressure jumps, and was read often enough to see the unit follow "
+                    "(kind=unit_pressure where it was slow)"
+                )
+            return attrs.evolve(draft.concluding(f"{kind}: {why}") if why else draft, kind=kind)
+    if any(have.issuperset(load) for load in KINDS["coupon"].needs):
+        return _loading(draft)
+    if asked:
+        return draft
+    unknown = [k for k in draft.free if not draft.block.columns[k].quantity]
+    for k in unknown[:_MOST_ASKED]:
+        unit = unit_of(draft.block.columns[k].unit)
+        fit = [q for q, read in READ_IN.items() if q != "count" and (unit is None or read == unit[0])]
+        draft = ask_column(draft, k, fit)
+    if unknown:
+        return draft
+    if "pressure_kPa" in have:
+        return attrs.evolve(draft, kind="pressure_hold")
+    ways = "; ".join(
+        f"{kind.name}: {' or '.join(', '.join(g) for g in kind.needs)}" for kind in KINDS.values()
+    )
+    raise NoExperiment(
+        f"no kind of experiment has {' and '.join(sorted(have)) or 'no known column'} alone; there are "
+        f"{draft.titles()}{_unread(draft)}",
+        draft.where,
+        f"export the columns of one kind ({ways}), or say with column.TITLE=QUANTITY what a column holds",
+    )
+
+
+def _loading(draft: Draft) -> Draft:
+    """Kind of loading, tension of a specimen or compression of a lattice, by the file's text."""
+    block = draft.block
+    words = " ".join(
+        [draft.path.stem, block.sheet, block.label, *(c.title for c in block.columns)]
+        + [" ".join((key, *cells)) for key, cells in block.facts.items()]
+    )
+    pulled, pressed = (bool(pattern.search(plain(words))) for pattern in (_TENSION, _COMPRESSION))
+    if pulled != pressed:
+        kind = "coupon" if pulled else "lattice_compression"
+        words = f"{kind}: the file speaks of {'tension' if pulled else 'compression'}"
+        return attrs.evolve(draft.concluding(words), kind=kind)
+    words = "a specimen was loaded: was it a coupon of resin, or a block of lattice compressed?"
+    return draft.asked("kind", words, _LOADED)
+
+
+def _is_stepped(columns: Mapping[str, Array]) -> bool:
+    """Return True if a record is of pressure steps, sampled fast."""
+    t, p = columns.get("time_s"), columns["pressure_kPa"]
+    if t is None or len(t) < 50 or not np.isfinite(p).all() or not (np.diff(t) > 0).all():
+        return False
+    lasts, extent = float(t[-1] - t[0]), float(np.ptp(p))
+    if not extent or len(t) / lasts < _CAMERA_Hz:
+        return False
+    later = np.interp(t + _WITHIN * lasts, t, p)
+    return bool(np.abs(later - p).max() >= _STEP * extent)
+
+
+def require_curve(draft: Draft) -> Draft:
+    """Raise NoExperiment for loads that are amplitudes of an oscillation; an answered column is none."""
+    for k, one in enumerate(draft.block.columns) if draft.kind in _LOADED else ():
+        if _OSCILLATION.search(plain(one.title)) and draft.answer_on("column", one)[1] is None:
+            raise NoExperiment(
+                f"{draft.title(k)} shows a test by oscillation: its loads are amplitudes, and no "
+                "stress-strain curve",
+                draft.where,
+                "export a test of one pull or pressing; if each row is a reading of one, answer "
+                f"column.{draft.key(one)}=none, or with its quantity",
+            )
+    return draft
+
+
+def with_needed(draft: Draft) -> Draft:
+    """Ask for the columns that the kind needs; raises NoExperiment if no candidate is left."""
+    have, kind = set(draft.columns), KINDS[draft.kind]
+    groups = [set(group) | ({"time_s"} if kind.timed else set()) for group in kind.needs]
+    if any(group - {"time_s"} <= have for group in groups):
+        return draft
+    # The group that most columns are there for, or may be by their units.
+    ways = []
+    for group in groups:
+        gone = sorted(group - have - {"time_s"})
+        wanted = [q for q in READ_IN if named(q) in gone]
+        unknown = [k for k in draft.free if may_hold(draft, k, wanted)]
+        fit = [q for q in wanted if any(may_hold(draft, k, [q]) for k in unknown)]
+        ways.append((len(group & have) / len(group), len(fit) / len(gone), gone, wanted, unknown))
+    _, _, gone, wanted, unknown = max(ways, key=lambda way: way[0] + way[1])
+    if not unknown:
+        raise NoExperiment(
+            f"{kind.name} needs {' and '.join(gone)}, and no column is left that may hold it; there are "
+            f"{draft.titles()}{_unread(draft)}",
+            draft.where,
+            "export that column as well, choose another kind, or say with column.TITLE=QUANTITY and "
+            "unit.TITLE=UNIT what a column holds",
+        )
+    alone = len(unknown) == len(wanted) == 1
+    for k in unknown[:_MOST_ASKED]:
+        draft = ask_column(draft, k, wanted, f", as {kind.name} needs {' and '.join(gone)}", alone)
+    return draft
+
+
+def _unread(draft: Draft) -> str:
+    """Columns that were not read, with the reasons, for an error."""
+    listed = "; ".join(one.words for one in draft.unread if one.what)
+    return f"; not read: {listed}" if listed else ""
