@@ -18,6 +18,7 @@ UNLIMITED = {
     "mu_addon/reading.py": "sets the limits",
     "mu_addon/run/heartbeat.py": "what the worker it watches says, over a pipe",
     "mu_addon/blender/printing/panel.py": "a property of the scene",
+    "mu_addon/blender/unit/resins.py": "a property of the unit",
     "mu_addon/blender/shared/operators.py": "a text that the user opens in Blender",
     "mu_addon/measured/table.py": "the text of a file read within its limit",
     "mu_addon/optimization/evaluation.py": "an entry of the cache, sealed and within its limit",
