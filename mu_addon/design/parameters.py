@@ -128,7 +128,7 @@ class Envelope:
     struts: str = text_quantity(
         "",
         lattice_kinds.canonical_text,
-        'struts of a custom kind, as "x y z to x y z; ...", in cells from 0 to 1; no taper after "straight;"',
+        'struts of a custom kind: "x y z to x y z; ...", in cells; no taper after "straight;"',
         "assumed: the paper's cells are body-centred",
     )
     cells_x: int = quantity(
