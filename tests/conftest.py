@@ -67,14 +67,3 @@ def pytest_collection_finish():
     """What was collected stays to the end, and garbage is looked for less often: it took 4 % of all time."""
     gc.freeze()
     gc.set_threshold(10_000, 10, 50)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def lattice_kinds_as_shipped():
-    """Kinds of lattice that a file's tests register go with it: the next file may count them."""
-    from mu_addon.design import lattice_kinds  # not before the variables above: it loads numpy
-
-    shipped = dict(lattice_kinds.KINDS)
-    yield
-    lattice_kinds.KINDS.clear()
-    lattice_kinds.KINDS.update(shipped)

@@ -9,13 +9,12 @@ Nothing is fitted to them: rigid zones come from one solid cell, three elements 
 from __future__ import annotations
 
 import tempfile
-from itertools import product
 from pathlib import Path
 
-import numpy as np
+import attrs
 
 from benchmarks.table import circumstances, options_of, print_head
-from mu_addon.design.lattice_kinds import LatticeKind, constant, register, sin_squared
+from mu_addon.design.lattice_kinds import LatticeKind, sin_squared
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
@@ -23,27 +22,19 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
 from mu_addon.resolved.printed_mesh import mesh_printed
+from tests.design.kinds import CORNERS, FACES, cross, custom, octet
 
-CORNERS = list(product((0.0, 1.0), repeat=3))
-FACES = [tuple(0.5 + 0.5 * s * (axis == k) for k in range(3)) for axis in range(3) for s in (-1, 1)]
-CENTRE = [(0.5, 0.5, 0.5)]
-_OCTET = [*CORNERS, *FACES]
-_NEIGHBOURS = [
-    (a, b)
-    for a in range(len(_OCTET))
-    for b in range(a)
-    if abs(np.linalg.norm(np.subtract(_OCTET[a], _OCTET[b])) - np.sqrt(0.5)) < 1e-9
-]
+NODES = [(0.5, 0.5, 0.5), *CORNERS, *FACES]
 KINDS = (
-    LatticeKind("cross", CENTRE + FACES, [(0, k) for k in range(1, 7)], constant),
-    LatticeKind("diagonals and cross", CENTRE + CORNERS + FACES, [(0, k) for k in range(1, 15)], sin_squared),
-    LatticeKind("octet", _OCTET, _NEIGHBOURS, sin_squared),
+    cross(),
+    LatticeKind("diagonals and cross", NODES, [(0, k) for k in range(1, 15)], sin_squared),
+    attrs.evolve(octet(), radius=sin_squared),
 )
 
 
 def angle(kind: LatticeKind, chambers: int, fidelity: str, kPa: float, folder: Path) -> tuple[float, int]:
     """Bending angle in degrees at a pressure, and the number of unknowns."""
-    unit = load_preset("mu-1.0x").evolve(kind=register(kind).name, count=chambers, seats=False)
+    unit = load_preset("mu-1.0x").evolve(**custom(kind), count=chambers, seats=False)
     mesh = mesh_printed(unit, MeshSettings(fidelity=fidelity, refine=0.5), cache=folder)
     solver = Equilibrium(Model(mesh), materials_of(unit, mesh))
     state = solver.reach(kPa / 1000.0, [solver.at_zero_pressure()])

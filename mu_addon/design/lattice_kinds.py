@@ -1,15 +1,17 @@
 """Kinds of lattice by name: nodes and struts of one cell, and a strut's radius along its length.
 
-A new kind is one `register(LatticeKind(...))`; solids, meshes and moduli take it from here.
+A kind is a file of `assets/lattices`, or the text of a unit's own struts; solids, meshes and moduli follow.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -17,12 +19,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..reading import file_text
+from .assets import asset_file, asset_names
+from .toml_text import parse
 
 Array = NDArray[np.float64]
 RadiusLaw = Callable[[Array, float, float], Array]
 
 _FINEST = 64
 """Largest denominator of a node's coordinates, so that shared nodes are found exactly."""
+CUSTOM = "custom"
+"""Name of the kind whose struts a unit states itself."""
+
+_MOST = 200
+_NUMBER = re.compile(r"\d(?:/[1-9]\d?|\.\d{1,12})?")
+_EXAMPLE = '"0 1/2 1/2 to 1/2 1/2 1/2; ..."'
 
 
 def sin_squared(t: Array, junction_radius: float, midspan_radius: float) -> Array:
@@ -192,36 +203,81 @@ def _distances(first: NDArray[np.int64], second: NDArray[np.int64]) -> Array:
     return np.where(inner, np.minimum(found, gap), found)
 
 
-_CENTRE_AND_CORNERS = [(0.5, 0.5, 0.5), *product((0.0, 1.0), repeat=3)]
-_HALF_DIAGONALS = [(0, corner) for corner in range(1, 9)]
-
-KINDS: dict[str, LatticeKind] = {}
-
-
-def register(kind: LatticeKind) -> LatticeKind:
-    """Add a lattice kind under its name and return it. Raises InputError where another kind has the name."""
-    if KINDS.get(kind.name, kind) != kind:
-        raise InputError(f"a lattice {kind.name!r} already exists", "lattice kind", "choose another name")
-    KINDS[kind.name] = kind
-    return kind
+@cache
+def names() -> tuple[str, ...]:
+    """Names of all kinds of lattice: those of the files in `assets/lattices`, and CUSTOM."""
+    return (*asset_names("lattices"), CUSTOM)
 
 
-def kind(name: str) -> LatticeKind:
-    """The lattice kind of this name. Raises InputError, which lists the valid names."""
-    if name not in KINDS:
+@cache
+def kind(name: str, struts: str = "") -> LatticeKind:
+    """The lattice kind of this name; struts: the text of CUSTOM's. Raises InputError."""
+    if name == CUSTOM:
+        return parsed(name, struts, "[lattice] struts")
+    if name not in names():
         raise InputError(
             f"there is no lattice {name!r}", "[lattice] kind", f"choose one of {', '.join(names())}"
         )
-    return KINDS[name]
+    path = asset_file("lattices", "lattice", name)
+    return parsed(name, read_struts(path), str(path))
 
 
-def names() -> tuple[str, ...]:
-    """Names of all kinds of lattice, in the order in which they were registered."""
-    return tuple(KINDS)
+def read_struts(path: Path) -> str:
+    """The canonical text of the struts in a file of a lattice kind. Raises InputError."""
+    try:
+        text = file_text(path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the lattice kind: {error}", str(path), "give a TOML file") from error
+    struts = parse(text, {"": ("struts",)}, str(path)).get("struts")
+    if not isinstance(struts, str):
+        raise InputError("there are no struts", str(path), f"write struts = {_EXAMPLE}")
+    return text_of(parsed(path.stem, struts, str(path)))
 
 
-BODY_CENTRED = register(LatticeKind("body-centred", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, sin_squared))
-"""Eight tapered half diagonals from the centre: the lattice of the source paper."""
+def parsed(name: str, text: str, where: str) -> LatticeKind:
+    """The kind whose struts a text lists by their ends, as "0 0 0 to 1/2 1/2 1/2; ...".
 
-STRAIGHT = register(LatticeKind("body-centred-straight", _CENTRE_AND_CORNERS, _HALF_DIAGONALS, constant))
-"""The body-centred lattice without taper."""
+    Ends are in cells; `straight` in front: of the mid-span's diameter throughout, else tapered. where: for
+    messages. Raises InputError.
+    """
+    entries = [entry.strip() for entry in text.replace("\n", ";").split(";") if entry.strip()]
+    straight = entries[:1] == ["straight"]
+    number: dict[tuple[Fraction, ...], int] = {}
+    struts = []
+    for entry in entries[straight:]:
+        ends = [end.split() for end in entry.split(" to ")]
+        if [len(end) for end in ends] != [3, 3] or not all(_NUMBER.fullmatch(x) for end in ends for x in end):
+            raise InputError(f"{entry[:60]!r} is not a strut between two nodes", where, f"write {_EXAMPLE}")
+        nodes = [tuple(map(Fraction, end)) for end in ends]
+        struts.append([number.setdefault(node, len(number)) for node in nodes])
+    if len(struts) > _MOST:
+        raise InputError(f"a cell of {len(struts)} struts", where, f"give {_MOST} at most")
+    try:
+        return LatticeKind(
+            name,
+            [[float(x) for x in node] for node in number],
+            struts,
+            constant if straight else sin_squared,
+        )
+    except InputError as error:
+        raise InputError(error.what, where, error.remedy) from error
+
+
+def text_of(kind: LatticeKind) -> str:
+    """The struts of a kind as `parsed` takes them, on one line. Raises InputError for another radius.
+
+    >>> text_of(kind("body-centred"))[:46]
+    '1/2 1/2 1/2 to 0 0 0; 1/2 1/2 1/2 to 0 0 1; 1/'
+    """
+    if kind.radius not in (constant, sin_squared):
+        raise InputError(
+            f"the radius of lattice {kind.name!r} has no text", "lattice kind", "take one of two"
+        )
+    nodes = [" ".join(str(Fraction(x, kind.divisions)) for x in node) for node in kind.grid.tolist()]
+    struts = [f"{nodes[a]} to {nodes[b]}" for a, b in kind.struts.tolist()]
+    return "; ".join([*(["straight"] if kind.radius is constant else []), *struts])
+
+
+def canonical_text(text: str) -> str:
+    """One text for all that list the same struts in the same order; "" for "". Raises InputError."""
+    return text_of(kind(CUSTOM, text)) if text.strip() else ""

@@ -125,6 +125,12 @@ class Envelope:
     section: ClassVar[str] = "lattice"
 
     kind: str = choice("body-centred", lattice_kinds.names, "kind of lattice cell", PAPER)
+    struts: str = text_quantity(
+        "",
+        lattice_kinds.canonical_text,
+        'struts of a custom kind: "x y z to x y z; ...", in cells; no taper after "straight;"',
+        "assumed: the paper's cells are body-centred",
+    )
     cells_x: int = quantity(
         3,
         "",
@@ -168,6 +174,20 @@ class Envelope:
         "strut diameter at mid-span, the maximum",
         "assumed: the paper says wider than the junction and prints none; a third wider",
     )
+
+    def __attrs_post_init__(self) -> None:
+        if self.kind == lattice_kinds.CUSTOM and not self.struts:
+            raise InputError(
+                "a custom lattice has no struts",
+                "[lattice] kind",
+                'write struts = "...", or kind = "FILE.toml"',
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters in use: `struts` only of a custom kind."""
+        fields = (f.name for f in attrs.fields(Envelope))
+        return tuple(name for name in fields if name != "struts" or self.kind == lattice_kinds.CUSTOM)
 
 
 @attrs.frozen
@@ -488,7 +508,7 @@ class Unit:
             cells_x=t.cells_x,
             cells_y_minus=t.cells_y_minus,
             cells_y_plus=t.cells_y_plus,
-            kind=lattice_kinds.kind(t.kind),
+            kind=lattice_kinds.kind(t.kind, t.struts if t.kind == lattice_kinds.CUSTOM else ""),
             junction_diameter=s * t.junction_diameter_mm,
             midspan_diameter=s * t.midspan_diameter_mm,
             row=w.row,
@@ -575,10 +595,11 @@ def to_toml(unit: Unit, comments: bool = True) -> str:
     return toml_text.compose(head, tables, comments)
 
 
-def from_toml(text: str, origin: str = "") -> Unit:
+def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Unit:
     """The unit in TOML text; keys left out keep their defaults.
 
-    origin: name of the file, for messages. Raises InputError with file and line.
+    origin: name of the file, for messages; beside: its folder, in which a lattice kind's file lies. Raises
+    InputError with file and line.
 
     >>> from_toml('format = 1').chambers.count
     6
@@ -593,10 +614,24 @@ def from_toml(text: str, origin: str = "") -> Unit:
                 "format",
                 f"write format = {FORMAT}, the only one so far",
             )
+        _take_kind(document.get("lattice", {}), beside or Path())
         sections = {_attribute(s): s(**document.get(_attribute(s), {})) for s in SECTIONS}
         require_used(sections["wall"], document.get("wall", {}))
         rest = {key: document[key] for key in ("name", "scale") if key in document}
         return Unit(**rest, **sections)
+
+
+def _take_kind(lattice: dict[str, Any], folder: Path) -> None:
+    """Put the struts of the file that `kind` names in its place, so that a unit carries them everywhere."""
+    kind = lattice.get("kind")
+    if "struts" in lattice and kind != lattice_kinds.CUSTOM:
+        raise InputError(
+            "struts has no effect with another kind",
+            "[lattice] struts",
+            f'write kind = "{lattice_kinds.CUSTOM}", or leave it out',
+        )
+    if isinstance(kind, str) and kind.endswith(".toml"):
+        lattice |= {"kind": lattice_kinds.CUSTOM, "struts": lattice_kinds.read_struts(folder / kind)}
 
 
 def read_unit(path: str | Path) -> Unit:
@@ -612,7 +647,7 @@ def read_unit(path: str | Path) -> Unit:
         ) from error
     except UnicodeDecodeError as error:
         raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
-    return from_toml(text, str(path))
+    return from_toml(text, str(path), path.parent)
 
 
 def write_unit(unit: Unit, path: str | Path) -> None:

@@ -3,115 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import attrs
 
 from ..errors import InputError
+from .declared_laws import wall_laws, wall_parameters
 from .quantity import choice, quantity
 
-LAWS = ("neo-hooke", "yeoh", "prony", "ogden-roxburgh")
-BRANCHES = (1, 2, 3)
-# The long-term modulus is what the shares leave: with all of it relaxing there is none.
-LARGEST_SHARE = 0.95
-
-_SHAPE = ("c2_over_c1", "c3_over_c1")
-_PRONY = tuple(f"prony_{name}" for i in BRANCHES for name in (f"g{i}", f"tau{i}_s"))
-_MULLINS = ("mullins_r", "mullins_m_kPa", "mullins_beta")
-# The parameters of each law, in the order of the class.
-_OF_LAW = {
-    "neo-hooke": (),
-    "yeoh": _SHAPE,
-    "prony": (*_SHAPE, *_PRONY),
-    "ogden-roxburgh": (*_SHAPE, *_MULLINS),
-}
+DEFAULT = "neo-hooke"
 
 
-def _share(number: int) -> float:
-    return quantity(
-        0.0,
-        "",
-        0.0,
-        LARGEST_SHARE,
-        f"share of the wall's shear modulus at once that relaxes in branch {number} of the Prony series",
-        "assumed: none relaxes unless a relaxation test says otherwise",
-    )
+def _fields_of_laws() -> dict[str, Any]:
+    """The field `law` and those of every law's own parameters; a law's come after those it builds on."""
+    laws = wall_laws()
+    texts = ", ".join(f"{key} {law.wall_text}" for key, law in laws.items())
+    source = "assumed: the paper prints none; the simplest, right to stretches of about 1.5"
+    rows = {name: row for law in laws.values() for name, row in law.parameters.items()}
+    ordered = dict.fromkeys(name for key in laws for name in wall_parameters(key))
+    law = choice(DEFAULT, lambda: tuple(wall_laws()), f"law of the wall; {texts}", source)
+    return {"law": law} | {name: quantity(*rows[name]) for name in ordered}
 
 
-def _time(number: int, default: float) -> float:
-    return quantity(
-        default,
-        "s",
-        1e-4,
-        1e7,
-        f"relaxation time of branch {number}",
-        "assumed: decades around a grasp of some seconds",
-    )
+_OfLaws: Any = attrs.make_class("_OfLaws", _fields_of_laws(), frozen=True)
 
 
 @attrs.frozen
-class Wall:
+class Wall(_OfLaws):
     """Section [wall]: the membrane's law beyond the small-strain moduli of [material].
 
-    Those moduli are the long-term ones of a wall that has not been loaded. c2_over_c1 and c3_over_c1 shape
-    Yeoh's law, on which prony and ogden-roxburgh build; `names` are the parameters in use. The lattice's law
-    is unchanged. Raises InputError for Prony shares that add up to more than LARGEST_SHARE.
+    Those moduli are the long-term ones of a wall that has not been loaded. `law` is one of `fem/laws`, whose
+    file declares its further parameters; `names` are those in use. The lattice's law is unchanged. Raises
+    InputError for parameters of the law that add up to more than it allows.
     """
 
     section: ClassVar[str] = "wall"
 
-    law: str = choice(
-        "neo-hooke",
-        lambda: LAWS,
-        "law of the wall; prony relaxes with time, ogden-roxburgh softens below its largest strain (Mullins)",
-        "assumed: the paper prints none; the simplest, right to stretches of about 1.5",
-    )
-    c2_over_c1: float = quantity(
-        0.0,
-        "",
-        -0.05,
-        10.0,
-        "second over first coefficient of Yeoh's law",
-        "assumed: none unless a coupon says otherwise",
-    )
-    c3_over_c1: float = quantity(
-        0.0,
-        "",
-        0.0,
-        10.0,
-        "third over first coefficient of Yeoh's law",
-        "assumed: none unless a coupon says otherwise",
-    )
-    prony_g1: float = _share(1)
-    prony_tau1_s: float = _time(1, 1.0)
-    prony_g2: float = _share(2)
-    prony_tau2_s: float = _time(2, 10.0)
-    prony_g3: float = _share(3)
-    prony_tau3_s: float = _time(3, 100.0)
-    mullins_r: float = quantity(
-        2.0,
-        "",
-        1.0,
-        1e3,
-        "Ogden-Roxburgh's r: the largest loss of stress is 1/r of it",
-        "assumed: a filled rubber loses about half",
-    )
-    mullins_m_kPa: float = quantity(
-        50.0,
-        "kPa",
-        0.01,
-        1e5,
-        "Ogden-Roxburgh's m: differences of strain energy far below it soften nothing",
-        "assumed: the energy of the default wall at a stretch of 1.2",
-    )
-    mullins_beta: float = quantity(
-        0.1,
-        "",
-        0.0,
-        10.0,
-        "Ogden-Roxburgh's beta: widens the return to the first loading's stress",
-        "assumed: a customary value",
-    )
     layers_excess: float = quantity(
         0.0,
         "",
@@ -138,12 +65,13 @@ class Wall:
     )
 
     def __attrs_post_init__(self) -> None:
-        total = sum(self.prony_shares)
-        if self.law == "prony" and total > LARGEST_SHARE:
+        *names, most = wall_laws()[self.law].wall_total or (0,)
+        total = sum(getattr(self, name) for name in names)
+        if total > most:
             raise InputError(
-                f"the shares that relax add up to {total:g}",
-                "[wall] prony_g1",
-                f"give prony_g1 to prony_g3 a sum of at most {LARGEST_SHARE:g}",
+                f"{', '.join(names)} add up to {total:g}",
+                f"[wall] {names[0]}",
+                f"give them a sum of at most {most:g}",
             )
 
     @property
@@ -151,24 +79,14 @@ class Wall:
         """Names of the parameters that this law uses; empty for the default wall."""
         sliding = ("friction_share", "friction_yield_kPa") if self.friction_share else ()
         layers = ("layers_excess",) if self.layers_excess else ()
-        if self.law == LAWS[0] and not (sliding or layers):
+        if self.law == DEFAULT and not (sliding or layers):
             return ()
-        return ("law", *_OF_LAW[self.law], *layers, *sliding)
-
-    @property
-    def prony_shares(self) -> tuple[float, ...]:
-        """Shares g_i of the shear modulus that relax, one for each of the three branches; without unit."""
-        return tuple(getattr(self, f"prony_g{i}") for i in BRANCHES)
-
-    @property
-    def prony_times_s(self) -> tuple[float, ...]:
-        """Relaxation times tau_i in s, one for each of the three branches."""
-        return tuple(getattr(self, f"prony_tau{i}_s") for i in BRANCHES)
+        return ("law", *wall_parameters(self.law), *layers, *sliding)
 
     @property
     def has_memory(self) -> bool:
         """True if the stress depends on the history of deformation, so that motions are solved in time."""
-        return self.law in ("prony", "ogden-roxburgh") or self.friction_share > 0
+        return wall_laws()[self.law].memory or self.friction_share > 0
 
     def require_without_memory(self, what: str) -> None:
         """Raise InputError if the stress depends on history; what: the job that does not support it."""
@@ -186,14 +104,14 @@ def offered(law: str, friction_share: float) -> tuple[str, ...]:
     friction_share: its value, 0 .. 10, without unit; 0 leaves out the yield stress.
     """
     sliding = ("friction_share", "friction_yield_kPa") if friction_share else ("friction_share",)
-    return ("law", *_OF_LAW[law], "layers_excess", *sliding)
+    return ("law", *wall_parameters(law), "layers_excess", *sliding)
 
 
 def require_used(wall: Wall, given: Iterable[str]) -> None:
     """Raise InputError for a parameter among `given` that the wall's law does not use."""
     for name in given:
         if name not in offered(wall.law, 1.0):
-            having = [law for law, names in _OF_LAW.items() if name in names]
+            having = [law for law in wall_laws() if name in wall_parameters(law)]
             raise InputError(
                 f"{name} has no effect with law = {wall.law!r}",
                 f"[wall] {name}",

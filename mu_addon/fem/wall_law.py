@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..design.quantity import in_MPa
-from .laws import Friction, Layered, NeoHooke, OgdenRoxburgh, Prony, Yeoh
+from .laws import LAWS, Friction, Layered, NeoHooke
 from .materials import Layer
 
 if TYPE_CHECKING:
@@ -29,8 +29,9 @@ def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float)
     (mu, kappa) = NeoHooke.parameters(modulus_MPa, poisson)[0]
     added, share = layer_stiffness(1 + wall.layers_excess, mu, kappa) if wall.layers_excess else (0.0, 1.0)
     less = min(added, 0.0)
-    row = law_row(wall, mu + less / 2, kappa + less / 3)
-    found = [_layer(_LAWS[wall.law], elements, row, share)]
+    law = LAWS[wall.law]
+    row = np.array(law.row_of_wall(wall, mu + less / 2, kappa + less / 3))
+    found = [_layer(law, elements, row, share)]
     if added:
         more = Layered.parameters(max(added, 0.0), -less, LAYER_NORMAL)[0]
         found.append(_layer(Layered, elements, more, share))
@@ -38,29 +39,6 @@ def wall_layers(wall: Wall, elements: Array, modulus_MPa: float, poisson: float)
         sliding = np.array([wall.friction_share * mu, in_MPa(wall.friction_yield_kPa)])
         found.append(_layer(Friction, elements, sliding))
     return tuple(found)
-
-
-_LAWS = {"neo-hooke": NeoHooke, "yeoh": Yeoh, "prony": Prony, "ogden-roxburgh": OgdenRoxburgh}
-
-
-def law_row(wall: Wall, mu_MPa: float, kappa_MPa: float) -> Array:
-    """Parameters (count,) of the wall's law for shear and bulk modulus at small strain in MPa.
-
-    In the order of the law's `parameter_names`; Prony's relative moduli g become beta = g/(1 - sum of g).
-    """
-    if wall.law == "neo-hooke":
-        return np.array([mu_MPa, kappa_MPa])
-    # Yeoh's law with c1 = mu/2 alone is neo-Hooke's.
-    c1 = mu_MPa / 2
-    row = [c1, wall.c2_over_c1 * c1, wall.c3_over_c1 * c1, kappa_MPa]
-    if wall.law == "prony":
-        # The law's branches are relative to the modulus after long, the shares g to that at once.
-        rest = 1 - sum(wall.prony_shares)
-        for g, tau in zip(wall.prony_shares, wall.prony_times_s, strict=True):
-            row += [g / rest, tau]
-    elif wall.law == "ogden-roxburgh":
-        row += [wall.mullins_r, in_MPa(wall.mullins_m_kPa), wall.mullins_beta]
-    return np.array(row)
 
 
 def layer_stiffness(ratio: float, shear_MPa: float, bulk_MPa: float) -> tuple[float, float]:

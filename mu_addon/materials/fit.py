@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
@@ -97,19 +96,6 @@ class Fit:
         """Relative error on the held-out coupons: root mean square of their shares; nan without any."""
         shares = [e.share for e in self.errors if not e.fitted]
         return float(np.sqrt(np.mean(np.square(shares)))) if shares else np.nan
-
-    def usable(self) -> tuple[Any, Array]:
-        """Law and row of parameters (count,), in the units that their names give, for a simulation.
-
-        Raises InputError where the law is not stable.
-        """
-        if not self.stable:
-            raise InputError(
-                f"{self.form.title} as fitted is unstable: {self.instability()}",
-                "fit-material",
-                "choose another law, or fit a narrower range",
-            )
-        return self.form.law, self.parameters
 
     def instability(self) -> str:
         """Reason why the law is unstable; "" if it is stable."""

@@ -7,8 +7,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..design.declared_laws import form_names
 from ..errors import InputError
-from ..fem.laws import MooneyRivlin, NeoHooke, Ogden, Yeoh
+from ..fem.laws import LAWS
 from .coupon import Array, isochoric_stress
 
 # Exponents of Ogden terms are looked for between these.
@@ -84,23 +85,28 @@ def with_bulk(law: Any, row: Array, poisson: float) -> Array:
     return row
 
 
-def _ogden(terms: int) -> Form:
-    names = tuple(name for p in range(1, terms + 1) for name in (f"mu{p}_MPa", f"alpha{p}"))
-    title = f"Ogden, {terms} term{'s' if terms > 1 else ''}"
-    return Form(f"ogden-{terms}", title, Ogden, names, (0.0,) * terms, terms)
+def _forms(law: Any) -> list[Form]:
+    """The forms in which a law can be fitted: of Ogden's, one for each number of terms."""
+    key = law.name.lower()
+    if not law.terms:
+        names, least = zip(*law.fitted, strict=True) if law.fitted else ((), ())
+        bounds = tuple(-np.inf if low is None else low for low in least)
+        return [Form(key, law.name, law, names, bounds)] if names else []
+    return [
+        Form(
+            f"{key}-{n}",
+            f"{law.name}, {n} term{'s' if n > 1 else ''}",
+            law,
+            law.parameter_names[: 2 * n],
+            (0.0,) * n,
+            n,
+        )
+        for n in range(1, law.terms + 1)
+    ]
 
 
-FORMS = {
-    form.name: form
-    for form in (
-        Form("neo-hooke", "neo-Hooke", NeoHooke, ("mu_MPa",), (0.0,)),
-        Form("mooney-rivlin", "Mooney-Rivlin", MooneyRivlin, ("c1_MPa", "c2_MPa"), (-np.inf, -np.inf)),
-        Form("yeoh", "Yeoh", Yeoh, ("c1_MPa", "c2_MPa", "c3_MPa"), (0.0, -np.inf, 0.0)),
-        _ogden(1),
-        _ogden(2),
-        _ogden(3),
-    )
-}
+_FOUND = {form.name: form for law in LAWS.values() for form in _forms(law)}
+FORMS = {name: _FOUND[name] for name in form_names()}
 
 
 def form(name: str) -> Form:

@@ -11,13 +11,13 @@ import attrs
 import numpy as np
 
 from ..design.assets import asset_file, asset_names
+from ..design.declared_laws import wall_laws, wall_parameters
 from ..design.parameters import HIGHEST_POISSON
 from ..design.quantity import in_kPa
 from ..design.toml_text import parse, place
-from ..design.wall_material import Wall, require_used
+from ..design.wall_material import DEFAULT, Wall, require_used
 from ..errors import InputError, did_you_mean
 from ..fem import laws
-from ..fem.materials import Layer, Materials
 from ..files import write_text
 from ..reading import file_text
 from ..toml_writer import toml_value
@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 FORMAT = 1
 CONFIDENCE = ("datasheet", "measured", "fitted", "second hand", "derived", "assumed")
 
-LAWS: dict[str, Any] = {
-    law.name: law for law in (laws.NeoHooke, laws.Yeoh, laws.MooneyRivlin, laws.Ogden, laws.Foam)
-}
+# Of a resin by its name: elastic, and no mere part of a material.
+LAWS: dict[str, Any] = {law.name: law for law in laws.LAWS.values() if law.whole and not law.history}
 # The quantities a file may give, with the unit each is in.
 QUANTITIES = {
     "density": "g/ml",
@@ -51,7 +50,8 @@ _LAW = ("name", "parameters", "low95", "high95", "confidence", "source", "ranges
 _KEYS: dict[str, Sequence[str]] = {"": ("format", "name", "about", "point"), "law": _LAW}
 _KEYS |= dict.fromkeys(QUANTITIES, _VALUE)
 # Of a unit's [wall] what no elastic law has; that law's shape is [law]'s.
-_WALL = tuple(f.name for f in attrs.fields(Wall) if f.name not in ("c2_over_c1", "c3_over_c1"))
+_SHAPES = [name for key, law in wall_laws().items() if not law.memory for name in wall_parameters(key)]
+_WALL = tuple(f.name for f in attrs.fields(Wall) if f.name not in _SHAPES)
 _KEYS["wall"] = (*_WALL, "confidence", "source")
 
 
@@ -146,25 +146,15 @@ class Material:
                     "choose another law, or restrict its range to the strains that occur",
                 )
 
-    def rows(self, count: int, factor: Any = 1.0) -> Array:
-        """Parameters (count, p) of `count` elements, with every modulus, in MPa, multiplied by `factor`.
-
-        factor: a number, or one for each element (count,). Raises InputError where the law is unstable within
-        its range.
-        """
-        self.require_stable()
-        rows = np.repeat(self.parameters[None], count, axis=0)
-        moduli = [name.endswith("_MPa") for name in self.law.parameter_names]
-        rows[:, moduli] *= np.broadcast_to(np.asarray(factor, float), count)[:, None]
-        return rows
-
     def in_unit(self, unit: Unit) -> Unit:
         """The unit with the moduli (kPa), law, memory and elongation of this material, else unchanged.
 
-        Raises InputError for another law than neo-Hooke or Yeoh, a Poisson's ratio above HIGHEST_POISSON, and
-        where the law is unstable.
+        Raises InputError for a law that is not offered for walls, or not together with the memory of [wall],
+        for a Poisson's ratio above HIGHEST_POISSON, and where the law is unstable.
         """
-        if self.law not in (laws.NeoHooke, laws.Yeoh):
+        offered, own = wall_laws(), self.law.name.lower()
+        law = own if self.wall.law == DEFAULT else self.wall.law
+        if own not in offered or own not in (DEFAULT, law, offered[law].builds_on.lower()):
             raise InputError(
                 f"a unit's wall cannot have the {self.law.name} law of {self.name}",
                 "[law]",
@@ -181,24 +171,14 @@ class Material:
                 "[law] parameters",
                 f"write kappa_MPa = {most:.4g}, or {HIGHEST_POISSON:g} in [poisson]",
             )
-        wall = self.wall
-        if self.law is laws.Yeoh:
-            c1, c2, c3, _ = self.parameters.tolist()
-            law = "yeoh" if wall.law == "neo-hooke" else wall.law
-            wall = attrs.evolve(wall, law=law, c2_over_c1=c2 / c1, c3_over_c1=c3 / c1)
+        shape = self.law.wall_of_row(self.parameters.tolist())
+        wall = attrs.evolve(self.wall, **{"law": law, **shape})
         material = attrs.evolve(
             unit.material, membrane_modulus_kPa=in_kPa(self.modulus_MPa), membrane_poisson=poisson
         )
         if "elongation" in self.values:
             material = attrs.evolve(material, elongation_at_break=self.values["elongation"].value / 100.0)
         return attrs.evolve(unit, material=material, wall=wall)
-
-    def materials(self, count: int, factor: Any = 1.0) -> Materials:
-        """`count` elements of this material for the solver, with moduli multiplied by `factor` as in `rows`.
-
-        Raises InputError where the law is unstable within its range.
-        """
-        return Materials((Layer(self.law, np.arange(count), self.rows(count, factor)),))
 
 
 def material_names() -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 
 from .. import materials, measured
+from ..design.declared_laws import form_names
 from ..design.quantity import described
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
@@ -64,9 +65,7 @@ class FitMaterial(Study):
     data: measured.Measured = given(MeasuredInput(data=_identity))
     laws: tuple[str, ...] = given(
         WordsInput(
-            descriptions=(
-                described("laws", "", "laws to fit, such as neo-hooke, yeoh or ogden-2; empty: all"),
-            ),
+            descriptions=(described("laws", "", f"laws to fit: {', '.join(form_names())}; empty: all"),),
             metavar="LAW",
         ),
         default=(),

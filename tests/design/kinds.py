@@ -1,12 +1,19 @@
-"""Kinds of lattice beside the shipped ones."""
+"""Kinds of lattice: the shipped ones, and others."""
 
 from itertools import product
 
 import numpy as np
 
-from mu_addon.design.lattice_kinds import LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant, kind, text_of
 
+BODY_CENTRED, STRAIGHT = kind("body-centred"), kind("body-centred-straight")
 CORNERS = list(product((0.0, 1.0), repeat=3))
+FACES = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
+
+
+def custom(kind):
+    """The parameters of a unit whose lattice is of this kind."""
+    return {"kind": "custom", "struts": text_of(kind)}
 
 
 def between(nodes, length):
@@ -24,10 +31,14 @@ def simple_cubic(name="simple-cubic"):
     return LatticeKind(name, CORNERS, between(CORNERS, 1.0), constant)
 
 
+def cross(name="cross"):
+    """Struts along the axes through the cell's centre."""
+    return LatticeKind(name, [(0.5, 0.5, 0.5), *FACES], [(0, k) for k in range(1, 7)], constant)
+
+
 def octet(name="octet"):
     """The octet truss: face-centred nodes, each joined to its twelve neighbours."""
-    faces = [[0.5 + 0.5 * s * (axis == k) for k in range(3)] for axis in range(3) for s in (-1, 1)]
-    nodes = [*CORNERS, *faces]
+    nodes = [*CORNERS, *FACES]
     return LatticeKind(name, nodes, between(nodes, np.sqrt(0.5)), constant)
 
 

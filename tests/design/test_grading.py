@@ -10,7 +10,7 @@ from mu_addon.design.anchors import window
 from mu_addon.design.figures import estimated_volume
 from mu_addon.design.grading import ALONG_Z, LEAST, MOST, CellFactor, Field, Grading, cells_text, parsed
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.lattice_kinds import STRAIGHT, sin_squared
+from mu_addon.design.lattice_kinds import sin_squared
 from mu_addon.design.parameters import Envelope, from_toml, load_preset, to_toml
 from mu_addon.design.printing.check import _drawing
 from mu_addon.design.printing.printer import load_printer
@@ -242,7 +242,7 @@ def test_the_print_check_names_the_thinnest_graded_strut():
 
 
 def test_the_straight_kind_is_graded_too():
-    unit = attrs.evolve(UNIT, lattice=Envelope(kind=STRAIGHT.name), grading=Grading(base=0.8))
+    unit = attrs.evolve(UNIT, lattice=Envelope(kind="body-centred-straight"), grading=Grading(base=0.8))
     radii = lattice_of(unit.dimensions).radii([0.0, 0.5, 1.0])
     assert radii.min() == pytest.approx(0.8)
     assert radii.max() == pytest.approx(1.0)

@@ -12,19 +12,13 @@ from hypothesis import strategies as st
 from mu_addon.design import lattice_kinds, solid
 from mu_addon.design.anchors import window
 from mu_addon.design.lattice import filled, lattice_of
-from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT, LatticeKind, constant, sin_squared
-from mu_addon.design.parameters import Envelope, Unit, from_toml, to_toml
+from mu_addon.design.lattice_kinds import LatticeKind, constant, sin_squared
+from mu_addon.design.parameters import Envelope, Unit, from_toml, read_unit, to_toml
 from mu_addon.design.stl_and_nodes import write_nodes
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import lattice_graph
 
-from .kinds import CORNERS, octet, simple_cubic, thirds
-
-
-@pytest.fixture
-def cubic(monkeypatch):
-    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
-    return lattice_kinds.register(simple_cubic())
+from .kinds import BODY_CENTRED, CORNERS, STRAIGHT, custom, octet, simple_cubic, thirds
 
 
 def from_centre(kind):
@@ -36,8 +30,7 @@ def from_centre(kind):
 
 
 def test_shipped_kinds_differ_in_taper_only():
-    assert lattice_kinds.names() == ("body-centred", "body-centred-straight")
-    assert lattice_kinds.kind("body-centred") is BODY_CENTRED
+    assert lattice_kinds.names() == ("body-centred", "body-centred-straight", "custom")
     assert np.array_equal(BODY_CENTRED.nodes, STRAIGHT.nodes)
     t = np.array([0.0, 0.25, 0.5, 1.0])
     assert BODY_CENTRED.radius(t, 0.75, 1.0) == pytest.approx([0.75, 0.875, 1.0, 0.75])
@@ -120,19 +113,48 @@ def test_a_bad_kind_is_named(case):
     assert caught.value.remedy
 
 
-def test_registry_refuses_a_second_kind_of_a_name(cubic):
-    lattice_kinds.register(simple_cubic())  # the same again
-    with pytest.raises(InputError, match="a lattice 'simple-cubic' already"):
-        lattice_kinds.register(octet("simple-cubic"))
-    with pytest.raises(InputError, match="no lattice 'octopus'"):
-        lattice_kinds.kind("octopus")
+def test_a_text_of_struts_is_the_kind_and_has_one_canonical_form():
+    for kind in (BODY_CENTRED, STRAIGHT, octet(), thirds()):
+        text = lattice_kinds.text_of(kind)
+        again = lattice_kinds.parsed("mine", text, "here")
+        assert lattice_kinds.text_of(again) == text
+        assert again.radius is kind.radius
+        np.testing.assert_array_equal(again.nodes[again.struts], kind.nodes[kind.struts])
+    said = "straight\n 0.5 0.50 1/2 to 0 0 0 ;\n\n1/2 2/4 1/2  to 1 1 1\n"
+    assert lattice_kinds.canonical_text(said) == "straight; 1/2 1/2 1/2 to 0 0 0; 1/2 1/2 1/2 to 1 1 1"
+    assert lattice_kinds.canonical_text(" ") == ""
 
 
-def test_another_kind_fills_a_unit(cubic, tmp_path):
-    """A registered kind goes through file, nodes, solid and graph by its name alone."""
-    unit = from_toml(to_toml(Unit(lattice=Envelope(kind="simple-cubic"))))
+@pytest.mark.parametrize(
+    ("lattice", "line", "what"),
+    [
+        ('kind = "octopus"', 3, "'octopus' is not known"),
+        ('kind = "custom"', 3, "has no struts"),
+        ('kind = "custom"\nstruts = "0 0 0 to 1 1"', 4, "is not a strut between two nodes"),
+        ('kind = "custom"\nstruts = "0 0 0 to 1/0 1 1"', 4, "is not a strut between two nodes"),
+        ('kind = "custom"\nstruts = "0 0 0 to 2 1 1"', 4, "a node outside its cell"),
+        ('struts = "0 0 0 to 1 1 1"', 3, "no effect with another kind"),
+        ('kind = "none.toml"', None, "cannot read the lattice kind"),
+        ('kind = "mine.toml"', None, "no struts"),
+        ('kind = "mine.toml"\nstruts = "0 0 0 to 1 1 1"', 4, "no effect with another kind"),
+        (f'kind = "custom"\nstruts = "{"0 0 0 to 1 1 1; " * 201}"', 4, "a cell of 201 struts"),
+    ],
+)
+def test_a_kind_that_does_not_fit_is_refused_at_its_line(lattice, line, what, tmp_path):
+    (tmp_path / "mine.toml").write_text("# nothing\n")
+    (tmp_path / "unit.toml").write_text(f"format = 1\n[lattice]\n{lattice}\n")
+    with pytest.raises(InputError) as caught:
+        read_unit(tmp_path / "unit.toml")
+    assert what in caught.value.what
+    assert (f"line {line}" if line else "e.toml") in caught.value.where
+    assert caught.value.remedy
+
+
+def test_another_kind_fills_a_unit(tmp_path):
+    """A unit's own struts go with it through file, nodes, solid and graph."""
+    unit = from_toml(to_toml(Unit(lattice=Envelope(**custom(simple_cubic())))))
     d = unit.dimensions
-    assert d.kind is cubic
+    assert d.kind == lattice_kinds.kind("custom", lattice_kinds.text_of(simple_cubic()))
     lattice = lattice_of(d)
     nx, ny, nz = 3, 4, 6
     assert len(lattice.nodes) == (nx + 1) * (ny + 1) * (nz + 1)
@@ -163,10 +185,8 @@ def test_shared_nodes_at_thirds_are_found_exactly():
     assert not lattice.inside.any()
 
 
-def test_a_one_sided_kind_is_no_units_lattice(monkeypatch):
-    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
+def test_a_one_sided_kind_is_no_units_lattice():
     slanted = LatticeKind("slanted", [(0.5, 0.5, 0.5), *CORNERS], [(0, 1), (0, 8)])
     assert slanted.mirrors == (False, False, False)
-    lattice_kinds.register(slanted)
     with pytest.raises(InputError, match="is not its own mirror image across x"):
-        Unit(lattice=Envelope(kind="slanted"))
+        Unit(lattice=Envelope(**custom(slanted)))

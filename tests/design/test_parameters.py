@@ -21,6 +21,7 @@ from mu_addon.design.parameters import (
 )
 from mu_addon.errors import InputError, OutputError
 
+from . import parameters_page
 from .units import units
 
 PRESETS = {"mu-0.75x": (0.75, 21.70), "mu-1.0x": (1.0, 18.34), "mu-1.5x": (1.5, 16.38)}
@@ -243,17 +244,5 @@ def test_modulus_must_be_positive():
 
 
 def test_the_documented_table_is_the_code():
-    rows = (
-        (Path(__file__).parents[2] / "docs" / "guide" / "parameters.md")
-        .read_text(encoding="utf-8")
-        .splitlines()
-    )
-    for section in SECTIONS:
-        for d in quantity.describe(section):
-            default = str(d.default).lower() if d.type in (bool, str) else f"{d.default:g}"
-            text = f"{d.text}{' *' if d.fixed else ''}"
-            source = "assumed" if d.assumed else "paper"
-            assert (
-                f"| `{section.section}.{d.name}` | {default} | {d.unit} | {d.allowed} | {text} | {source} |"
-                in rows
-            )
+    """Where it is not: python -m tests.design.parameters_page."""
+    assert parameters_page.PAGE.read_text(encoding="utf-8") == parameters_page.page()

@@ -12,7 +12,7 @@ from scipy.special import ellipe
 
 from mu_addon.design import shapes, surface
 from mu_addon.design.gates import GateError
-from mu_addon.design.lattice_kinds import BODY_CENTRED, STRAIGHT, LatticeKind, constant
+from mu_addon.design.lattice_kinds import LatticeKind, constant
 from mu_addon.design.parameters import Envelope, Printing, Unit, load_preset
 from mu_addon.design.strut_cell import (
     Facets,
@@ -26,7 +26,7 @@ from mu_addon.design.strut_cell import (
 )
 from mu_addon.errors import InputError
 
-from .kinds import CORNERS, octet, simple_cubic, thirds
+from .kinds import BODY_CENTRED, CORNERS, FACES, STRAIGHT, octet, simple_cubic, thirds
 
 COARSE = Facets(12, 6)
 PAPER = StrutCell(BODY_CENTRED, 12.5, 0.75, 1.0)
@@ -242,7 +242,6 @@ def kind(nodes, struts):
 
 
 CENTRE = [(0.5, 0.5, 0.5)]
-FACES = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
 MISSING = {
     "no path along z": (kind(CENTRE + FACES[:4], [(0, k) for k in range(1, 5)]), "no load path along z"),
     "rods that pass": (

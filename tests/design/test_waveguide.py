@@ -7,18 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mu_addon.design import gates, lattice_kinds, shapes
+from mu_addon.design import gates, shapes
 from mu_addon.design import solid as solids
 from mu_addon.design.anchors import anchor_points, window, windows
 from mu_addon.design.block import Block
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.lattice_kinds import LatticeKind, constant
 from mu_addon.design.parameters import Chambers, Envelope, Unit, Waveguide, load_preset
 from mu_addon.design.profile import outer_radius
 from mu_addon.design.waveguide import free_bar, strut_radii, waveguide
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import Limits, lattice_graph
 
+from .kinds import cross, custom
 from .units import units
 
 # Chains of different lengths and bends, out of the 3210 of the lattice.
@@ -263,16 +263,10 @@ def test_an_end_without_room_is_refused_and_goes_without_a_seat():
     assert len(bar.wells) == 6
 
 
-def test_a_lattice_with_upright_struts_has_no_seats_but_wells(monkeypatch):
+def test_a_lattice_with_upright_struts_has_no_seats_but_wells():
     """Struts along the path become the bar, those square to it cover wells only at the nodes."""
-    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
-    ends = [(0.5, 0.5, z) for z in (0.0, 1.0)] + [(0.5, y, 0.5) for y in (0.0, 1.0)]
-    ends += [(x, 0.5, 0.5) for x in (0.0, 1.0)]
-    lattice_kinds.register(
-        LatticeKind("upright cross", [(0.5, 0.5, 0.5), *ends], [(0, k) for k in range(1, 7)], constant)
-    )
     unit = Unit(
-        lattice=Envelope(kind="upright cross", junction_diameter_mm=1.0, midspan_diameter_mm=1.4),
+        lattice=Envelope(**custom(cross()), junction_diameter_mm=1.0, midspan_diameter_mm=1.4),
         waveguide=Waveguide(seats=False),
     )
     p = anchor_points(unit)

@@ -62,6 +62,7 @@ class Cubic(Law):
     """
 
     name = "cubic"
+    isotropic = False
     parameter_names = ("C11_MPa", "C12_MPa", "C44_MPa", "a_x", "a_y", "a_z", "b_x", "b_y", "b_z")
     energy, stress, tangent = map(staticmethod, of_green_strain(cubic_energy, cubic_stress, cubic_stiffness))
 

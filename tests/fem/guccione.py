@@ -87,6 +87,7 @@ class Guccione(Law):
     """
 
     name = "Guccione"
+    isotropic = False
     parameter_names = ("C_MPa", "b_f", "b_t", "b_fs", "kappa_MPa", "fibre_x", "fibre_y", "fibre_z")
     split_volume = True
     bulk = 4

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mu_addon.design.grading import Grading
-from mu_addon.design.lattice_kinds import LatticeKind, constant, sin_squared
+from mu_addon.design.lattice_kinds import sin_squared
 from mu_addon.design.parameters import Envelope, load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.graded_lattice import element_factors, relative_moduli
@@ -17,6 +17,7 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.printed_mesh import mesh_of, mesh_printed
+from tests.design.kinds import cross
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.printed
@@ -67,9 +68,8 @@ def test_the_kind_without_taper_has_the_mid_spans_diameter():
 def test_what_it_does_not_know_is_refused():
     with pytest.raises(InputError, match="outside"):
         relative_moduli(D, np.array([2.2]))
-    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
     for kind in (
-        LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant),
+        cross(),
         attrs.evolve(D.kind, name="other taper", radius=lambda t, a, b: sin_squared(t, a, b) ** 1.1),
     ):
         with pytest.raises(InputError, match="not known"):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mu_addon.errors import InputError
+from mu_addon.fem import laws
 from mu_addon.fem.laws import (
     CubicShear,
     DiagonalStretch,
@@ -29,23 +30,12 @@ from .guccione import Guccione
 from .points import difference, evaluate
 
 FIBRE = [1.0, 2.0, -1.0]
-ROWS = {
-    NeoHooke: NeoHooke.parameters(0.6, 0.4)[0],
-    MooneyRivlin: np.array([0.3, 0.1, 5.0]),
-    Yeoh: np.array([0.3, -0.02, 0.004, 5.0]),
-    Ogden: np.array([0.6, 1.3, 0.02, 5.0, -0.1, -2.0, 7.0]),
-    Foam: np.array([0.4, 3.0, 0.25, 12.0, 0.3, 2.0]),
+ROWS = {law: np.array(law.example) for law in laws.LAWS.values()} | {
     Guccione: Guccione.parameters(2.0, 8.0, 2.0, 4.0, 100.0, FIBRE)[0],
     Cubic: Cubic.parameters(3.0, 0.25, 0.4, FIBRE, [0, 1, 1])[0],
-    CubicShear: np.array([0.7]),
-    DiagonalStretch: np.array([0.5]),
-    Layered: Layered.parameters(0.7, 0.2, FIBRE)[0],
-    Prony: np.array([0.3, -0.02, 0.004, 5.0, 0.5, 1.0, 0.3, 10.0, 0.0, 1.0]),
-    OgdenRoxburgh: np.array([0.3, -0.02, 0.004, 5.0, 1.5, 0.05, 0.1]),
-    Friction: np.array([0.4, 0.1]),
 }
-ANISOTROPIC = [Guccione, Cubic, CubicShear, Layered]
-ISOTROPIC = [law for law in ROWS if law not in ANISOTROPIC]
+ISOTROPIC = [law for law in ROWS if law.isotropic]
+ANISOTROPIC = [law for law in ROWS if not law.isotropic]
 LAWS = pytest.mark.parametrize("law", ROWS, ids=lambda law: law.__name__)
 rotations = st.integers(0, 2**32 - 1).map(
     lambda seed: np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
@@ -82,6 +72,13 @@ def test_stress_and_tangent_are_derivatives(law):
     # Some tangents jump where sliding or softening sets in; no point of these lies within a step of that.
     assert np.abs(by_stress - A).max() < 1e-9 * np.abs(A).max()
     np.testing.assert_allclose(A, A.transpose(0, 2, 1), atol=1e-14 * np.abs(A).max())
+
+
+@LAWS
+def test_no_law_takes_what_is_no_number_or_below_zero_throughout(law):
+    for bad in (np.full(len(ROWS[law]), np.nan), -np.abs(ROWS[law])):
+        with pytest.raises(InputError, match="must be"):
+            law.valid(bad[None])
 
 
 @LAWS

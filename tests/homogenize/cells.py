@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
-
 import attrs
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from mu_addon.design.lattice_kinds import LatticeKind, constant
 from mu_addon.fem.model import Model
 from mu_addon.homogenize.specimen import repeated
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.tiling import tiled
+from tests.design import kinds
 from tests.fem import bodies
 
-CORNERS = list(itertools.product((0.0, 1.0), repeat=3))
-SIMPLE_CUBIC = LatticeKind(
-    "simple cubic",
-    CORNERS,
-    [
-        (a, b)
-        for a, b in itertools.combinations(range(8), 2)
-        if np.abs(np.subtract(CORNERS[a], CORNERS[b])).sum() == 1
-    ],
-    constant,
-)
+SIMPLE_CUBIC = kinds.simple_cubic()
 
 
 def isotropic(bulk, shear):

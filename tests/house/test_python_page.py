@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from mu_addon.design import lattice_kinds
-
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ("guide/python.md", "guide/print.md", "engineering/extend.md")
 EXAMPLES = [
@@ -32,8 +30,6 @@ NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 def printed(tmp_path, monkeypatch):
     """What a script prints, run from the repository with the package that is tested here."""
     monkeypatch.chdir(ROOT)
-    # An example adds a kind of its own.
-    monkeypatch.setattr(lattice_kinds, "KINDS", dict(lattice_kinds.KINDS))
 
     def output(code):
         script, text = tmp_path / "example.py", io.StringIO()

@@ -127,13 +127,10 @@ def test_a_law_that_passes_near_a_held_out_test_by_chance_is_not_chosen(treloar)
     assert choose(fits[:1]).chosen is fits[0]
 
 
-def test_an_unstable_law_is_flagged_and_refused(to_uniaxial):
+def test_an_unstable_law_is_flagged_and_not_chosen(to_uniaxial):
     bad = to_uniaxial["mooney-rivlin"]
     assert not bad.stable
     assert "c1_MPa + c2_MPa" in bad.instability()
-    with pytest.raises(InputError, match="Mooney-Rivlin as fitted is unstable"):
-        bad.usable()
-    assert to_uniaxial["yeoh"].usable()[0] is FORMS["yeoh"].law
     with pytest.raises(InputError, match="no fitted law is stable"):
         choose([bad])
     # A law that softens: admissible, and yet unstable from some stretch on.

@@ -71,19 +71,6 @@ def test_elastic_50a():
     assert found.stress_MPa == pytest.approx([p.stress_MPa for p in resin.points], rel=0.022)
 
 
-def test_a_material_fills_a_body_and_its_moduli_can_be_scaled():
-    material = parse_material(MINIMAL)
-    assert (material.modulus_MPa, material.poisson) == pytest.approx((1.5, 0.45))
-    modulus, poisson = material.materials(3, [1.0, 2.0, 0.5]).small_strain(3)
-    assert modulus == pytest.approx([1.5, 3.0, 0.75])
-    assert poisson == pytest.approx(0.45)
-    ogden = read_material_of(Ogden, "mu1_MPa = 0.6, alpha1 = 2.0, mu2_MPa = 0.1, alpha2 = 4.0, ")
-    rows = ogden.rows(2, [1.0, 3.0])
-    assert rows[1, ::2] == pytest.approx(3 * rows[0, ::2])
-    # Exponents are no moduli.
-    assert rows[1, 1::2].tolist() == rows[0, 1::2].tolist()
-
-
 def read_material_of(law, parameters):
     rest = {Ogden: "mu3_MPa = 0.0, alpha3 = 1.0, kappa_MPa = 100.0"}.get(law, "kappa_MPa = 100.0")
     text = MINIMAL.replace(
@@ -107,7 +94,7 @@ def test_an_unstable_law_is_named_before_it_is_used():
     law = LAWS["Mooney-Rivlin"]
     material = read_material_of(law, "c1_MPa = 0.4, c2_MPa = -0.3, ")
     with pytest.raises(InputError, match="Mooney-Rivlin law is unstable in uniaxial above a stretch of"):
-        material.rows(4)
+        material.require_stable()
     with pytest.raises(InputError, match=r"c1_MPa \+ c2_MPa = -0\.1 must be positive"):
         read_material_of(law, "c1_MPa = 0.4, c2_MPa = -0.5, ")
 

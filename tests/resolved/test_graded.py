@@ -6,7 +6,6 @@ import pytest
 
 from mu_addon.design.anchors import windows
 from mu_addon.design.grading import Grading
-from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.meshing.mesh import LATTICE, boundary_faces
@@ -16,6 +15,7 @@ from mu_addon.resolved.lattice import strut_volume_mm3, struts
 from mu_addon.resolved.octants import graded_nodes
 from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
+from tests.design.kinds import cross, custom
 
 UNIT = load_preset("mu-1.0x")
 SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
@@ -91,17 +91,10 @@ def test_a_printed_waveguide_stands_in_graded_struts():
     assert (sensed.nodes[: len(mesh.nodes)] == mesh.nodes).all(), "struts wider than the bar stay"
 
 
-@pytest.fixture(scope="module")
-def cross():
-    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
-    return LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant)
-
-
-def test_struts_of_another_kind_are_graded_about_their_axes(cross, tmp_path):
+def test_struts_of_another_kind_are_graded_about_their_axes(tmp_path):
     """As wide as drawn at each place: their volume grows by as much, and none leaves the box's faces."""
-    register(cross)
     factors = Grading(), Grading(base=0.9, tip=1.3, minus_y=0.9, plus_y=1.3, cells="1 0 1: 1.3")
-    plain, graded = (with_grading(g).evolve(kind=cross.name, seats=False) for g in factors)
+    plain, graded = (with_grading(g).evolve(**custom(cross()), seats=False) for g in factors)
     before, after = (struts(unit.printed, 1, 5, cache=tmp_path) for unit in (plain, graded))
     volumes = [(element_volumes(mesh) * mesh.filled.mean(axis=1)).sum() for mesh in (before, after)]
     wanted = strut_volume_mm3(graded) / strut_volume_mm3(plain)
@@ -113,10 +106,10 @@ def test_struts_of_another_kind_are_graded_about_their_axes(cross, tmp_path):
     assert after.nodes.max(axis=0) == pytest.approx(high, abs=0.0)
 
 
-def test_struts_that_fill_their_cell_are_refused(cross):
+def test_struts_that_fill_their_cell_are_refused():
     thick = attrs.evolve(with_grading(Grading(tip=1.9)).printed, midspan_diameter=3.0)
     with pytest.raises(InputError, match="fill their cell"):
         graded_nodes(thick, np.zeros((1, 3)))
-    wide = attrs.evolve(with_grading(Grading(tip=1.9)).printed, kind=cross, midspan_diameter=5.0)
+    wide = attrs.evolve(with_grading(Grading(tip=1.9)).printed, kind=cross(), midspan_diameter=5.0)
     with pytest.raises(InputError, match="close the openings"):
         struts(wide, 1, 5)

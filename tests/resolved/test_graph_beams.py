@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.grading import Grading
 from mu_addon.design.lattice import filled, lattice_of
-from mu_addon.design.lattice_kinds import BODY_CENTRED, LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.carried_nodes import Carried, following
@@ -32,12 +31,9 @@ from mu_addon.resolved.joints import POISSON, Zones, zones_of
 from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.resolved.strut import strut_mesh
 from mu_addon.resolved.waveguide import bar_of, with_waveguide
-from tests.design.kinds import octet
+from tests.design.kinds import BODY_CENTRED, cross, custom, octet
 
-FACES = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
-UPRIGHT = LatticeKind(
-    "cross of the faces", [(0.5, 0.5, 0.5), *FACES], [(0, k) for k in range(1, 7)], constant
-)
+UPRIGHT = cross()
 NONE = Zones(0.0, 0.0, ())
 
 
@@ -81,8 +77,7 @@ def test_an_octet_frame_of_slender_bars_has_the_moduli_of_pinned_ones():
 
 @pytest.fixture(scope="module")
 def unit():
-    register(UPRIGHT)
-    return load_preset("mu-1.0x").evolve(kind=UPRIGHT.name, count=3, seats=False)
+    return load_preset("mu-1.0x").evolve(**custom(UPRIGHT), count=3, seats=False)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
@@ -16,6 +15,7 @@ from mu_addon.resolved.frame import joint_factors
 from mu_addon.resolved.joint_stretch import joint_stretch
 from mu_addon.resolved.joints import concentration_factors
 from mu_addon.resolved.printed_mesh import mesh_printed
+from tests.design import kinds
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
 SMALL = 1e-4
@@ -78,9 +78,7 @@ def test_a_body_of_solid_struts_has_none():
 
 @pytest.fixture(scope="module")
 def cross():
-    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
-    register(LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant))
-    return UNIT.evolve(kind="cross", seats=False)
+    return UNIT.evolve(**kinds.custom(kinds.cross()), seats=False)
 
 
 def test_factors_of_another_kind_are_by_the_joints_place(cross, tmp_path):

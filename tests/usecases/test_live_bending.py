@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from mu_addon.design.lattice_kinds import LatticeKind, constant, register
 from mu_addon.design.parameters import Unit
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
@@ -16,6 +15,7 @@ from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from mu_addon.usecases.simulate_and_place.job import Job as Study
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
+from tests.design.kinds import cross, custom
 
 from .test_obstacles import WALL
 
@@ -59,9 +59,7 @@ def test_a_wall_from_the_design_before_bends_as_one_meshed_anew(tmp_path):
 
 def test_a_lattice_of_another_kind_bends_too(tmp_path):
     """Its cell is meshed once: a thicker wall moves the mesh."""
-    faces = [(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)]
-    register(LatticeKind("cross", [(0.5, 0.5, 0.5), *faces], [(0, k) for k in range(1, 7)], constant))
-    bending, unit = LiveBending(tmp_path), UNIT.evolve(kind="cross", seats=False)
+    bending, unit = LiveBending(tmp_path), UNIT.evolve(**custom(cross()), seats=False)
     first, motion = answered(bending, 1, unit, 10.0)
     assert len(motion.mesh.beams) > 0
     cells = sorted((tmp_path / requests.CELLS).iterdir())

@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.lattice_kinds import register
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
@@ -22,7 +21,7 @@ from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.run import run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
-from tests.design.kinds import octet
+from tests.design.kinds import custom, octet
 
 UNIT = load_preset("mu-1.0x")
 # Four chambers, three paths: as many stages as six and ten have.
@@ -351,9 +350,8 @@ def test_a_candidate_that_is_followed_from_rest_is_kept_at_every_pressure_on_its
 
 
 def test_a_lattice_that_holds_no_waveguide_is_refused_before_anything_is_made(tmp_path):
-    register(octet())
     mesh = MeshSettings(refine=0.5, fidelity=RESOLVED)
-    job = attrs.evolve(JOB, unit=JOB.unit.evolve(kind="octet", seats=False), mesh=mesh)
+    job = attrs.evolve(JOB, unit=JOB.unit.evolve(**custom(octet()), seats=False), mesh=mesh)
     with run_to_end(Progress([])) as context, pytest.raises(InputError, match="no node at the cell's centre"):
         run_stages(Study.open(job, tmp_path, context))
     assert not (tmp_path / "unit.stl").exists()

@@ -183,7 +183,10 @@ def names_of(root, name: str) -> list[str]:
             return [w.name for w in windows(to_unit(root.mu_unit).chambers.count)]
         except InputError:
             return []
-    return asset_names("materials") if name == RESIN else lattice_kinds.names()
+    if name == RESIN:
+        return asset_names("materials")
+    own = root.mu_unit.lattice.struts
+    return [kind for kind in lattice_kinds.names() if own or kind != lattice_kinds.CUSTOM]
 
 
 def title(name: str, d: Description) -> str:

@@ -8,6 +8,7 @@ metric units when typed; fields of lengths here use that subtype.
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import textwrap
+from zlib import crc32
 
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -35,7 +36,9 @@ def blender_property(d: Description, update=None, options=frozenset(), name="", 
         "options": {"ANIMATABLE", *options},
     }
     if d.choices or items:
-        items = items or [(name, choice_label(name), textwrap.shorten(d.text, 60)) for name in d.choices]
+        text = textwrap.shorten(d.text, 60)
+        # A file keeps the number, which is the name's: it stays when a choice is added.
+        items = items or [(name, choice_label(name), text, crc32(name.encode()) >> 1) for name in d.choices]
         return EnumProperty(items=items, default=d.default, **shared)
     if d.type is str:
         return StringProperty(default=d.default, **more, **shared)

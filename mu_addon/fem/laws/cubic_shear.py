@@ -10,7 +10,6 @@ import warp as wp
 from .green import of_green_strain, symmetric_identity
 from .law import Array, Law
 from .tensors import f64, mat33, mat99
-from .valid import require
 
 
 @wp.func
@@ -45,6 +44,9 @@ class CubicShear(Law):
 
     name = "cubic shear"
     parameter_names = ("G_MPa",)
+    from_zero = parameter_names
+    example = (0.7,)
+    whole = isotropic = False
     energy, stress, tangent = map(
         staticmethod, of_green_strain(cubic_shear_energy, cubic_shear_stress, cubic_shear_stiffness)
     )
@@ -57,10 +59,3 @@ class CubicShear(Law):
         """
         G = parameters[:, 0]
         return np.stack([0.6 * G, np.zeros_like(G)], axis=1)
-
-    @staticmethod
-    def valid(parameters: Array) -> None:
-        """Raise InputError unless G in MPa of every row (k, 1) is 0 or more and finite."""
-        G = parameters[:, 0]
-        good = np.isfinite(G) & (G >= 0)
-        require(good, CubicShear, "G_MPa", G, "0 or more and finite", "give a G_MPa from 0")

@@ -10,7 +10,6 @@ import warp as wp
 from .green import of_green_strain
 from .law import Array, Law
 from .tensors import add_dyad, f64, mat33, mat99
-from .valid import require
 
 
 @wp.func
@@ -41,6 +40,9 @@ class DiagonalStretch(Law):
 
     name = "diagonal stretch"
     parameter_names = ("C_MPa",)
+    from_zero = parameter_names
+    example = (0.5,)
+    whole = False
     energy, stress, tangent = map(
         staticmethod, of_green_strain(diagonal_energy, diagonal_stress, diagonal_stiffness)
     )
@@ -50,10 +52,3 @@ class DiagonalStretch(Law):
         """Shear and bulk modulus (k, 2) in MPa of parameters (k, 1): 0 and C."""
         C = parameters[:, 0]
         return np.stack([np.zeros_like(C), C], axis=1)
-
-    @staticmethod
-    def valid(parameters: Array) -> None:
-        """Raise InputError unless C in MPa of every row (k, 1) is 0 or more and finite."""
-        C = parameters[:, 0]
-        good = np.isfinite(C) & (C >= 0)
-        require(good, DiagonalStretch, "C_MPa", C, "0 or more and finite", "give a C_MPa from 0")

@@ -116,6 +116,7 @@ class Foam(Law):
         "lambda_MPa",
         "gamma",
     )
+    example = (0.4, 3.0, 0.25, 12.0, 0.3, 2.0)
     energy, stress, tangent = map(
         staticmethod, of_stretches(foam_energy, foam_stress, foam_slope, foam_difference)
     )

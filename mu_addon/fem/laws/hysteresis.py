@@ -11,7 +11,6 @@ from .green import green_strain, of_green_strain, symmetric_identity
 from .isochoric import split
 from .law import Array, Law
 from .tensors import THIRD, add_dyad, f64, isochoric, mat33, mat99, put_symmetric, symmetric_at
-from .valid import require_positive
 
 # A uniaxial stress s has a deviator of length sqrt(2/3) s.
 _DEVIATOR = wp.constant(f64(np.sqrt(2 / 3)))
@@ -86,6 +85,9 @@ class Friction(Law):
 
     name = "friction"
     parameter_names = ("mu_MPa", "yield_MPa")
+    positive = parameter_names
+    example = (0.4, 0.1)
+    whole = False
     history = 6
     split_volume = True
     energy, stress, tangent = map(
@@ -98,8 +100,3 @@ class Friction(Law):
     def small_strain(parameters: Array) -> Array:
         """Shear modulus before sliding, and bulk modulus 0, (k, 2) in MPa, of parameters (k, 2)."""
         return np.stack([parameters[:, 0], np.zeros(len(parameters))], axis=1)
-
-    @staticmethod
-    def valid(parameters: Array) -> None:
-        """Raise InputError unless modulus and yield stress in MPa of every row (k, 2) are > 0 and finite."""
-        require_positive(Friction, parameters, *Friction.parameter_names)

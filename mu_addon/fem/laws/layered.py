@@ -10,7 +10,7 @@ import warp as wp
 from .green import of_green_strain
 from .law import Array, Law
 from .tensors import f64, mat33, mat99, vec3
-from .valid import require, require_unit, unit
+from .valid import require_unit, unit
 
 _NORMAL = 2
 
@@ -70,6 +70,9 @@ class Layered(Law):
 
     name = "layered"
     parameter_names = ("in_plane_MPa", "across_MPa", "normal_x", "normal_y", "normal_z")
+    from_zero = parameter_names[:_NORMAL]
+    example = (0.7, 0.2, *unit([1.0, 2.0, -1.0])[0])
+    whole = isotropic = False
     energy, stress, tangent = map(
         staticmethod, of_green_strain(layered_energy, layered_stress, layered_stiffness)
     )
@@ -93,14 +96,11 @@ class Layered(Law):
         mean = (2 * parameters[:, 0] + parameters[:, 1]) / 3
         return np.stack([mean / 2, mean / 3], axis=1)
 
-    @staticmethod
-    def valid(parameters: Array) -> None:
+    @classmethod
+    def valid(cls, parameters: Array) -> None:
         """Raise InputError unless both moduli are 0 or more and finite and the normal is a unit vector.
 
         parameters: (k, 5), moduli in MPa. The normal's length may differ from 1 by 1e-9.
         """
-        for column, name in enumerate(Layered.parameter_names[:_NORMAL]):
-            values = parameters[:, column]
-            good = np.isfinite(values) & (values >= 0)
-            require(good, Layered, name, values, "0 or more and finite", f"give a {name} from 0")
-        require_unit(Layered, parameters, _NORMAL)
+        super().valid(parameters)
+        require_unit(cls, parameters, _NORMAL)

@@ -33,6 +33,8 @@ class MooneyRivlin(Law):
 
     name = "Mooney-Rivlin"
     parameter_names = ("c1_MPa", "c2_MPa", "kappa_MPa")
+    example = (0.3, 0.1, 5.0)
+    fitted = (("c1_MPa", None), ("c2_MPa", None))
     split_volume = True
     bulk = 2
     energy, stress, tangent = map(

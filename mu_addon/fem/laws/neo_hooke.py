@@ -9,7 +9,7 @@ import warp as wp
 
 from .law import Array, Law
 from .tensors import THIRD, TWO_THIRDS, f64, mat33, mat99
-from .valid import require_positive, shear_and_bulk
+from .valid import shear_and_bulk
 
 
 @wp.func
@@ -58,6 +58,11 @@ class NeoHooke(Law):
 
     name = "neo-Hooke"
     parameter_names = ("mu_MPa", "kappa_MPa")
+    positive = parameter_names
+    example = (0.6 / 2.8, 1.0)
+    wall = ""
+    wall_text = "holds to stretches of about 1.5"
+    fitted = (("mu_MPa", 0.0),)
     split_volume = True
     bulk = 1
     energy = staticmethod(neo_hooke_energy)
@@ -72,13 +77,3 @@ class NeoHooke(Law):
         -1 and 0.5.
         """
         return np.stack(shear_and_bulk(NeoHooke, modulus_MPa, poisson), axis=1)
-
-    @staticmethod
-    def small_strain(parameters: Array) -> Array:
-        """Shear and bulk modulus (k, 2) in MPa at small strain: the parameters (k, 2) themselves."""
-        return parameters
-
-    @staticmethod
-    def valid(parameters: Array) -> None:
-        """Raise InputError unless mu and kappa in MPa of every row (k, 2) are positive and finite."""
-        require_positive(NeoHooke, parameters, *NeoHooke.parameter_names)

@@ -66,6 +66,8 @@ class Ogden(Law):
 
     name = "Ogden"
     parameter_names = ("mu1_MPa", "alpha1", "mu2_MPa", "alpha2", "mu3_MPa", "alpha3", "kappa_MPa")
+    example = (0.6, 1.3, 0.02, 5.0, -0.1, -2.0, 7.0)
+    terms = 3
     split_volume = True
     bulk = 6
     energy, stress, tangent = map(

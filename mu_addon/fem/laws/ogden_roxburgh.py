@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from ...design.quantity import in_MPa
 from .isochoric import split
 from .law import Array, Law
 from .tensors import add_dyad, f64, isochoric, mat33, mat99
-from .valid import require, require_positive
+from .valid import require
 from .yeoh import Yeoh, yeoh_parts
 
 _ROOT_PI = wp.constant(f64(np.sqrt(np.pi)))
@@ -75,6 +77,19 @@ class OgdenRoxburgh(Law):
 
     name = "Ogden-Roxburgh"
     parameter_names = (*Yeoh.parameter_names, "r", "m_MPa", "beta")
+    positive, from_zero = ("m_MPa",), ("beta",)
+    example = (*Yeoh.example, 1.5, 0.05, 0.1)
+    builds_on = "Yeoh"
+    wall = """
+    mullins_r | 2 | | 1 to 1000 | Ogden-Roxburgh's r: the largest loss of stress is 1/r of it \
+        | assumed: a filled rubber loses about half
+    mullins_m_kPa | 50 | kPa | 0.01 to 100000 \
+        | Ogden-Roxburgh's m: differences of strain energy far below it soften nothing \
+        | assumed: the energy of the default wall at a stretch of 1.2
+    mullins_beta | 0.1 | | 0 to 10 | Ogden-Roxburgh's beta: widens the return to the first loading's stress \
+        | assumed: a customary value
+    """
+    wall_text = "softens below its largest strain (Mullins)"
     history = 1
     split_volume = True
     bulk = 3
@@ -83,20 +98,24 @@ class OgdenRoxburgh(Law):
     )
     advance = staticmethod(roxburgh_advance)
 
+    @classmethod
+    def row_of_wall(cls, wall: Any, mu_MPa: float, kappa_MPa: float) -> Sequence[float]:
+        """Parameters for shear and bulk modulus in MPa of the virgin material."""
+        yeoh = Yeoh.row_of_wall(wall, mu_MPa, kappa_MPa)
+        return *yeoh, wall.mullins_r, in_MPa(wall.mullins_m_kPa), wall.mullins_beta
+
     @staticmethod
     def small_strain(parameters: Array) -> Array:
         """Shear modulus 2 c1 of the virgin material and kappa, (k, 2) in MPa, of parameters (k, 7)."""
         return Yeoh.small_strain(parameters)
 
-    @staticmethod
-    def valid(parameters: Array) -> None:
+    @classmethod
+    def valid(cls, parameters: Array) -> None:
         """Raise InputError unless the Yeoh law is valid, r >= 1, m > 0 in MPa and beta >= 0.
 
         parameters: (k, 7), in the order of `parameter_names`.
         """
-        law = OgdenRoxburgh
         Yeoh.valid(parameters[:, :4])
-        require_positive(law, parameters, "m_MPa")
-        r, beta = parameters[:, 4], parameters[:, 6]
-        require(r >= 1, law, "r", r, "1 or more", "with less, the softened stress turns against the strain")
-        require(beta >= 0, law, "beta", beta, "0 or more", "give 0 for the law of two parameters")
+        super().valid(parameters)
+        r = parameters[:, 4]
+        require(r >= 1, cls, "r", r, "1 or more", "with less, the softened stress turns against the strain")

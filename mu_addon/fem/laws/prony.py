@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import warp as wp
@@ -9,7 +10,6 @@ import warp as wp
 from .isochoric import split
 from .law import Array, Law
 from .tensors import THIRD, add_left, f64, isochoric, mat33, mat99, put_symmetric, symmetric_at
-from .valid import require, require_positive
 from .yeoh import Yeoh, yeoh_parts, yeoh_slope
 
 _BRANCHES = 3
@@ -101,25 +101,52 @@ class Prony(Law):
 
     name = "Prony"
     parameter_names = (*Yeoh.parameter_names, "beta1", "tau1_s", "beta2", "tau2_s", "beta3", "tau3_s")
+    positive, from_zero = ("tau1_s", "tau2_s", "tau3_s"), ("beta1", "beta2", "beta3")
+    example = (*Yeoh.example, 0.5, 1.0, 0.3, 10.0, 0.0, 1.0)
+    builds_on = "Yeoh"
+    wall = """
+    prony_g1 | 0 | | 0 to 0.95 | share of the shear modulus at once that relaxes in branch 1 \
+        | assumed: none unless a relaxation test says otherwise
+    prony_tau1_s | 1 | s | 1e-4 to 1e7 | relaxation time of branch 1 \
+        | assumed: decades around a grasp of some seconds
+    prony_g2 | 0 | | 0 to 0.95 | share of the shear modulus at once that relaxes in branch 2 \
+        | assumed: none unless a relaxation test says otherwise
+    prony_tau2_s | 10 | s | 1e-4 to 1e7 | relaxation time of branch 2 \
+        | assumed: decades around a grasp of some seconds
+    prony_g3 | 0 | | 0 to 0.95 | share of the shear modulus at once that relaxes in branch 3 \
+        | assumed: none unless a relaxation test says otherwise
+    prony_tau3_s | 100 | s | 1e-4 to 1e7 | relaxation time of branch 3 \
+        | assumed: decades around a grasp of some seconds
+    """
+    wall_text = "relaxes with time"
+    # The long-term modulus is what the shares leave: with all of it relaxing there is none.
+    wall_total = ("prony_g1", "prony_g2", "prony_g3", 0.95)
     history = _HISTORY
     split_volume = True
     bulk = 3
     energy, stress, tangent = map(staticmethod, split(prony_energy, prony_stress, prony_tangent, bulk))
     advance = staticmethod(prony_advance)
 
+    @classmethod
+    def row_of_wall(cls, wall: Any, mu_MPa: float, kappa_MPa: float) -> Sequence[float]:
+        """Parameters for long-term shear and bulk modulus in MPa: beta = g/(1 - sum of g)."""
+        shares = [getattr(wall, f"prony_g{i}") for i in range(1, _BRANCHES + 1)]
+        rest = 1 - sum(shares)
+        row = list(Yeoh.row_of_wall(wall, mu_MPa, kappa_MPa))
+        for i, g in enumerate(shares, 1):
+            row += [g / rest, getattr(wall, f"prony_tau{i}_s")]
+        return row
+
     @staticmethod
     def small_strain(parameters: Array) -> Array:
         """Long-term shear modulus 2 c1 and kappa, (k, 2) in MPa, of parameters (k, 10)."""
         return Yeoh.small_strain(parameters)
 
-    @staticmethod
-    def valid(parameters: Array) -> None:
+    @classmethod
+    def valid(cls, parameters: Array) -> None:
         """Raise InputError unless the Yeoh law is valid, all tau > 0 in s and all beta >= 0.
 
         parameters: (k, 10), in the order of `parameter_names`.
         """
         Yeoh.valid(parameters[:, :4])
-        require_positive(Prony, parameters, "tau1_s", "tau2_s", "tau3_s")
-        for name in ("beta1", "beta2", "beta3"):
-            beta = parameters[:, Prony.parameter_names.index(name)]
-            require(beta >= 0, Prony, name, beta, "0 or more", "give 0 for a branch that is not wanted")
+        super().valid(parameters)

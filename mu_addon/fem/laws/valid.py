@@ -25,12 +25,13 @@ def require(good: Array, law: Any, name: str, values: Array, wanted: str, remedy
         )
 
 
-def require_positive(law: Any, parameters: Array, *names: str) -> None:
-    """Raise InputError unless the named columns of parameters (k, count) are finite and positive."""
+def require_positive(law: Any, parameters: Array, *names: str, or_zero: bool = False) -> None:
+    """Raise InputError unless the named columns of parameters (k, count) are finite and positive, or zero."""
+    wanted, remedy = ("0 or more", "from 0") if or_zero else ("positive", "above 0")
     for name in names:
         values = parameters[:, law.parameter_names.index(name)]
-        good = np.isfinite(values) & (values > 0)
-        require(good, law, name, values, "positive and finite", f"give a {name} above 0")
+        good = np.isfinite(values) & ((values > 0) | (or_zero & (values == 0)))
+        require(good, law, name, values, f"{wanted} and finite", f"give a {name} {remedy}")
 
 
 def shear_and_bulk(law: Any, modulus_MPa: Any, poisson: Any) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,9 +42,30 @@ class Yeoh(Law):
 
     name = "Yeoh"
     parameter_names = ("c1_MPa", "c2_MPa", "c3_MPa", "kappa_MPa")
+    example = (0.3, -0.02, 0.004, 5.0)
+    wall = """
+    c2_over_c1 | 0 | | -0.05 to 10 | second over first coefficient of Yeoh's law \
+        | assumed: none unless a coupon says otherwise
+    c3_over_c1 | 0 | | 0 to 10 | third over first coefficient of Yeoh's law \
+        | assumed: none unless a coupon says otherwise
+    """
+    wall_text = "stiffens at large strain"
+    fitted = (("c1_MPa", 0.0), ("c2_MPa", None), ("c3_MPa", 0.0))
     split_volume = True
     bulk = 3
     energy, stress, tangent = map(staticmethod, split(*yeoh_parts, bulk))
+
+    @classmethod
+    def row_of_wall(cls, wall: Any, mu_MPa: float, kappa_MPa: float) -> Sequence[float]:
+        """Parameters for shear and bulk modulus in MPa: c1 = mu/2 alone is neo-Hooke's law."""
+        c1 = mu_MPa / 2
+        return c1, wall.c2_over_c1 * c1, wall.c3_over_c1 * c1, kappa_MPa
+
+    @classmethod
+    def wall_of_row(cls, row: Sequence[float]) -> dict[str, float]:
+        """The ratios c2/c1 and c3/c1 of a row (4,)."""
+        c1, c2, c3, _ = row
+        return {"c2_over_c1": c2 / c1, "c3_over_c1": c3 / c1}
 
     @staticmethod
     def small_strain(parameters: Array) -> Array:
