@@ -1,4 +1,4 @@
-"""`export` and `specimens`: files of a unit, and of test specimens, for printers and CAD."""
+"""`export`: files of a unit for printers and CAD."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .options import add_model, add_setting, add_unit, modelled_unit, unit_if_named
+from .options import add_model, add_setting, add_unit, modelled_unit
 
 if TYPE_CHECKING:
     from ..run.context import RunContext
     from .options import Commands
 
 
-def add_export(commands: Commands[Any]) -> None:
+def add(commands: Commands[Any]) -> None:
     """Add the parser of `export`."""
     from ..usecases.export.settings import FORMATS, QUALITY, RESIN
 
@@ -63,7 +63,7 @@ def add_export(commands: Commands[Any]) -> None:
     add_setting(command, RESIN, "NAME|FILE")
 
 
-def run_export(options: argparse.Namespace, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
     from ..design.printing.sheets import compensation_offsets
     from ..usecases.export.job import Job, path_of, resin_of
@@ -83,34 +83,4 @@ def run_export(options: argparse.Namespace, context: RunContext) -> None:
         offset_source=source,
         vent_along=None if options.vent_along is None else tuple(options.vent_along),
     )
-    USE_CASE.start(job, Path(options.out), context)
-
-
-def add_specimens(commands: Commands[Any]) -> None:
-    """Add the parser of `specimens`."""
-    from ..design.settings import PRINTER
-    from ..usecases.export.settings import RESIN
-
-    command = commands.add_parser(
-        "specimens",
-        help="Write test specimens as STL: lattice cubes, coupons, a gauge for the printer and a part "
-        "for each of its limits, with data sheets for the measurements.",
-        epilog="example: run.py specimens --out out/specimens",
-    )
-    add_unit(command, required=False)
-    add_setting(command, RESIN, "NAME|FILE")
-    # The parts named limit-... show its limits.
-    add_setting(command, PRINTER, "NAME|FILE")
-
-
-def run_specimens(options: argparse.Namespace, context: RunContext) -> None:
-    """Write the specimens of a unit, mu-1.0x unless one is named."""
-    from ..design.parameters import load_preset
-    from ..design.printing.printer import load_printer
-    from ..design.settings import PRESET
-    from ..usecases.export.job import resin_of
-    from ..usecases.export.specimens import USE_CASE, Job
-
-    unit = unit_if_named(options) or load_preset(PRESET)
-    job = Job(unit, resin_of(options.resin), load_printer(options.printer))
     USE_CASE.start(job, Path(options.out), context)

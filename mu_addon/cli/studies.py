@@ -28,13 +28,18 @@ if TYPE_CHECKING:
 
 
 def _add_unit(command: argparse.ArgumentParser, one: Any) -> None:
-    add_unit(command, one.needed)
-    if one.needed:
+    add_unit(command, one.needed and not one.default)
+    if one.needed and not one.default:
         add_model(command)
 
 
-def _unit(options: argparse.Namespace, context: RunContext) -> Any:
-    return modelled_unit(options, context) if hasattr(options, "model") else unit_if_named(options)
+def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    if hasattr(options, "model"):
+        return modelled_unit(options, context)
+    from ..design.parameters import load_preset
+
+    found = unit_if_named(options)
+    return load_preset(one.default) if found is None and one.default else found
 
 
 def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
@@ -42,7 +47,7 @@ def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
     add_results(command)
 
 
-def _measured(options: argparse.Namespace, context: RunContext) -> Any:
+def _measured(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
     from ..measured import read_folder
 
     require_out(options)
@@ -97,5 +102,5 @@ def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) ->
             given = getattr(options, one.option or one.descriptions[0].name)
             values[name] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
         else:
-            values[name] = OBJECTS[one.kind][1](options, context)
+            values[name] = OBJECTS[one.kind][1](options, context, one)
     use_case(kind.name).start(kind(**values), Path(options.out), context)

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .parameters import write_unit as write_unit
     from .printing.check import PrintCheck as PrintCheck
     from .printing.check import check as check
+    from .printing.limit_parts import limit_parts as limit_parts
     from .printing.orientation import direction_name as direction_name
     from .printing.printer import MEANING as MEANING
     from .printing.printer import Printer as Printer

@@ -136,7 +136,7 @@ def _feed(digest: hashlib._Hash, value: Any) -> None:
         for key, item in value.items():
             _feed(digest, key)
             _feed(digest, item)
-    elif callable(getattr(value, "hash", None)):
+    elif callable(getattr(value, "hash", None)) and not isinstance(value, type):
         digest.update(f"{type(value).__name__} {value.hash()};".encode())
     elif attrs.has(type(value)):
         digest.update(f"{type(value).__name__};".encode())
@@ -144,6 +144,8 @@ def _feed(digest: hashlib._Hash, value: Any) -> None:
             if field.init:
                 digest.update(f"{field.name} ".encode())
                 _feed(digest, getattr(value, field.name))
+    elif isinstance(value, type):
+        digest.update(f"{value.__module__}.{value.__qualname__};".encode())
     elif isinstance(value, types.FunctionType):
         code = value.__code__
         digest.update(f"{value.__qualname__} {code.co_names} ".encode() + code.co_code)

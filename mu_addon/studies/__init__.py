@@ -7,7 +7,12 @@ from importlib import import_module
 
 from ..run.study import Study
 
-STUDIES = {"check": "Check", "fit-material": "FitMaterial", "homogenize": "Homogenize"}
+STUDIES = {
+    "check": "Check",
+    "fit-material": "FitMaterial",
+    "homogenize": "Homogenize",
+    "specimens": "Specimens",
+}
 """Class by command; its module has the command's name."""
 
 

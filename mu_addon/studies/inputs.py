@@ -20,10 +20,11 @@ UNIT = "unit.toml"
 
 @attrs.frozen
 class UnitInput(Input):
-    """A unit, in a file of its own; needed: there is always one."""
+    """A unit, in a file of its own; needed: there is always one; default: the preset where none is given."""
 
     kind: str = "unit"
     needed: bool = True
+    default: str = ""
 
     def write(self, name: str, value: design.Unit | None) -> Written:
         """The file's name, and its text."""
@@ -122,6 +123,37 @@ class ResinInput(Input):
         if isinstance(table, dict) and isinstance(table.get("modulus_kPa"), int | float):
             table["modulus_MPa"] = in_MPa(table.pop("modulus_kPa"))
         return structured(Resin, table, f"{found.path}, [{name}]")
+
+
+@attrs.frozen
+class MaterialInput(Input):
+    """A resin with all its figures, by a name of the library or a file; None stands for the usual one.
+
+    So a window that writes inputs loads no library.
+    """
+
+    kind: str = "material"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> materials.Material | None:
+        """The resin of a name or of a file; raises InputError."""
+        (name,) = values
+        if not name:
+            return None
+        return (
+            materials.read_material(Path(name)) if name.endswith(".toml") else materials.load_material(name)
+        )
+
+    def write(self, name: str, value: materials.Material | None) -> Written:
+        """Its name, and its file unless it is the usual one."""
+        if value is None:
+            return Written({name: USUAL_RESIN})
+        return Written({name: value.name}, files={f"{name}.toml": materials.material_text(value)})
+
+    def read(self, name: str, found: Found) -> materials.Material | None:
+        """The resin of the folder; raises InputError."""
+        found.keys.pop(name, None)
+        kept = found.path.parent / f"{name}.toml"
+        return materials.read_material(kept) if kept.is_file() else None
 
 
 @attrs.frozen

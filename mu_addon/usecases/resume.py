@@ -23,7 +23,6 @@ MODULES = {
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
     "export.toml": ".export.run",
-    "specimens.toml": ".export.specimens",
     "grip.toml": ".grip.run",
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",

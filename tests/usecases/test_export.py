@@ -27,12 +27,12 @@ from mu_addon.measured.folder import read_folder
 from mu_addon.meshing import lattice_region
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
+from mu_addon.studies.specimens import Specimens
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.export import run as exporting
-from mu_addon.usecases.export import specimens
 from mu_addon.usecases.export.job import Job, path_of
 from mu_addon.usecases.export.job import read_job as read_export
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
-from mu_addon.usecases.export.specimens import USE_CASE as SPECIMENS
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))
 RESIN = load_material("elastic-50a-v1")
@@ -269,7 +269,9 @@ def test_calliper_sheets_become_offsets(tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimens")
-    context, _ = run(SPECIMENS, specimens.Job(Unit(), RESIN), folder)
+    context, _ = run(
+        use_case("specimens"), Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), folder
+    )
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -363,7 +365,11 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
         (folder / entry["file"]).write_text("\n".join(",".join(r) for r in [columns, *rows]) + "\n")
     found = read_folder(folder)
     assert len(found.experiments) == len(entries) == 3 * 3 + 3 + 3 + 2
-    assert (printed[0] / "sheet.html").read_text().count("<tr") > 20
+    assert (printed[0] / "report.html").read_text().count("<tr") > 20
+    # What is filled in stays when the specimens are written again.
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    run(use_case("specimens"), Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):

@@ -24,12 +24,12 @@ from mu_addon.studies.check import Check, read_part
 from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
+from mu_addon.studies.specimens import Specimens
 from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
 from mu_addon.usecases.diagnose import design_experiments
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.export import job as export
-from mu_addon.usecases.export import specimens
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
@@ -90,7 +90,8 @@ def jobs(folder):
         UNIT, resin, window(UNIT, "alpha2"), "alpha2", ("stl", "txt"), "interactive", (0.1, 1 / 3), "calipers"
     )
     yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
-    yield specimens.Job(UNIT, resin)
+    yield Specimens(unit=UNIT, resin=resin, printer=load_printer())
+    yield Specimens(unit=UNIT, resin=None, printer=load_printer())
     yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)
     yield live_bending.Job()
     yield lattice(UNIT, "elastic-50a-v1", cells=2, friction="stick", strain=0.25, refine=2 / 3)

@@ -47,7 +47,7 @@ WRITERS = (
     "mu_addon.usecases.grip.job",
     "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",
-    "mu_addon.usecases.export.specimens",
+    "mu_addon.studies.specimens",
     "mu_addon.studies.check",
     "pyparsing",
     "PIL.Image",

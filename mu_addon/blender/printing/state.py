@@ -239,9 +239,9 @@ def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
 
 
 def _specimens(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
-    from ...usecases.export.specimens import LAYOUT, Job
+    from ...studies.specimens import Specimens
 
-    return LAYOUT, Job(unit, None, _printer(root))
+    return Specimens.layout(), Specimens(unit=unit, resin=None, printer=_printer(root))
 
 
 def solid_of(root: Any, unit: Unit, quality: str = "interactive", stl: str = "") -> Solid:
