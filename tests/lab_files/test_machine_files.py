@@ -156,8 +156,7 @@ FILES = {
         table(lambda row, i: '"=""' + row.replace(",", '""","=""') + '"""', TITLES), {}, READ, [],
     ),
     "fixed width": (
-        table(lambda row, i: "".join(f"{c:>12}" for c in row.split(",")), " Time  Load  Ext", " (s)  (N)  (mm)"),
-        {}, READ, [],
+        table(lambda row, i: row.replace(",", " " * 9), " Time  Load  Ext", " (s)  (N)  (mm)"), {}, READ, [],
     ),
     "extension and travel": (
         many(
@@ -310,6 +309,9 @@ ASKED = {
     "no section": (
         many(lambda i: f"{i},{i}", "strain [-],force [N]"), {"kind": "coupon", "mode": "uniaxial"},
         [("section_mm", "")],
+    ),
+    "a kind whose columns are asked for": (
+        many(lambda i: f"{i},{i},{i}", "Time (s),A,B"), PRESSED, [("column.A", ""), ("column.B", "")],
     ),
 }  # fmt: skip
 
