@@ -200,8 +200,10 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         raise _malformed(name, "the header of the PLY file does not end")
     header = _text(content[:end]).split("\n")
     body = content[end + len(b"end_header") :].lstrip(b" ")
+    form = next((line[7:].split(" ")[0] for line in header if line.startswith("format ")), "")
+    text = "\n" * (len(header) - 1) + _text(body[:_SHOWN]) if form == "ascii" else ""
     try:
-        order = next(_ORDERS[line.split()[1]] for line in header if line.startswith("format "))
+        order = _ORDERS[form]
         elements = _ply_elements(header, order or "<f8")
         if order:
             body = body[2 if body.startswith(b"\r\n") else 1 :]
@@ -212,6 +214,8 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
             found[element], at = _ply_rows(body, at, count, properties)
         vertex, face = found["vertex"], found["face"]
         corners = face.get("vertex_indices", face.get("vertex_index"))
+        if corners is not None and any(np.ndim(corner) != 1 for corner in corners[:1]):
+            raise ValueError("the corners of a face are no list")
         if not len(vertex["x"]) or corners is None:
             raise ValueError("it has no points" if corners is not None else "its faces have no corners")
         points = np.column_stack([np.asarray(vertex[axis], float) for axis in "xyz"])
@@ -221,10 +225,10 @@ def _ply(content: bytes, name: str) -> tuple[Vertices, Triangles]:
         if len(faces) and not 0 <= faces.min() <= faces.max() < len(points):
             raise ValueError("a face names a point that the file does not have")
         return points, _triangles(points, [[int(c) for c in face] for face in corners if len(face) > 2])
-    except (KeyError, StopIteration) as error:
+    except KeyError as error:
         raise _malformed(name, f"its header names no {error}") from error
     except (ValueError, IndexError, OverflowError) as error:
-        _require_points(_text(body[:_SHOWN]) if not order else "", name)
+        _require_points(text, name)
         raise _malformed(name, str(error) or "the PLY file is damaged") from error
 
 

@@ -226,7 +226,7 @@ def _with_keys(draft: Draft) -> Draft:
         draft = draft.asked("mode", "how was the coupon loaded?", MODES, "uniaxial")
     if draft.kind == "blocked_force" and "gap_mm" not in keys:
         draft = draft.asked("gap_mm", "how far in mm was the load cell from the tip at rest?", (), "0")
-    if "pressure" in kind.keys and keys["pressure"] is None:
+    if "pressure" in kind.keys and keys["pressure"] is None and "pressure_kPa" in draft.columns:
         draft, keys["pressure"] = _reference(draft)
     if "cells" in draft.answers and "cells" in kind.keys:
         cells = draft.numbers("cells", (1, 3), whole=True)

@@ -112,6 +112,7 @@ def test_columns_for_each_marker(tmp_path, text, names, time_s):
         ),
         (",,A,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n1,0,9,2,3\n2,0,8,2,3\n", "in mm", "line 2", "plane"),
         ("t,A x,A y\n0,0.1,0.2\n1,0.1,0.25\n", "within 0.05: they are not in pixels", "a.csv", "pixels"),
+        ("#Kinovea Trajectory\n0 1 2\n1 1 2 3 4\n", "not `T X Y`", "line 3", "each path"),
         ("frame,A x,A y\n0,1,2\n1,1,lost\n", "not a number", "row 3", "correct"),
         ("frame,A x,A y\n0,1,2\n0,1,2\n", "does not increase", "row 3", "one animal or track"),
         ("frame,id,x,y\n0,1,1,2\n0,1,1,2\n", "two rows for one frame", "row 3", "keep the row"),

@@ -52,6 +52,7 @@ _FRAMES = ("frame", "frame idx", "frame id", "frame number", "frame nr", "frames
 NO_MARKERS = "the file contains no tracked markers"
 # What Kinovea's text of paths begins with.
 _KINOVEA = "#Kinovea Trajectory"
+_MOMENT = re.compile(r"(?:(\d+):(\d\d):)?(\d+(?:\.\d+)?)(?::(\d\d))?")
 _LAYOUTS = (
     "name the columns `NAME right_px` and `NAME down_px`, a row a frame; or export, in pixels, NAME x and "
     "NAME y for each marker, frame, id, x and y in each row, or DeepLabCut's CSV"
@@ -90,7 +91,7 @@ def read_pixels(path: Path) -> Tracks:
     """
     try:
         text = own_text(path)
-        lines = _lines_of_kinovea(text) if text.startswith(_KINOVEA) else own_lines(text)
+        lines = _lines_of_kinovea(text, str(path)) if text.startswith(_KINOVEA) else own_lines(text)
         require_rows(len(lines) - 1, str(path))
         layout = _layout(lines, str(path))
         heading, *body = own_rows(lines[layout.heading :])
@@ -108,7 +109,7 @@ def read_pixels(path: Path) -> Tracks:
     return table.of_rows() if layout.id is not None else table.of_columns()
 
 
-def _lines_of_kinovea(text: str) -> list[Line]:
+def _lines_of_kinovea(text: str, where: str) -> list[Line]:
     """Lines of a table with a row a moment, of Kinovea's text with lines `T X Y` below each other's paths."""
     paths: dict[str, dict[float, str]] = {}
     begun: dict[float, int] = {}
@@ -117,18 +118,20 @@ def _lines_of_kinovea(text: str) -> list[Line]:
         words = line.replace(",", ".").split()
         if line.startswith("#") or not words:
             name, apart = line.strip("# \t") if words else name, True
-        elif len(words) == 3 and all(map(is_like_number, words[1:])):
-            if apart and (name in paths or name in ("", "T X Y")):
-                name = f"path {len(paths) + 1}"
-            apart = False
-            *above, seconds = words[0].split(":")[:3]
-            time = sum(60.0 ** (len(above) - k) * float(part) for k, part in enumerate(above)) + float(
-                seconds
+            continue
+        moment = _MOMENT.fullmatch(words[0])
+        if moment is None or len(words) != 3 or not all(map(is_like_number, words[1:])):
+            raise InputError(
+                "the line is not `T X Y`", f"{where}, line {number}", "export each path on its own"
             )
-            # Its clock is h:mm:ss:hh, with hundredths of a second.
-            time += 0.01 * float((words[0].split(":")[3:] or ["0"])[0])
-            paths.setdefault(name, {})[time] = ",".join(words[1:])
-            begun.setdefault(time, number)
+        if apart and (name in paths or name in ("", "T X Y")):
+            name = f"path {len(paths) + 1}"
+        apart = False
+        # A clock is h:mm:ss:hh, with hundredths of a second.
+        hours, minutes, seconds, hundredths = (float(part or 0) for part in moment.groups())
+        time = 3600.0 * hours + 60.0 * minutes + seconds + 0.01 * hundredths
+        paths.setdefault(name, {})[time] = ",".join(words[1:])
+        begun.setdefault(time, number)
     times = sorted(begun)
     whole = ":" not in text and all(time == int(time) for time in times)
     title = "Time (s)" if not whole else "Time (ms)" if np.diff(times[:2]).min(initial=2) > 1 else "Frame"
