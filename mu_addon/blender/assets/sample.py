@@ -63,7 +63,7 @@ def _unit(context: Any, preset: str = "mu-0.75x") -> Any:
     return unit_object.active_root(context)
 
 
-def _ranking(context: Any) -> list[Any]:
+def _paths(context: Any) -> list[Any]:
     """A unit cut open with its candidate paths, ready for *Place the Sensor*."""
     root = _unit(context)
     root.mu_unit.cut = root.mu_unit.candidates = True
@@ -115,7 +115,7 @@ def _tree(context: Any) -> list[Any]:
 
 SCENES: dict[str, tuple[str, Callable[[Any], list[Any]]]] = {
     "overview": ("Units whole, cut open with paths, and in a user-defined body", _overview),
-    "ranking": ("A unit with its candidate paths, ready for Place the Sensor", _ranking),
+    "paths": ("A unit with its candidate paths, ready for Place the Sensor", _paths),
     "obstacle": ("A unit next to a box that it bends against, ready for Motion Only", _obstacle),
     "gripper": ("A gripper over a cube, ready for Grasp", _gripper),
     "measured": ("A unit with measured data, ready for Diagnose", _measured),

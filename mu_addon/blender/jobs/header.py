@@ -7,6 +7,7 @@ header.
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
 from ...errors import InputError
@@ -14,6 +15,7 @@ from ...run.child import CANCELLED, DONE, WAITING
 from ...run.progress import spell
 from ..shared import viewports
 from ..shared.operators import reports_errors
+from ..shared.registration import add_handlers, remove_handlers
 from . import start_child
 from .panel import shortened, whole
 
@@ -151,6 +153,12 @@ def _notice(layout, key: str) -> None:
     words.label(text=shortened(_words(key), NOTICE_LETTERS), icon=icon)
 
 
+@persistent
+def _loaded(*_):
+    # They were of another file.
+    start_child.hush()
+
+
 CLASSES = (MU_OT_job_cancel, MU_OT_job_dismiss, MU_MT_jobs)
 
 _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLASSES)
@@ -159,6 +167,7 @@ _register_classes, _unregister_classes = bpy.utils.register_classes_factory(CLAS
 def register() -> None:
     """Register operators, the menu, and the bar."""
     _register_classes()
+    add_handlers({"load_post": _loaded})
     viewports.extend_status_bar(draw)
     bpy.types.VIEW3D_HT_header.append(draw_in_view)
 
@@ -167,4 +176,5 @@ def unregister() -> None:
     """Unregister them."""
     bpy.types.VIEW3D_HT_header.remove(draw_in_view)
     viewports.reduce_status_bar(draw)
+    remove_handlers({"load_post": _loaded})
     _unregister_classes()

@@ -183,6 +183,12 @@ def ended() -> list[str]:
     return [key for key, child in _children.items() if key in _titles and key not in running()]
 
 
+def hush() -> None:
+    """Drop the notices of ended jobs; their panels still tell."""
+    for key in ended():
+        del _titles[key]
+
+
 def last(record: lasting_jobs.Record) -> None:
     """Let a job outlive Blender, unless the user decides otherwise."""
     _lasting.add(record.key)

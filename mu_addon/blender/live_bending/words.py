@@ -59,15 +59,14 @@ def _draw() -> None:
     live = None if root is None else state.of(root)
     if root is None or live is None or root.mu_unit.show != "preview":
         return
-    scale = bpy.context.preferences.system.ui_scale
-    left = legend.beside_tools(bpy.context.area) + legend.LEFT * scale
-    legend.write(words(root), left, legend.BOTTOM * scale / 2.0, round(14 * scale))
+    place = legend.room(bpy.context, 1)
+    legend.write(words(root), place.left, place.foot - 25 * place.scale, round(14 * place.scale))
     ends = None if live.current is None else live.current.ends(root.mu_live.colour)
     if ends is not None and state.is_seen(root):
         # Beside the legend of motions that stand apart.
-        left += 0.0 if legend.subject(bpy.context) is None else BESIDE * scale
-        legend.field_ramp(root, ends, scale, left)
-        legend.above([field_colours.BY_NAME[root.mu_live.colour].title], scale, left)
+        place = place if legend.subject(bpy.context) is None else place.beside(BESIDE)
+        legend.field_ramp(root, ends, place)
+        legend.above([field_colours.BY_NAME[root.mu_live.colour].title], place)
 
 
 _overlay = Overlay(_draw)

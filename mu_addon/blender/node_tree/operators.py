@@ -49,6 +49,13 @@ def show(context, tree) -> None:
         space.node_tree = tree
 
 
+def _open(context, tree) -> None:
+    """Show a new tree in the node editor, and its units in the scene."""
+    state.refresh(tree)
+    state.show_units(context, tree)
+    show(context, tree)
+
+
 class _TreeOperator(TreeOperator):
     find_root = staticmethod(root_tree)
 
@@ -67,6 +74,9 @@ class MU_OT_tree_evaluate(_TreeOperator, bpy.types.Operator):
         return "This tree is being evaluated" if state.RUN.is_running(tree) else start_child.lacking()
 
     def act(self, context, tree):
+        state.refresh(tree)
+        if state.show_units(context, tree):
+            bpy.ops.ed.undo_push(message="Units of the Tree")
         state.start(tree, (self.node,) if self.node else ())
 
 
@@ -85,9 +95,7 @@ class MU_OT_tree_new(bpy.types.Operator):
 
     @reports_errors
     def execute(self, context):
-        tree = conversion.from_tree(template(self.template))
-        state.refresh(tree)
-        show(context, tree)
+        _open(context, conversion.from_tree(template(self.template)))
         return {"FINISHED"}
 
 
@@ -119,9 +127,7 @@ class MU_OT_tree_load(bpy.types.Operator):
     @reports_errors
     def execute(self, context):
         path = Path(bpy.path.abspath(self.filepath))
-        tree = conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent))
-        state.refresh(tree)
-        show(context, tree)
+        _open(context, conversion.from_tree(with_absolute_paths(read_tree(path), definitions(), path.parent)))
         return {"FINISHED"}
 
 

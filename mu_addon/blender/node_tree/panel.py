@@ -40,10 +40,11 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
         if tree is None:
             layout.operator_menu_enum("mu.tree_new", "template", icon="NODETREE")
             layout.operator("mu.tree_load", icon="FILE_FOLDER")
+            _of_unit(layout)
             return
         child = state.RUN.child(tree)
         start_button(layout, child, "mu.tree_evaluate", "PLAY")
-        job_state(layout, child, "see the nodes", "tree_")
+        job_state(layout, child, "see the nodes, and the scene for their units", "tree_")
         row = layout.row(align=True)
         for what in ("report", "folder"):
             row.operator("mu.tree_open", text=what.capitalize()).what = what
@@ -56,7 +57,14 @@ class MU_PT_tree(_Panel, bpy.types.Panel):
         row.operator("mu.tree_save", text="Save", icon="EXPORT")
         row.operator("mu.tree_load", text="Open", icon="IMPORT")
         layout.operator_menu_enum("mu.tree_new", "template", icon="NODETREE")
-        layout.operator("mu.tree_of_unit", icon="OUTLINER_OB_LATTICE")
+        _of_unit(layout)
+
+
+def _of_unit(layout) -> None:
+    """Draw the ways from the active unit to a tree: a node with its fields, or the steps that it follows."""
+    row = layout.row(align=True)
+    row.operator("mu.tree_of_unit", text="Active Unit", icon="OUTLINER_OB_LATTICE").steps = False
+    row.operator("mu.tree_of_unit", text="Its Steps", icon="NODETREE").steps = True
 
 
 class MU_PT_node(_Panel, bpy.types.Panel):

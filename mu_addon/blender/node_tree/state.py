@@ -28,6 +28,7 @@ from ...usecases.graph.job import LAYOUT, Job, file_name
 from ...usecases.graph.plan import plan_of
 from ...usecases.graph.templates import steps_of
 from ..jobs.start_child import INTERVAL_S, JOB_ENDED, JobKind
+from ..shared import landing, viewports
 from ..shared.file_cache import FileCache
 from ..shared.registration import add_handlers, remove_handlers
 from ..simulate.study_folder import default_folder, relative
@@ -46,6 +47,8 @@ _pending: set[int] = set()
 _refreshed: dict[int, float] = {}
 _written: dict[int, int] = {}
 _states: dict[int, dict[str, State]] = {}
+_designs: dict[int, dict[str, Any]] = {}
+"""By tree: the units of its nodes, by name, as of the latest refresh."""
 
 
 def trees() -> Iterator[Any]:
@@ -99,6 +102,8 @@ def refresh(tree: Any) -> dict[str, State]:
     conversion.mark_links(tree, {key: frozenset(sources) for key, sources in refused.items()})
     classes.set_states(tree, {**found, **_of_groups(tree, found)})
     _states[tree.session_uid] = found
+    outputs = {name: values.get("unit") for name, values in evaluation.outputs.items()}
+    _designs[tree.session_uid] = {name: unit for name, unit in outputs.items() if unit is not None}
     _follow(tree, evaluation)
     _keep_reachable(tree)
     return found
@@ -131,6 +136,30 @@ def _follow(tree: Any, evaluation: Evaluation) -> None:
         except MuError:
             same = False
         following.agree(root) if same else following.take(root, design)
+
+
+def show_units(context: Any, tree: Any) -> list[Any]:
+    """Put the units of a tree that nothing shows into the scene, to follow their nodes; return the objects.
+
+    A unit that another node changes is shown as that node leaves it.
+    """
+    designs, made = _designs.get(tree.session_uid, {}), []
+    for node in list(tree.nodes):
+        design = designs.get(node.name)
+        if design is None or not hasattr(node, "follower") or node.follower is not None:
+            continue
+        after = (link.to_node for out in node.outputs for link in out.links)
+        if any(hasattr(other, "follower") and other.name in designs for other in after):
+            continue
+        root = unit_object.create(context, design.unit)
+        root.mu_unit.path = design.path
+        landing.land(context, root)
+        following.agree(root)
+        node.follower = root
+        made.append(root)
+    if made:
+        viewports.frame(made)
+    return made
 
 
 def _keep_reachable(tree: Any) -> None:

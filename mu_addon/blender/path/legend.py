@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import attrs
 import blf
 import bpy
 import numpy as np
@@ -67,7 +68,7 @@ def _draw() -> None:
             width = blf.dimensions(0, text)[0]
             legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
     if known.j and root.mu_motion.legend:
-        _legend(context, root, known, scale)
+        _legend(context, root, known)
 
 
 def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
@@ -83,17 +84,17 @@ def _subject(context: Any) -> tuple[Any, list[tuple[str, Any]]]:
     return active, []
 
 
-def _legend(context: Any, root: Any, known: ranking.Known, scale: float) -> None:
-    left = legend.beside_tools(context.area) + legend.LEFT * scale
+def _legend(context: Any, root: Any, known: ranking.Known) -> None:
+    texts = lines(known)
+    place = legend.room(context, len(texts))
     if any(motion_parts.is_seen(root, part) for part in motion_parts.parts(root)):
-        left += BESIDE * scale
-    if not known.stale:
-        colours = np.array([field_colours.of_map(s) for s in np.linspace(0.0, 1.0, legend.PIECES + 1)])
-        legend.ramp(colours, marks(known), scale, left)
-    size = round(12 * scale)
-    bottom = (legend.BOTTOM + (0 if known.stale else legend.HEIGHT + 14)) * scale
-    for line, text in enumerate(reversed(lines(known))):
-        legend.write(text, left, bottom + 1.5 * size * line, size)
+        place = place.beside(BESIDE)
+    if known.stale:
+        legend.above(texts, attrs.evolve(place, height=0.0))
+        return
+    colours = np.array([field_colours.of_map(s) for s in np.linspace(0.0, 1.0, legend.PIECES + 1)])
+    legend.ramp(colours, marks(known), place)
+    legend.above(texts, place)
 
 
 def seen(root: Any) -> list[tuple[str, Any]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import attrs
 import blf
 import bpy
 import gpu
@@ -27,7 +28,11 @@ from . import motion as motion_parts
 
 PIECES = 48
 """Number of flat pieces of the drawn ramp."""
-WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 60
+WIDTH, HEIGHT, LEFT, BOTTOM = 18, 190, 24, 30
+LEAST = 40
+"""Least height of a ramp that is drawn, as the sizes above in pixels at a scale of 1."""
+LINE = 18
+"""Height of a line of text."""
 NO_COLOURS = ("This view's shading shows no colours:", "press Show Colours in its header")
 TEXT = (0.92, 0.92, 0.92, 1.0)
 
@@ -38,6 +43,40 @@ def ticks(low: float, high: float) -> list[float]:
     step *= next(f for f in (5, 2, 1) if (high - low) / (f * step) >= 3 or f == 1)
     first = np.ceil(low / step - 1e-9)
     return [float(step * n) + 0.0 for n in np.arange(first, np.floor(high / step + 1e-9) + 1)]
+
+
+@attrs.frozen
+class Room:
+    """Where a legend is drawn, in pixels: left end, foot of its ramp, and height of the ramp, 0 for none."""
+
+    left: float
+    foot: float
+    height: float
+    scale: float
+
+    def beside(self, width: float) -> Room:
+        """The room to the right of a legend of that width at a scale of 1."""
+        return attrs.evolve(self, left=self.left + width * self.scale)
+
+
+def room(context: Any, count: int) -> Room:
+    """Room for a legend with so many lines of text, clear of what Blender draws over a viewport.
+
+    That are the toolbar, the redo panel and the asset shelf below, and the headers and texts above.
+    """
+    scale, area, region = context.preferences.system.ui_scale, context.area, context.region
+    below = [
+        other.y + other.height - region.y
+        for other in area.regions
+        if other.type in ("HUD", "ASSET_SHELF", "ASSET_SHELF_HEADER") and other.height > 1
+    ]
+    # Above the foot's line of words, see `live_bending.words`.
+    foot = max([BOTTOM * scale, *(top + 10 * scale for top in below)]) + 30 * scale
+    overlay = area.spaces.active.overlay
+    texts = 2 * overlay.show_text + 7 * overlay.show_stats if overlay.show_overlays else 0
+    top = below_headers(area, region) - (texts + 1) * LINE * scale
+    height = min(HEIGHT * scale, top - foot - (14 + LINE * count) * scale)
+    return Room(beside_tools(area) + LEFT * scale, foot, height if height >= LEAST * scale else 0.0, scale)
 
 
 def lines(root: Any, motion: Any, scene: Any) -> list[str]:
@@ -78,18 +117,19 @@ def _draw() -> None:
     size = round(12 * scale)
     in_scene = any(child.get(LEGEND) and child.visible_get() for child in root.children)
     if not in_scene:
-        left = beside_tools(context.area) + LEFT * scale
+        texts = lines(root, motion, context.scene)
+        place = room(context, len(texts))
         if any(root.mu_motion.field in part.data.attributes for part in shown):
-            field_ramp(root, (root.mu_motion.low, root.mu_motion.high), scale, left)
-        above(lines(root, motion, context.scene), scale, left)
+            field_ramp(root, (root.mu_motion.low, root.mu_motion.high), place)
+        above(texts, place)
     _names(context, root, motion, size)
 
 
-def above(texts: Sequence[str], scale: float, left: float, bottom: float = BOTTOM + HEIGHT + 14) -> None:
-    """Write lines above the ramp, or above another height."""
-    size = round(12 * scale)
+def above(texts: Sequence[str], place: Room) -> None:
+    """Write lines above the ramp."""
+    foot = place.foot + place.height + (14 * place.scale if place.height else 0.0)
     for line, text in enumerate(reversed(texts)):
-        write(text, left, bottom * scale + 1.5 * size * line, size)
+        write(text, place.left, foot + LINE * place.scale * line, round(12 * place.scale))
 
 
 def subject(context: Any) -> Any | None:
@@ -105,29 +145,43 @@ def beside_tools(area: Any) -> float:
     return 0.0 if tools is None or tools.width <= 1 else float(tools.width)
 
 
-def field_ramp(root: Any, ends: tuple[float, float], scale: float, left: float) -> None:
-    """Draw a unit's ramp with the values of a range, `left` pixels from the view's left."""
+def before_sidebar(context: Any) -> float:
+    """Width in pixels of the viewport to the left of the sidebar over it."""
+    sidebar = next((region for region in context.area.regions if region.type == "UI"), None)
+    over = context.preferences.system.use_region_overlap and sidebar is not None and sidebar.width > 1
+    return float(context.region.width - (sidebar.width if over else 0))
+
+
+def field_ramp(root: Any, ends: tuple[float, float], place: Room) -> None:
+    """Draw a unit's ramp with the values of a range, or that this view shows no colours."""
     low, high = ends
     if not viewports.shows_colours(bpy.context):
-        above(NO_COLOURS, scale, left, BOTTOM + HEIGHT - 30)
+        above(NO_COLOURS, attrs.evolve(place, height=max(place.height - 4 * LINE * place.scale, 0.0)))
     elif high > low:
         marks = [((value - low) / (high - low), f"{value:.4g}") for value in ticks(low, high)]
-        ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1), ends), marks, scale, left)
+        ramp(field_colours.colours(root, np.linspace(low, high, PIECES + 1), ends), marks, place)
 
 
-def ramp(colours: Any, marks: list[tuple[float, str]], scale: float, left: float) -> None:
+def ramp(colours: Any, marks: list[tuple[float, str]], place: Room) -> None:
     """Draw colours (PIECES + 1, 4), linear, from below to above; marks: share of the height, and text."""
-    x0, x1 = left, left + WIDTH * scale
-    heights = (BOTTOM + HEIGHT * np.linspace(0.0, 1.0, PIECES + 1)) * scale
+    if not place.height:
+        return
+    x0, x1 = place.left, place.left + WIDTH * place.scale
+    heights = place.foot + place.height * np.linspace(0.0, 1.0, PIECES + 1)
     corners = [(x, y) for y in heights for x in (x0, x1)]
     corner = np.array([[0, 1, 3], [0, 3, 2]], np.int32)
     triangles = np.concatenate([corner + 2 * piece for piece in range(PIECES)])
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     data = {"pos": corners, "color": display(np.repeat(colours, 2, axis=0)).tolist()}
     batch_for_shader(shader, "TRIS", data, indices=triangles).draw(shader)
-    size = round(11 * scale)
-    for share, text in marks:
-        write(text, x1 + 6 * scale, (BOTTOM + HEIGHT * share) * scale - 0.35 * size, size)
+    size = round(11 * place.scale)
+    last = -size
+    for share, text in sorted(marks):
+        y = place.foot + place.height * share - 0.35 * size
+        # In a low view only those that do not cover each other.
+        if y - last >= size:
+            write(text, x1 + 6 * place.scale, y, size)
+            last = y
 
 
 def display(linear: Any) -> Any:

@@ -4,6 +4,7 @@
 
 from typing import Any, ClassVar
 
+import blf
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import (
@@ -147,9 +148,11 @@ def _mark(context: Any, root: Any, size: int) -> None:
     side = SIDE * context.preferences.system.ui_scale
     legend.cross(at.x, at.y, side, MARK)
     field = field_colours.BY_NAME[root.mu_motion.field]
-    legend.write(
-        f"largest {place.value:.4g} {field.unit}".rstrip(), at.x + 2 * side, at.y - 0.35 * size, size
-    )
+    text = f"largest {place.value:.4g} {field.unit}".rstrip()
+    # To the left of a mark that is beside the sidebar.
+    x, width = at.x + 2 * side, blf.dimensions(0, text)[0]
+    x = x if x + width < legend.before_sidebar(context) else at.x - 2 * side - width
+    legend.write(text, x, at.y - 0.35 * size, size)
 
 
 _overlay = Overlay(_draw)

@@ -17,6 +17,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...usecases.sensor.traces import steady_range, unbroken
+from ..results import legend
 from ..results.legend import TEXT, ticks, write
 from ..shared.viewports import Overlay
 from ..unit import object as unit_object
@@ -37,7 +38,7 @@ ANGLE = (1.0, 1.0, 1.0, 1.0)
 BAND = (1.0, 1.0, 1.0, 0.22)
 PAPER, GRID = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.16)
 WARNING = (1.0, 0.35, 0.3, 1.0)
-HEIGHT, GAP, LEFT, RIGHT, BOTTOM, WIDEST = 92, 26, 110, 20, 24, 900
+HEIGHT, GAP, LEFT, RIGHT, WIDEST = 92, 26, 110, 20, 900
 GAP_S = 0.5
 """Pause in s, or five samples', across which no curve is drawn."""
 
@@ -65,18 +66,15 @@ def shown(settings: Any, session: Session) -> list[tuple[int, str]]:
     return [(k, name) for k, name in enumerate(session.channels) if name not in hidden]
 
 
-def room(context: Any, scale: float) -> tuple[float, float]:
-    """Left and right end of the plot in pixels: beside toolbar, legend and sidebar."""
-    width = context.region.width
-    for region in context.area.regions:
-        if region.type == "UI" and context.preferences.system.use_region_overlap:
-            width -= region.width if region.width > 1 else 0
-    left = LEFT * scale
-    return left + 40 * scale, min(width - RIGHT * scale, left + WIDEST * scale)
+def room(context: Any, scale: float) -> tuple[float, float, float]:
+    """Left and right end and foot of the plot in pixels: beside toolbar, legend and sidebar."""
+    width, left = legend.before_sidebar(context), LEFT * scale
+    right = min(width - RIGHT * scale, left + WIDEST * scale)
+    return left + 40 * scale, right, legend.room(context, 0).foot
 
 
 def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: float) -> None:
-    left, right = room(context, scale)
+    left, right, bottom = room(context, scale)
     if right - left < 100 * scale:
         return
     age, low, high = traces.extremes()
@@ -91,7 +89,6 @@ def _plot(context: Any, settings: Any, session: Session, traces: Any, scale: flo
         axes.append(("channels", [(k, name, COLOURS[k % len(COLOURS)]) for k, name in channels], None))
     if np.isfinite(low[n:]).any():
         axes.append(("angle", [(n, "angle in °, with its 95 % band:", ANGLE)], (n + 1, n + 2)))
-    bottom = BOTTOM * scale
     for title, curves, band in axes:
         top = bottom + HEIGHT * scale
         places = [k for k, _, _ in curves] + list(band or ())

@@ -13,6 +13,7 @@ from mu_addon.blender.jobs.panel import rounded
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
 from mu_addon.blender.simulate.panel import start_words
+from mu_addon.blender.unit import object as unit_object
 from mu_addon.run.child import Child
 
 from .acting import add, refused
@@ -79,6 +80,18 @@ def test_one_runs_the_others_wait_and_each_ends_with_a_notice(monkeypatch):
     assert said() == ""
     assert SIMULATION.child(second) is None, "and its panel says no more of it"
     assert "is not running" in refused(bpy.ops.mu.job_cancel)
+
+
+def test_a_notice_goes_when_another_file_opens(monkeypatch, tmp_path):
+    root = add()
+    child = started(root, "good", monkeypatch)
+    ended(child)
+    assert "Done in" in said()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    assert said() == ""
+    (root,) = unit_object.roots()
+    assert SIMULATION.child(root) is child, "the panel of its unit still tells"
 
 
 @pytest.mark.own_process

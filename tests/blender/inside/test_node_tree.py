@@ -17,6 +17,7 @@ from mu_addon.blender.node_tree import (
     state,
 )
 from mu_addon.blender.sidebar import unit_panel
+from mu_addon.blender.unit import object as unit_object
 from mu_addon.design.steps import STEPS
 from mu_addon.graph import read_tree
 from mu_addon.run.child import DONE
@@ -79,6 +80,32 @@ def test_a_template_becomes_a_tree_that_becomes_the_same_file(shipped):
         nodes[key] = attrs.evolve(node, settings=kept)
     assert conversion.to_tree(tree) == attrs.evolve(core, nodes=nodes)
     assert "failed" not in states(tree).values()
+
+
+def test_a_trees_units_are_in_the_scene_follow_it_and_are_those_of_the_sidebar():
+    bpy.ops.ed.undo_push(message="before")
+    tree = new("unit")
+    (root,) = unit_object.roots()
+    assert following.followed(root) == tree.nodes["Assemble Unit"]
+    assert root.mu_unit.path == "alpha4"
+    assert unit_object.active_root(bpy.context) == root
+    tree.nodes["Chambers"].wall_mm = 1.25
+    state.refresh(tree)
+    assert root.mu_unit.chambers.wall_mm == 1.25
+    assert not unit_object.behind(root)
+    root.mu_unit.chambers.wall_mm = 1.1
+    assert abs(tree.nodes["Chambers"].wall_mm - 1.1) < 1e-6
+    assert state.show_units(bpy.context, tree) == [], "once"
+    # A unit that other nodes change is theirs: three walls are three objects.
+    new("three-walls")
+    walls = sorted(r.mu_unit.chambers.wall_mm for r in unit_object.roots() if r != root)
+    assert len(set(walls)) == 3
+    # One that was deleted comes back with the evaluation; a tree that was built by hand has its unit then.
+    bpy.ops.mu.delete()
+    tree.nodes["Assemble Unit"].follower = None
+    state.refresh(tree)
+    (again,) = state.show_units(bpy.context, tree)
+    assert again.mu_unit.chambers.wall_mm == pytest.approx(1.1)
 
 
 def test_links_of_every_type_are_valid_where_the_core_takes_them_and_red_with_a_reason_elsewhere():

@@ -354,12 +354,12 @@ def test_presets_and_groups_become_an_asset_library_of_the_users():
     assert list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize("scene", ["ranking", "obstacle", "gripper", "measured", "tree"])
+@pytest.mark.parametrize("scene", ["paths", "obstacle", "gripper", "measured", "tree"])
 def test_a_sample_scene_for_each_task_has_what_it_begins_with_in_view(scene):
     assert bpy.ops.mu.sample(scene=scene) == {"FINISHED"}
     bpy.context.view_layer.update()
     made = {
-        "ranking": lambda: unit_object.roots()[0].mu_unit.candidates,
+        "paths": lambda: unit_object.roots()[0].mu_unit.candidates,
         "obstacle": lambda: obstacles.of_unit(unit_object.roots()[0]),
         "gripper": gripper_object.roots,
         "measured": lambda: evidence.measured_data(unit_object.roots()[0]).measured,

@@ -192,6 +192,35 @@ def test_a_name_above_a_motion_stays_below_the_headers():
     assert legend.name_height(900.0, 700.0, 530.0) == 900.0, "the body is out of sight, and so is its name"
 
 
+def test_a_legend_keeps_clear_of_what_blender_draws_in_a_view_of_any_size():
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0, use_region_overlap=True))
+    overlay = SimpleNamespace(show_overlays=True, show_text=True, show_stats=False)
+
+    def room(height, count=2, redo=0, stats=False, tools=0):
+        view = SimpleNamespace(type="WINDOW", x=0, y=100, width=800, height=height)
+        others = [
+            SimpleNamespace(type="HEADER", y=74 + height, height=26),
+            SimpleNamespace(type="HUD", y=110, height=redo or 1),
+            SimpleNamespace(type="TOOLS", y=100, width=tools or 1, height=height),
+        ]
+        overlay.show_stats = stats
+        active = SimpleNamespace(overlay=overlay)
+        area = SimpleNamespace(regions=[view, *others], spaces=SimpleNamespace(active=active))
+        context = SimpleNamespace(preferences=preferences, area=area, region=view)
+        found = legend.room(context, count)
+        texts = found.foot + found.height + 14 + legend.LINE * count
+        assert not found.height or texts <= height - 26 - 2 * legend.LINE * (1 + 3 * stats), "below its texts"
+        assert found.foot - 30 >= redo, "above the redo panel"
+        return found
+
+    assert room(600).height == legend.HEIGHT
+    assert room(600, tools=40).left == room(600).left + 40.0
+    assert 0 < room(350, count=4).height < legend.HEIGHT
+    assert 0 < room(420, redo=120).height < legend.HEIGHT
+    assert room(420, stats=True).height < room(420).height
+    assert room(200).height == 0.0, "no ramp, for its texts would lie on Blender's own"
+
+
 def test_candidates_are_seen_on_the_unit_at_rest_alone(home):
     root = started(home)
     root.mu_unit.candidates = True

@@ -475,7 +475,7 @@ def test_what_is_drawn_does_not_grow_with_the_rate_and_stays_in_its_axes(tmp_pat
     )
     monkeypatch.setattr(sensor_plot, "write", lambda text, x, y, size, *colour: texts.append(text))
     monkeypatch.setattr(sensor_plot, "blf", MagicMock(**{"dimensions.return_value": (40.0, 10.0)}))
-    monkeypatch.setattr(sensor_plot, "room", lambda context, scale: (100.0, 900.0))
+    monkeypatch.setattr(sensor_plot, "room", lambda context, scale: (100.0, 900.0, 24.0))
 
     def plotted():
         shapes.clear()
