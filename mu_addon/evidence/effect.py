@@ -24,6 +24,7 @@ SLIP = "marker_slip"
 CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
 # Error of the model's own mesh: present in every set of data, seen or not.
 NUMERICS = "mesh_error"
+EVERY = (-math.inf, math.inf)
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
 
@@ -222,7 +223,7 @@ class Parameter:
     linear: bool = False
     spread: float = math.inf
     experiment: str = ""
-    plausible: tuple[float, float] = (-math.inf, math.inf)
+    plausible: tuple[float, float] = EVERY
 
     def __attrs_post_init__(self) -> None:
         inside = [self.null, *self.starts]
@@ -254,6 +255,15 @@ class Parameter:
         away = [abs(v - self.null) for v in self.starts if v != self.null]
         size = 1e-3 * min(self.high - self.low, *away) if away else 1e-3 * (self.high - self.low)
         return size if self.null + size <= self.high else -size
+
+
+def factor(name: str, start: float, source: str, plausible: tuple[float, float] = EVERY) -> Parameter:
+    """A factor less 1, from a tenth to ten times: one range for effects that act alike on data.
+
+    A rival is not excluded by a narrower range of its own. plausible: range in which it may be named a cause;
+    beyond it stays a rival, and keeps a verdict open.
+    """
+    return Parameter(name, "", -0.9, 9.0, 0.0, (start,), source, plausible=plausible)
 
 
 @attrs.frozen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import attrs
 
-from .acceptance import JUMP, doubts, loss, share_by_experiment, sudden
+from .acceptance import JUMP, bounded_by, doubts, loss, share_by_experiment, sudden
 from .curved_reading import curved_reading
 from .effect import STEP
 from .fit import Fit, Fitter
@@ -69,6 +69,8 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
         if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
             return None
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
+        return None
+    if bounded_by(fitter, best):
         return None
     gain, dof = base.chi2 - best.chi2 - by_search(best), len(best.keys) - len(base.keys)
     p = by_count(gain, dof, len(found.singles) + len(found.wider))
