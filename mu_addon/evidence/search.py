@@ -75,8 +75,14 @@ def select(
         if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
-            # It cannot be compared with earlier ones; its part is left as structure.
-            doubted = "" if level else f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
+            # It cannot be compared with earlier ones; its part is left as structure. A first one may need a
+            # second, that alternates from test to test, to predict any test.
+            pair = None if level else _hidden_pair(fitter, effects, seen, base, pool, progress)
+            if pair is not None:
+                p_best, chosen = pair
+                ps, levels = [p_best, p_best], [pool, [chosen]]
+            elif not level:
+                doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         if level == 1 and not alone:
             alone = True
