@@ -16,6 +16,8 @@ GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
 THICKNESS = "strut_thickness"
 # A factor on the force of some tests; of which causes, `scaled_by` tells.
 FORCE_SCALE = "force_scale"
+# A supply that does not give the pressure that was asked for and logged.
+SUPPLY_LIMIT, SUPPLY_RATE = "supply_limit", "supply_rate_limit"
 # Effects that multiply the modulus in their experiments.
 SCALES = frozenset((BATCH, STEP, HEATING))
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
@@ -82,6 +84,14 @@ LIBRARY = {
     "line_lag": (
         "the resistance of the air line delays the chamber pressure behind the gauge",
         "steps and fast cycles",
+    ),
+    SUPPLY_LIMIT: (
+        "the supply cannot give the largest pressures, which were asked for and logged",
+        "a gauge at the unit, read beside the log",
+    ),
+    SUPPLY_RATE: (
+        "the supply cannot change its pressure as fast as was asked for and logged",
+        "a gauge at the unit, read beside the log; the same protocol at a third of the rate",
     ),
     "leak": (
         "leaking air flows through the line, so the chamber pressure is below the gauge",

@@ -17,6 +17,11 @@ from .rivals import causes_of, nearest, not_chosen, promising_rivals, with_rival
 from .scatter import ALONE
 from .significance import by_count
 
+# Effects by which a specimen remembers its drive, and tests against that drive as it is now.
+MEMORY = frozenset(
+    ("viscoelasticity", "rate_independent_hysteresis", "mullins_softening", "fatigue_drift")
+)
+OF_THE_DRIVE = frozenset(("pressure", "angle", "strain", "added_mass"))
 # Share of a misfit that one effect must take to be named although structure is left, and the factor by which
 # any other one's residual must exceed its own.
 MAINLY, APART = 0.99, 10.0
@@ -57,6 +62,9 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     if of_all and near and (not sure or any(own > 1.0 - MAINLY for own in near.values())):
         return None
     table = tuple(strict_table(fitter, best))
+    if best.names[0] in MEMORY and set(structure(table)) & OF_THE_DRIVE:
+        # What is a function of the drive itself has not been remembered.
+        return None
     if of_all and near and set(structure(table)) - {OUTLIER}:
         # Effects that leave the same moment or the same waves are alike in what they are not.
         return None
@@ -111,6 +119,8 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
     """
     base, chosen = found.base, found.chosen
     if found.doubted or at_a_bound(chosen) or not _plain(fitter, found):
+        return False
+    if MEMORY.intersection(chosen.names) and set(found.left) & OF_THE_DRIVE:
         return False
     if any(c.rivals for c in with_rivals(fitter, found).causes):
         return False

@@ -8,7 +8,21 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, CAMERA, FORCE_SCALE, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter, factor
+from .effect import (
+    BATCH,
+    CAMERA,
+    FORCE_SCALE,
+    GEOMETRY,
+    HEATING,
+    SLIP,
+    STEP,
+    SUPPLY_LIMIT,
+    SUPPLY_RATE,
+    THICKNESS,
+    Effect,
+    Parameter,
+    factor,
+)
 
 # Instruments and clamps may fail in one experiment, independent of the specimen.
 OF_THE_BENCH = CAMERA.union(
@@ -22,6 +36,8 @@ OF_THE_BENCH = CAMERA.union(
         "force_drift",
         "force_lag",
         "line_lag",
+        SUPPLY_LIMIT,
+        SUPPLY_RATE,
         "clock_offset",
         "angle_offset",
         "angle_drift",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...evidence.effect import SLIP, THICKNESS
+from ...evidence.effect import SLIP, SUPPLY_LIMIT, SUPPLY_RATE, THICKNESS
 
 _INSTRUMENT = "the simulation is not at fault"
 _MODEL = "simulate with --model model.toml, which has it"
@@ -37,6 +37,8 @@ TO_DO = {
     "force_drift": f"let the load cell warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_lag": f"switch off the load cell's filter, or test slower; {_INSTRUMENT}",
     "line_lag": f"{_MODEL}; a shorter or wider line, or a gauge at the unit",
+    SUPPLY_LIMIT: f"set the supply to give that pressure, or log a gauge at the unit; {_INSTRUMENT}",
+    SUPPLY_RATE: f"ask for slower changes, or log a gauge at the unit; {_INSTRUMENT}",
     "leak": "find the leak (soapy water at joints and inlet) and seal it, then measure again",
     "clogged_chamber": "drain and clean the unit, and look for cured resin in its necks; print with drains",
     "gravity": f"{_MODEL}, and give the direction in which the unit hangs by --orientation",
