@@ -18,6 +18,8 @@ THICKNESS = "strut_thickness"
 FORCE_SCALE = "force_scale"
 # A supply that does not give the pressure that was asked for and logged.
 SUPPLY_LIMIT, SUPPLY_RATE = "supply_limit", "supply_rate_limit"
+# A load cell off straight, and what of grips and specimen looks like one.
+CURVED_CELL, GRIPS = "force_nonlinearity", frozenset(("seating", "frame_compliance"))
 # Effects that multiply the modulus in their experiments.
 SCALES = frozenset((BATCH, STEP, HEATING))
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
@@ -69,7 +71,7 @@ LIBRARY = {
         "the force is scaled: load cell, section as typed, clamping or specimen",
         "a dead weight on the load cell, the section measured, the specimen clamped again",
     ),
-    "force_nonlinearity": (
+    CURVED_CELL: (
         "the load cell's reading is not proportional to the force, by at most 5 % of its largest",
         "dead weights hung from the load cell, in steps up to the largest force",
     ),

@@ -9,7 +9,7 @@ from itertools import combinations
 import attrs
 import numpy as np
 
-from .effect import CAMERA, FORCE_SCALE, NUMERICS, Effect
+from .effect import CAMERA, CURVED_CELL, FORCE_SCALE, GRIPS, NUMERICS, Effect
 from .fit import Fit, Fitter
 from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
 from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
@@ -180,16 +180,19 @@ def pairs_for(
     chosen: Fit,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[str, ...]:
-    """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
+    """Pairs of effects that explain the data as well as an instrument's fault does, as "one with the other".
 
-    A camera's fault scales each channel. Two physical effects can do that together although neither does it
-    alone. The `SEEDS` pairs that take most to first order are fitted.
+    A camera's fault scales each channel, and a load cell's curve is that of grips and specimen. Two physical
+    effects can do that together although neither does it alone. The `SEEDS` pairs that take most to first
+    order are fitted; beside a load cell's curve one of them is of the grips.
     """
-    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
+    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in (*CAMERA, *chosen.names)]
+    of_grips = CURVED_CELL in chosen.names
     columns = {id(s): s.column[: len(base.residual)] for s in physical}
     promised = []
     for one, other in combinations(physical, 2):
-        if one.effect.name != other.effect.name:
+        names = {one.effect.name, other.effect.name}
+        if len(names) == 2 and (names & GRIPS or not of_grips):
             q = np.linalg.qr(np.stack([columns[id(one)], columns[id(other)]], axis=1))[0]
             promised.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
     promised.sort(key=lambda pair: -pair[0])
@@ -198,7 +201,7 @@ def pairs_for(
         progress(" and ".join(e.name for e in pair))
         starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
         both = fitter.best(pair, starts)
-        if both.chi2 + by_search(both) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
+        if cost(both) - cost(chosen) < not_distinguished(chosen.chi2, len(fitter.record)):
             found[TOGETHER.join(e.title for e in pair)] = None
     return tuple(found)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
-from .effect import BATCH, CAMERA, FORCE_SCALE, GEOMETRY, HEATING, STEP, THICKNESS, Effect
+from .effect import BATCH, CAMERA, CURVED_CELL, FORCE_SCALE, GEOMETRY, HEATING, STEP, THICKNESS, Effect
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
@@ -24,6 +24,8 @@ ELSEWHERE = 4.0
 # Changes of the scale of some tests, and what differs among specimens that would do as much.
 OF_SOME = frozenset((STEP, HEATING, FORCE_SCALE, GEOMETRY))
 OF_SPECIMENS = frozenset((BATCH, THICKNESS))
+# Faults that two physical effects together imitate.
+IMITATED = CAMERA | {CURVED_CELL}
 # Most effects of owners that are fitted, the most promising first.
 MOST_FITS = 12
 
@@ -104,7 +106,7 @@ def select(
     table = tuple(strict_table(fitter, chosen))
     accepted = not (doubted or structure(table))
     causes = causes_of(fitter, effects, base, chosen, ps, levels, accepted)
-    if len(causes) == 1 and CAMERA.intersection(chosen.names):
+    if len(causes) == 1 and IMITATED.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
         causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
     if chosen is base and accepted:

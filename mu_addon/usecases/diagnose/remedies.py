@@ -67,7 +67,15 @@ TO_DO = {
 }
 
 
-def what_to_do(effects: tuple[str, ...]) -> str:
-    """Remedies for these causes, a sentence each; empty without any."""
-    sentences = (TO_DO[name] for name in effects)
+def in_the_simulation(effect: str) -> bool:
+    """Return True if a cause is physics that a simulation should have, not an instrument's fault."""
+    return _INSTRUMENT not in TO_DO[effect]
+
+
+def what_to_do(effects: tuple[str, ...], sure: bool = True) -> str:
+    """Remedies for these causes, a sentence each; empty without any.
+
+    sure: nothing inside the simulation would do as well; only then is it said to be right.
+    """
+    sentences = (TO_DO[name] if sure else TO_DO[name].replace(f"; {_INSTRUMENT}", "") for name in effects)
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

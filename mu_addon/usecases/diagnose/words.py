@@ -17,7 +17,7 @@ from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
-from .remedies import what_to_do
+from .remedies import in_the_simulation, what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
@@ -365,7 +365,8 @@ def to_do(verdict: Verdict) -> str:
         return "Make the next measurement below before anything is changed."
     if verdict.kind == "unexplained":
         return f"Do not trust the simulation to better than {_error(verdict)} until this is explained."
-    return what_to_do(verdict.names)
+    doubtful = any(in_the_simulation(name) for name in verdict.in_question - {*verdict.names})
+    return what_to_do(verdict.names, not (doubtful or verdict.refused or verdict.selection.left))
 
 
 def _with_moduli(verdict: Verdict) -> str:
