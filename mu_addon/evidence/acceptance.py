@@ -18,6 +18,8 @@ from .scatter import STATED, excess
 
 Array = np.ndarray[Any, Any]
 
+# Of a nuisance that a bound holds back, in words.
+BOUND = "is at its bound"
 # Name of the test for a jump at one moment.
 JUMP = "jump"
 # An effect rests on one experiment alone if this share of the information on it comes from there.
@@ -70,7 +72,7 @@ def bounded_by(fitter: Fitter, fit: Fit) -> str:
     if p is None:
         return ""
     value = f"{fit.values[p.name]:.3g} {p.unit}".rstrip()
-    return f"{p.name.removesuffix(f'_{p.unit}')} is at its bound, {value}, which makes part of the error itself"
+    return f"{p.name.removesuffix(f'_{p.unit}')} {BOUND}, {value}, which makes part of the error itself"
 
 
 def _too_large(chosen: Fit) -> str:

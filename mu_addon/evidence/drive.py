@@ -130,10 +130,10 @@ def denoised_drives(
     """The experiments with denoised drives (`denoised`), and a copy with noise added again.
 
     Drives are the columns of `DRIVES` that no simulator predicts, in experiments with time_s, at least
-    `DENOISED` rows and finite values; what is no noise stays (`is_noise`). The copy has the same drives with equal simulated noise, denoised again.
-    A model driven by it misfits data of the first list only by the gauge's noise. A drive in steps of a
-    display is freed of them (`between_steps`), and its copy stays as read. The copy is None where no drive is
-    noisy.
+    `DENOISED` rows and finite values; what is no noise stays (`is_noise`). The copy has the same drives with
+    equal simulated noise, denoised again. A model driven by it misfits data of the first list only by the
+    gauge's noise. A drive in steps of a display is freed of them (`between_steps`), and its copy stays as
+    read. The copy is None where no drive is noisy.
     """
     rng = np.random.default_rng(0)
     found, again = [], []

@@ -270,12 +270,12 @@ class Parameter:
 
 
 def factor(name: str, start: float, source: str, plausible: tuple[float, float] = EVERY) -> Parameter:
-    """A factor less 1, from a tenth to ten times: one range for effects that act alike on data.
+    """A factor less 1, from a hundredth to ten times: one range for effects that act alike on data.
 
     A rival is not excluded by a narrower range of its own. plausible: range in which it may be named a cause;
     beyond it stays a rival, and keeps a verdict open.
     """
-    return Parameter(name, "", -0.9, 9.0, 0.0, (start,), source, plausible=plausible)
+    return Parameter(name, "", -0.99, 9.0, 0.0, (start,), source, plausible=plausible)
 
 
 @attrs.frozen
@@ -308,7 +308,8 @@ class Effect:
     @reveals.default
     def _shown_by(self) -> str:
         usual = LIBRARY.get(self.name, ("", ""))[1]
-        return "; or ".join(dict.fromkeys(SHOWN_BY.get((self.name, kind), usual) for kind in self.kinds))
+        shown = dict.fromkeys(SHOWN_BY.get((self.name, kind), usual) for kind in self.kinds)
+        return "; or ".join(shown) or usual
 
     def __attrs_post_init__(self) -> None:
         if self.name not in LIBRARY or not self.parameters:

@@ -18,9 +18,7 @@ from .scatter import ALONE
 from .significance import by_count
 
 # Effects by which a specimen remembers its drive, and tests against that drive as it is now.
-MEMORY = frozenset(
-    ("viscoelasticity", "rate_independent_hysteresis", "mullins_softening", "fatigue_drift")
-)
+MEMORY = frozenset(("viscoelasticity", "rate_independent_hysteresis", "mullins_softening", "fatigue_drift"))
 OF_THE_DRIVE = frozenset(("pressure", "angle", "strain", "added_mass"))
 # Share of a misfit that one effect must take to be named although structure is left, and the factor by which
 # any other one's residual must exceed its own.

@@ -48,9 +48,7 @@ def causes_of(
                 if accepted and a.name not in chosen.names
             ]
         less = fitter.best(others, [chosen.values])
-        near = max(
-            not_distinguished(chosen.chi2, len(fitter.record)), LAW**2 * (base.chi2 - less.chi2)
-        )
+        near = max(not_distinguished(chosen.chi2, len(fitter.record)), LAW**2 * (base.chi2 - less.chi2))
         tried = _with_their_laws(fitter, chosen, less, tried)
         # A rival's gain by its search is no fit.
         spent = chosen.chi2 + by_search(chosen)
@@ -140,7 +138,7 @@ def coinciding(
 def _as_one(
     fitter: Fitter, found: Selection, scales: Sequence[Effect], progress: Callable[[str], None]
 ) -> Selection:
-    """A selection of several causes as one where a scale of some tests alone explains as much; else unchanged.
+    """A selection of several causes as one where a scale of some tests alone explains as much; else itself.
 
     Two effects that share a scale between them have the same rivals, and are no two causes.
     """

@@ -43,7 +43,9 @@ FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, prin
 # tangent, as the toe of such records has one scale of load.
 SETTLING = (
     Parameter("settling_mm_per_N", "mm/N", 0.0, 5.0, 0.0, (0.01, 0.3), "at no load; printed plates 0.1"),
-    Parameter("settled_at", "", 0.005, 1.0, 0.1, (0.05, 0.3), "of the largest load, where grips have settled"),
+    Parameter(
+        "settled_at", "", 0.005, 1.0, 0.1, (0.05, 0.3), "of the largest load, where grips have settled"
+    ),
     Parameter("stays", "", 0.0, 1.0, 0.0, (0.0, 0.3), "share of that compliance that does not settle"),
 )
 _TIMED = {e.name: e.parameters for e in TIMED}
@@ -209,11 +211,11 @@ def recorded(
     """Nominal stress (n,) in kPa that the machine records at the experiment's strains, its zero included.
 
     law: stress (n,) in kPa of strain (n,) in slow loading. largest_N: force at which the load cell's curve is
-    straight again. Faces close a gap g while the load builds up: the
-    specimen strains by e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A
-    frame of compliance c in series leaves the specimen e - c A s/L, one that settles (`SETTLING`) less of it. Relaxation needs time_s, the frame
-    section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
-    share is not found.
+    straight again. Faces close a gap g while the load builds up: the specimen strains by
+    e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A frame of compliance c in
+    series leaves the specimen e - c A s/L, one that settles (`SETTLING`) less of it. Relaxation needs time_s,
+    the frame section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the
+    frame's share is not found.
     """
     timed = "time_s" in experiment.columns
     if timed and any(values.get(key) for key in FILTERED):
@@ -277,9 +279,9 @@ def _shared(
     """Stress s (n,) in kPa with s = stress_of(strain - taken(s)): a specimen in series with a frame.
 
     alone (n,): in kPa, without the frame. strain (n,): of both. taken: strain (n,) that the frame takes, at
-    most `give` a kPa. law: in slow loading; stress_of: with history, whose slope by a sample's own strain is not known, and arbitrary
-    where it turns. So the slope between each sample's last two values is used, which changes little at a
-    time. Raises ConvergenceError.
+    most `give` a kPa. law: in slow loading; stress_of: with history, whose slope by a sample's own strain is
+    not known, and arbitrary where it turns. So the slope between each sample's last two values is used, which
+    changes little at a time. Raises ConvergenceError.
     """
     small = 1e-6
     slope = np.maximum((law(strain + small) - law(strain - small)) / (2 * small), 0.0)

@@ -29,7 +29,13 @@ def supply(kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
     if not (most > 0.0 and fastest > 0.0):
         return ()
     short = Parameter(
-        "short_kPa", "kPa", 0.0, MOST_SHORT * most, 0.0, tuple(s * most for s in STARTS), "of the largest read"
+        "short_kPa",
+        "kPa",
+        0.0,
+        MOST_SHORT * most,
+        0.0,
+        tuple(s * most for s in STARTS),
+        "of the largest read",
     )
     slow = Parameter(
         "s_per_kPa", "s/kPa", 0.0, LONGEST / fastest, 0.0, tuple(s / fastest for s in LONGER), "of its valve"

@@ -482,8 +482,8 @@ class UnitPressure:
         """Pressure (n,) in kPa at which the base unit has the state of the unit with these values.
 
         values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
-        of the gauge, limits of the supply, leak and line lag (with an open valve), modulus with temperature and fatigue,
-        viscoelasticity, hysteresis, Mullins softening.
+        of the gauge, limits of the supply, leak and line lag (with an open valve), modulus with temperature
+        and fatigue, viscoelasticity, hysteresis, Mullins softening.
         """
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, PressureHistory())
