@@ -11,13 +11,15 @@ from .curved_reading import curved_reading
 from .effect import NUMERICS, SLIP, STEP
 from .fit import PRIOR, Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
-from .plausibility import at_a_bound, value_at_a_bound
+from .plausibility import at_a_bound, held_back, value_at_a_bound
 from .record import KNOWN
 from .residuals import Dependence
 from .scatter import STATED, excess
 
 Array = np.ndarray[Any, Any]
 
+# Of a nuisance that a bound holds back, in words.
+BOUND = "is at its bound"
 # Name of the test for a jump at one moment.
 JUMP = "jump"
 # An effect rests on one experiment alone if this share of the information on it comes from there.
@@ -57,8 +59,20 @@ def doubts(
     margin: see `sudden`.
     """
     return (
-        sudden(table_base, base, chosen, margin) or _too_large(chosen) or curved_reading(fitter, base, chosen)
+        sudden(table_base, base, chosen, margin)
+        or _too_large(chosen)
+        or bounded_by(fitter, chosen)
+        or curved_reading(fitter, base, chosen)
     )
+
+
+def bounded_by(fitter: Fitter, fit: Fit) -> str:
+    """Nuisance at a bound that makes part of the misfit itself, as text; empty without one."""
+    p = held_back(fitter, fit)
+    if p is None:
+        return ""
+    value = f"{fit.values[p.name]:.3g} {p.unit}".rstrip()
+    return f"{p.name.removesuffix(f'_{p.unit}')} {BOUND}, {value}, which makes part of the error itself"
 
 
 def _too_large(chosen: Fit) -> str:

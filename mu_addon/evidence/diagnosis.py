@@ -29,8 +29,14 @@ from .readings import without_unpredicted_readings, without_wrong_readings
 from .record import Record, record
 from .residuals import ALTERNATION, BY_TURN, strict_table, structure
 from .rivals import coinciding, with_promising_rivals
-from .scatter import NEAR, with_bursts, within_accuracy, within_scatter
-from .search import further_owners, one_more, reselected, select, select_owned, select_pooled
+from .scatter import (
+    NEAR,
+    with_bursts,
+    within_accuracy,
+    within_scatter,
+    within_scatter_without_clock,
+)
+from .search import further_owners, of_some_tests, one_more, reselected, select, select_owned, select_pooled
 from .sensitivity import (
     WANDERING,
     Sensitivity,
@@ -160,7 +166,7 @@ def with_owners(now: Diagnosis, progress: Progress) -> Diagnosis:
         now = attrs.evolve(now, chosen=chosen, seen=seen)
     values, known = now.chosen.chosen.values, now.fitter.known
     strained = any(abs(values[p.name] - p.null) > STRAINED * p.spread for p in known)
-    if now.kind in OPEN or (now.chosen.causes and strained):
+    if now.kind in OPEN or (now.chosen.causes and strained) or of_some_tests(now.chosen):
         now = attrs.evolve(now, chosen=select_pooled(now.fitter, now.chosen, progress))
     return attrs.evolve(now, chosen=further_owners(now.fitter, now.chosen, progress))
 
@@ -246,7 +252,9 @@ def by_size(now: Diagnosis, progress: Progress) -> Diagnosis:
     if words:
         none = attrs.evolve(found, chosen=found.base, causes=(), doubted="", excused=words)
         now = attrs.evolve(now, chosen=none, set_aside=(*now.set_aside, words))
-    if now.kind == "none" and not now.chosen.excused and (words := too_far(now.fitter, found.base)):
+    found = now.chosen
+    sure = now.kind != "unexplained" and not (now.graded or found.excused)
+    if sure and (words := too_far(now.fitter, found.chosen)):
         doubted = attrs.evolve(now, chosen=attrs.evolve(found, doubted=words))
         now = with_what_explains_most(doubted, progress)
     return now
@@ -353,7 +361,7 @@ def noise_of(
     curved = {k: v for k, v in values.items() if k not in zeros}
     columns = span(measured, signatures(measured, simulator, curved, effects))
     found = estimate(measured, measured.values - measured.predict(simulator, values), columns)
-    return within_accuracy(measured, found)
+    return within_scatter_without_clock(measured, within_accuracy(measured, found))
 
 
 def _rough(measured: Record, group: str) -> Source:

@@ -16,6 +16,10 @@ GEOMETRY, STEP, HEATING = "geometry_as_typed", "step_change", "self_heating"
 THICKNESS = "strut_thickness"
 # A factor on the force of some tests; of which causes, `scaled_by` tells.
 FORCE_SCALE = "force_scale"
+# A supply that does not give the pressure that was asked for and logged.
+SUPPLY_LIMIT, SUPPLY_RATE = "supply_limit", "supply_rate_limit"
+# A load cell off straight, and what of grips and specimen looks like one.
+CURVED_CELL, GRIPS = "force_nonlinearity", frozenset(("seating", "frame_compliance"))
 # Effects that multiply the modulus in their experiments.
 SCALES = frozenset((BATCH, STEP, HEATING))
 # A shift of one marker from some moment on, see `prediction.marker_slip`.
@@ -24,6 +28,7 @@ SLIP = "marker_slip"
 CAMERA = frozenset(("camera_scale", "camera_tilt", "camera_perspective", "lens_distortion"))
 # Error of the model's own mesh: present in every set of data, seen or not.
 NUMERICS = "mesh_error"
+EVERY = (-math.inf, math.inf)
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
 
@@ -66,7 +71,7 @@ LIBRARY = {
         "the force is scaled: load cell, section as typed, clamping or specimen",
         "a dead weight on the load cell, the section measured, the specimen clamped again",
     ),
-    "force_nonlinearity": (
+    CURVED_CELL: (
         "the load cell's reading is not proportional to the force, by at most 5 % of its largest",
         "dead weights hung from the load cell, in steps up to the largest force",
     ),
@@ -81,6 +86,14 @@ LIBRARY = {
     "line_lag": (
         "the resistance of the air line delays the chamber pressure behind the gauge",
         "steps and fast cycles",
+    ),
+    SUPPLY_LIMIT: (
+        "the supply cannot give the largest pressures, which were asked for and logged",
+        "a gauge at the unit, read beside the log",
+    ),
+    SUPPLY_RATE: (
+        "the supply cannot change its pressure as fast as was asked for and logged",
+        "a gauge at the unit, read beside the log; the same protocol at a third of the rate",
     ),
     "leak": (
         "leaking air flows through the line, so the chamber pressure is below the gauge",
@@ -222,7 +235,7 @@ class Parameter:
     linear: bool = False
     spread: float = math.inf
     experiment: str = ""
-    plausible: tuple[float, float] = (-math.inf, math.inf)
+    plausible: tuple[float, float] = EVERY
 
     def __attrs_post_init__(self) -> None:
         inside = [self.null, *self.starts]
@@ -256,6 +269,15 @@ class Parameter:
         return size if self.null + size <= self.high else -size
 
 
+def factor(name: str, start: float, source: str, plausible: tuple[float, float] = EVERY) -> Parameter:
+    """A factor less 1, from a hundredth to ten times: one range for effects that act alike on data.
+
+    A rival is not excluded by a narrower range of its own. plausible: range in which it may be named a cause;
+    beyond it stays a rival, and keeps a verdict open.
+    """
+    return Parameter(name, "", -0.99, 9.0, 0.0, (start,), source, plausible=plausible)
+
+
 @attrs.frozen
 class Effect:
     """Physics that the base model lacks; `kinds` are the experiments it can be seen in.
@@ -286,7 +308,8 @@ class Effect:
     @reveals.default
     def _shown_by(self) -> str:
         usual = LIBRARY.get(self.name, ("", ""))[1]
-        return "; or ".join(dict.fromkeys(SHOWN_BY.get((self.name, kind), usual) for kind in self.kinds))
+        shown = dict.fromkeys(SHOWN_BY.get((self.name, kind), usual) for kind in self.kinds)
+        return "; or ".join(shown) or usual
 
     def __attrs_post_init__(self) -> None:
         if self.name not in LIBRARY or not self.parameters:

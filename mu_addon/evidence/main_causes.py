@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import attrs
 
-from .acceptance import JUMP, doubts, loss, share_by_experiment, sudden
+from .acceptance import JUMP, bounded_by, doubts, loss, share_by_experiment, sudden
 from .curved_reading import curved_reading
 from .effect import STEP
 from .fit import Fit, Fitter
@@ -17,6 +17,9 @@ from .rivals import causes_of, nearest, not_chosen, promising_rivals, with_rival
 from .scatter import ALONE
 from .significance import by_count
 
+# Effects by which a specimen remembers its drive, and tests against that drive as it is now.
+MEMORY = frozenset(("viscoelasticity", "rate_independent_hysteresis", "mullins_softening", "fatigue_drift"))
+OF_THE_DRIVE = frozenset(("pressure", "angle", "strain", "added_mass"))
 # Share of a misfit that one effect must take to be named although structure is left, and the factor by which
 # any other one's residual must exceed its own.
 MAINLY, APART = 0.99, 10.0
@@ -57,6 +60,9 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
     if of_all and near and (not sure or any(own > 1.0 - MAINLY for own in near.values())):
         return None
     table = tuple(strict_table(fitter, best))
+    if best.names[0] in MEMORY and set(structure(table)) & OF_THE_DRIVE:
+        # What is a function of the drive itself has not been remembered.
+        return None
     if of_all and near and set(structure(table)) - {OUTLIER}:
         # Effects that leave the same moment or the same waves are alike in what they are not.
         return None
@@ -69,6 +75,8 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
         if (len(shares) > 1 and max(shares.values()) > ALONE) or loss(fitter, base, best) <= 0.0:
             return None
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
+        return None
+    if bounded_by(fitter, best):
         return None
     gain, dof = base.chi2 - best.chi2 - by_search(best), len(best.keys) - len(base.keys)
     p = by_count(gain, dof, len(found.singles) + len(found.wider))
@@ -109,6 +117,8 @@ def _mainly_several(fitter: Fitter, found: Selection) -> bool:
     """
     base, chosen = found.base, found.chosen
     if found.doubted or at_a_bound(chosen) or not _plain(fitter, found):
+        return False
+    if MEMORY.intersection(chosen.names) and set(found.left) & OF_THE_DRIVE:
         return False
     if any(c.rivals for c in with_rivals(fitter, found).causes):
         return False

@@ -8,7 +8,21 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import BATCH, CAMERA, FORCE_SCALE, GEOMETRY, HEATING, SLIP, STEP, THICKNESS, Effect, Parameter
+from .effect import (
+    BATCH,
+    CAMERA,
+    FORCE_SCALE,
+    GEOMETRY,
+    HEATING,
+    SLIP,
+    STEP,
+    SUPPLY_LIMIT,
+    SUPPLY_RATE,
+    THICKNESS,
+    Effect,
+    Parameter,
+    factor,
+)
 
 # Instruments and clamps may fail in one experiment, independent of the specimen.
 OF_THE_BENCH = CAMERA.union(
@@ -22,6 +36,8 @@ OF_THE_BENCH = CAMERA.union(
         "force_drift",
         "force_lag",
         "line_lag",
+        SUPPLY_LIMIT,
+        SUPPLY_RATE,
         "clock_offset",
         "angle_offset",
         "angle_drift",
@@ -34,13 +50,16 @@ OF_THE_BENCH = CAMERA.union(
 OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
 # Numerics and a machine's frame are the same for all, and a marker's slip has its owner by its moment.
 OF_NONE = frozenset(("mesh_error", "gravity", "frame_compliance", SLIP))
-CHANGE = Parameter("change", "", -0.8, 4.0, 0.0, (0.1,), "batches differ by 5 to 20 %, struts by more")
+CHANGE = factor("change", 0.1, "batches differ by 5 to 20 %, struts by more")
+# Elastomers soften by some 0.5 % a kelvin, and double their modulus over some decades of rate at most.
+WARMED = factor("change", 0.1, "self-heating by some 10 K, stiffening by rate", (-0.3, 1.0))
 BATCH_EFFECT = Effect(BATCH, (CHANGE,), ())
 THICKER = Parameter(
     "thicker_mm", "mm", -0.4, 0.6, 0.0, (0.05,), "diameter less that drawn; printers are 0.05 to 0.2 mm off"
 )
 THICKNESS_EFFECT = Effect(THICKNESS, (THICKER,), ("lattice_compression",))
-HEIGHT = Parameter("height", "", -0.2, 0.2, 0.0, (0.03,), "true over typed, less 1; misread or mistyped")
+HEIGHT = factor("height", 0.03, "true over typed, less 1; misread or mistyped", (-0.2, 0.2))
+CHANGES = {GEOMETRY: HEIGHT, STEP: CHANGE, HEATING: WARMED}
 # Kinds in a testing machine, whose force depends on specimen, geometry and clamping alike.
 MACHINE = ("coupon", "lattice_compression")
 # Rates of tests are two where they differ by more than this factor.
@@ -108,7 +127,7 @@ def coincident_effects(experiments: Sequence[Experiment]) -> dict[Effect, frozen
             label = f"tests at {100 * rate:.2g} %/s or faster"
             groups[HEATING, label] = frozenset(name for _, name in rates[k:])
     return {
-        Effect(name, (HEIGHT if name == GEOMETRY else CHANGE,), kinds, whose=whose): members
+        Effect(name, (CHANGES[name],), kinds, whose=whose): members
         for (name, whose), members in groups.items()
         if len(members) < len(own)
     }

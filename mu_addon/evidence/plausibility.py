@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from .effect import Parameter
 from .fit import Fit, Fitter, logarithmic
+from .found_causes import RIVAL_DELTA_CHI2
 
 # Mistaken units: N for kN, kPa for MPa or Pa, mm for m.
 FACTORS = (1e3, 1e-3, 1e6, 1e-6)
@@ -63,6 +64,29 @@ def _refuse(fitter: Fitter, p: Parameter, fitted: float) -> None:
 def _source(columns: Container[str], channel: str) -> str:
     """The column that a channel was read from: the force where stress was computed from it."""
     return "force_N" if channel == "stress_kPa" and "force_N" in columns else channel
+
+
+def held_back(fitter: Fitter, fit: Fit) -> Parameter | None:
+    """The nuisance whose bound holds a fit back; None without any.
+
+    Beyond that bound chi squared would fall by more than `RIVAL_DELTA_CHI2`, to first order: part of the
+    misfit is made by the bound, and no effect may explain it.
+    """
+    nuisances = {p.name: p for p in fitter.curved}
+    every, left = np.vstack([fit.jacobian, fit.prior]), fit.residual
+    for i, key in enumerate(fit.keys):
+        p = nuisances.get(key)
+        if p is None or not math.isfinite(fit.chi2):
+            continue
+        ends = [(p.low, -1.0), (p.high, 1.0)]
+        beyond = [out for end, out in ends if math.isclose(fit.values[key], end, rel_tol=1e-4)]
+        others = np.linalg.qr(np.delete(every, i, axis=1))[0]
+        own = every[:, i] - others @ (others.T @ every[:, i])
+        length = float(np.linalg.norm(own)) or 1.0
+        along = float(own[: len(left)] @ left) / length
+        if any(along * out > 0.0 and along**2 > RIVAL_DELTA_CHI2 for out in beyond):
+            return p
+    return None
 
 
 def at_a_bound(fit: Fit) -> bool:

@@ -9,11 +9,13 @@ from itertools import combinations
 import attrs
 import numpy as np
 
-from .effect import CAMERA, FORCE_SCALE, NUMERICS, Effect
+from .effect import CAMERA, CURVED_CELL, FORCE_SCALE, GRIPS, NUMERICS, Effect
 from .fit import Fit, Fitter
-from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection
+from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
 from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined
 from .owned import MACHINE, owned_effects
+from .plausibility import value_at_a_bound
+from .residuals import strict_table
 from .sensitivity import Sensitivity
 
 # Number of a cause's rivals that are fitted by all laws of their mechanisms, and the share of the cause's
@@ -46,7 +48,7 @@ def causes_of(
                 if accepted and a.name not in chosen.names
             ]
         less = fitter.best(others, [chosen.values])
-        near = max(RIVAL_DELTA_CHI2, LAW**2 * (base.chi2 - less.chi2))
+        near = max(not_distinguished(chosen.chi2, len(fitter.record)), LAW**2 * (base.chi2 - less.chi2))
         tried = _with_their_laws(fitter, chosen, less, tried)
         # A rival's gain by its search is no fit.
         spent = chosen.chi2 + by_search(chosen)
@@ -118,11 +120,12 @@ def coinciding(
     owned = [e for e in owned_effects(scales, single) if set(e.kinds) & set(MACHINE)]
     if not owned or not found.causes or found.left or found.doubted:
         return found
-    causes = []
+    found = _as_one(fitter, found, owned, progress)
+    chosen, causes = found.chosen, []
     for c in found.causes:
         scaled = owned if set(c.effect.kinds) & set(MACHINE) else []
         fits = promising_rivals(fitter, chosen, c.effect, scaled, progress)
-        near = [f for f in fits if cost(f) - cost(chosen) < RIVAL_DELTA_CHI2]
+        near = [f for f in fits if cost(f) - cost(chosen) < margin(fitter, found)]
         if c.effect.among and near and cost(near[0]) < cost(chosen):
             # One size for some replaces a size of each.
             found, near = attrs.evolve(found, chosen=near[0]), near[1:]
@@ -132,6 +135,42 @@ def coinciding(
     return attrs.evolve(found, causes=tuple(causes))
 
 
+def _as_one(
+    fitter: Fitter, found: Selection, scales: Sequence[Effect], progress: Callable[[str], None]
+) -> Selection:
+    """A selection of several causes as one where a scale of some tests alone explains as much; else itself.
+
+    Two effects that share a scale between them have the same rivals, and are no two causes.
+    """
+    base, chosen = found.base, found.chosen
+    if len(found.causes) < 2:
+        return found
+    enough = HALF_WAY * (base.chi2 - chosen.chi2)
+    tried = [e for e in scales if promise(fitter, base, e) > enough]
+    for e in tried:
+        progress(e.title)
+    alone = ranked(beside(fitter, (), e, base.values) for e in tried)
+    near = [f for f in alone if cost(f) - cost(chosen) < margin(fitter, found)]
+    if not near or value_at_a_bound(near[0].effects[0].parameters[0], near[0].values[near[0].keys[-1]]):
+        return found
+    titles = [f.effects[0].title for f in near[1:]]
+    shared = [set(c.rivals) for c in found.causes]
+    titles += [t for t in found.causes[0].rivals if all(t in own for own in shared)]
+    one = near[0]
+    titles = [t for t in dict.fromkeys(titles) if t != one.effects[0].title]
+    cause = Cause(one.effects[0], max(c.p_value for c in found.causes), base.chi2 - one.chi2, tuple(titles))
+    return attrs.evolve(found, chosen=one, causes=(cause,), table=tuple(strict_table(fitter, one)))
+
+
+def margin(fitter: Fitter, found: Selection) -> float:
+    """Chi squared within which an effect is not distinguished from a cause.
+
+    `RIVAL_DELTA_CHI2`, or `UNKNOWN` of what the causes leave beyond noise: what no law explains may as well
+    be part of either.
+    """
+    return not_distinguished(found.chosen.chi2, len(fitter.record))
+
+
 def pairs_for(
     fitter: Fitter,
     seen: Sequence[Sensitivity],
@@ -139,16 +178,19 @@ def pairs_for(
     chosen: Fit,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[str, ...]:
-    """Pairs of effects that explain the data as well as a camera's fault alone does, as "one with the other".
+    """Pairs of effects that explain the data as well as an instrument's fault does, as "one with the other".
 
-    A camera's fault scales each channel. Two physical effects can do that together although neither does it
-    alone. The `SEEDS` pairs that take most to first order are fitted.
+    A camera's fault scales each channel, and a load cell's curve is that of grips and specimen. Two physical
+    effects can do that together although neither does it alone. The `SEEDS` pairs that take most to first
+    order are fitted; beside a load cell's curve one of them is of the grips.
     """
-    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in CAMERA]
+    physical = [s for s in seen if s.worth_a_fit and s.effect.name not in (*CAMERA, *chosen.names)]
+    of_grips = CURVED_CELL in chosen.names
     columns = {id(s): s.column[: len(base.residual)] for s in physical}
     promised = []
     for one, other in combinations(physical, 2):
-        if one.effect.name != other.effect.name:
+        names = {one.effect.name, other.effect.name}
+        if len(names) == 2 and (names & GRIPS or not of_grips):
             q = np.linalg.qr(np.stack([columns[id(one)], columns[id(other)]], axis=1))[0]
             promised.append((float(np.sum((q.T @ base.residual) ** 2)), one.effect, other.effect))
     promised.sort(key=lambda pair: -pair[0])
@@ -157,7 +199,7 @@ def pairs_for(
         progress(" and ".join(e.name for e in pair))
         starts = [{**base.values, **a, **b} for a in pair[0].starts() for b in pair[1].starts()]
         both = fitter.best(pair, starts)
-        if both.chi2 + by_search(both) - chosen.chi2 - by_search(chosen) < RIVAL_DELTA_CHI2:
+        if cost(both) - cost(chosen) < not_distinguished(chosen.chi2, len(fitter.record)):
             found[TOGETHER.join(e.title for e in pair)] = None
     return tuple(found)
 

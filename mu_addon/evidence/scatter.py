@@ -148,6 +148,16 @@ def bounded(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
     return found
 
 
+def within_scatter_without_clock(record: Record, sources: Mapping[str, Source]) -> dict[str, Source]:
+    """Sources of noise by group, those of readings without a clock no larger than readings show (`bounded`).
+
+    There each value stands alone, and the whole misfit would pass for white noise.
+    """
+    most = bounded(record, sources)
+    timed = {s.group for s in record.series if not math.isnan(s.sample_s)}
+    return {g: source if g in timed else most[g] for g, source in sources.items()}
+
+
 def _root_mean_square(values: Sequence[float]) -> float:
     return math.sqrt(sum(v**2 for v in values) / max(len(values), 1))
 

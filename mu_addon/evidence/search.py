@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
-from .effect import BATCH, CAMERA, Effect
+from .effect import BATCH, CAMERA, CURVED_CELL, FORCE_SCALE, GEOMETRY, HEATING, STEP, THICKNESS, Effect
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
@@ -21,6 +21,11 @@ from .significance import by_count, by_gauges, false_alarm_probability, gain_of
 MOST_EFFECTS = 3
 # Ratio of the gain by scales of single tests to a first effect's, above which no second is tried.
 ELSEWHERE = 4.0
+# Changes of the scale of some tests, and what differs among specimens that would do as much.
+OF_SOME = frozenset((STEP, HEATING, FORCE_SCALE, GEOMETRY))
+OF_SPECIMENS = frozenset((BATCH, THICKNESS))
+# Faults that two physical effects together imitate.
+IMITATED = CAMERA | {CURVED_CELL}
 # Most effects of owners that are fitted, the most promising first.
 MOST_FITS = 12
 
@@ -72,8 +77,14 @@ def select(
         if p >= FALSE_ALARM_RATE or of_the_law(chosen, pool[0], taken):
             break
         if loss(fitter, chosen, pool[0]) <= 0.0:
-            # It cannot be compared with earlier ones; its part is left as structure.
-            doubted = "" if level else f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
+            # It cannot be compared with earlier ones; its part is left as structure. A first one may need a
+            # second, that alternates from test to test, to predict any test.
+            pair = None if level else _hidden_pair(fitter, effects, seen, base, pool, progress)
+            if pair is not None:
+                p_best, chosen = pair
+                ps, levels = [p_best, p_best], [pool, [chosen]]
+            elif not level:
+                doubted = f"{pool[0].names[-1]} fits, but its leave-one-out prediction fails"
             break
         if level == 1 and not alone:
             alone = True
@@ -95,7 +106,7 @@ def select(
     table = tuple(strict_table(fitter, chosen))
     accepted = not (doubted or structure(table))
     causes = causes_of(fitter, effects, base, chosen, ps, levels, accepted)
-    if len(causes) == 1 and CAMERA.intersection(chosen.names):
+    if len(causes) == 1 and IMITATED.intersection(chosen.names):
         pairs = pairs_for(fitter, seen, base, chosen, progress)
         causes = (attrs.evolve(causes[0], rivals=(*causes[0].rivals, *pairs)),)
     if chosen is base and accepted:
@@ -294,6 +305,8 @@ def select_pooled(
         return found
     found = attrs.evolve(found, wider=(*found.wider, *(f for _, f in fits)))
     gain, best = fits[0]
+    if found.causes and gain < _gained(found) + RIVAL_DELTA_CHI2:
+        return _beside_the_step(found, fits)
     own = sizes_of(best.effects[0])
     tried = len(pooled_effects(fitter.simulator.effects, fitter.record.experiments))
     p = by_count(gain, 1 + len(best.effects[0].keys) - len(own), 0.5 * tried)
@@ -308,6 +321,38 @@ def select_pooled(
     table = tuple(strict_table(fitter, best))
     pooled = attrs.evolve(found, chosen=best, causes=(cause,), table=table, doubted="", p_best=p)
     return found if pooled.left else pooled
+
+
+def of_some_tests(found: Selection) -> bool:
+    """Return True if a cause changes the scale of some tests, which their specimens may do as well."""
+    return any(c.effect.whose and c.effect.name in OF_SOME for c in found.causes)
+
+
+def _gained(found: Selection) -> float:
+    """Gain of a selection's causes in -2 log L, as `fits_among` counts that of a spread."""
+    return found.base.chi2 - found.chosen.chi2 - by_search(found.chosen)
+
+
+def _beside_the_step(found: Selection, fits: Sequence[tuple[float, Fit]]) -> Selection:
+    """A selection whose change of some tests has as rivals what differs from specimen to specimen as well.
+
+    Where no specimen was tested on both sides of a change, its specimens may be what changed: always a rival
+    that leaves no more of the misfit.
+    """
+    found_too = [
+        fit.effects[0].title
+        for _, fit in fits
+        if fit.effects[0].among == "specimen"
+        and fit.names[0] in OF_SPECIMENS
+        and fit.chi2 < found.chosen.chi2 + RIVAL_DELTA_CHI2
+    ]
+    causes = [
+        attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *found_too))))
+        if c.effect.whose and c.effect.name in OF_SOME
+        else c
+        for c in found.causes
+    ]
+    return attrs.evolve(found, causes=tuple(causes))
 
 
 def further_owners(

@@ -20,10 +20,10 @@ MODULUS = Parameter(
     "coupon_modulus_kPa",
     "kPa",
     1.0,
-    1e6,
+    1e8,
     1000.0,
     (),
-    "soft gels to hard rubber",
+    "gels to polymers filled with fibres",
     plausible=(30.0, 1e7),
 )
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..effect import FORCE_SCALE, Effect, Parameter
+from ..effect import FORCE_SCALE, Effect, Parameter, factor
 from ..ringing import swinging
 from .effective_pressure import first_order_lag
 
@@ -51,7 +51,7 @@ def gauge(kind: str) -> tuple[Effect, ...]:
             (Parameter("offset_kPa", "kPa", -10.0, 10.0, 0.0, (-1.0, 1.0), "gauge pressures of benches"),),
             (kind,),
         ),
-        Effect("pressure_gain", (Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "gauge's sheet"),), (kind,)),
+        Effect("pressure_gain", (factor("gain", 0.05, "gauge's sheet", (-0.3, 0.3)),), (kind,)),
         Effect(CURVE, (GAUGE_BOW,), (kind,)),
     )
 
@@ -73,7 +73,7 @@ def before_the_gauge(reading: Array, values: Mapping[str, float], largest_kPa: f
     return straightened(p, values.get(f"{CURVE}.bow", 0.0), largest_kPa)
 
 
-GAIN = Parameter("gain", "", -0.3, 0.3, 0.0, (0.05,), "calibrations of load cells")
+GAIN = factor("gain", 0.05, "calibrations of load cells, sections, units")
 CELL_BOW = bow("off straight at half load, of the largest; load cells 0.0005, film sensors 0.03")
 FILTER = (Parameter("time_s", "s", 0.0, 2.0, 0.0, (0.05, 0.5), "amplifiers average over 1 ms to 1 s"),)
 # Of two poles: equal ones are damped by 1, a Bessel filter's by 0.87, a Butterworth filter's by 0.71.

@@ -19,7 +19,7 @@ Array = np.ndarray[Any, Any]
 
 KIND = "lattice_compression"
 
-MODULUS = Parameter("lattice_modulus_kPa", "kPa", 0.1, 1e5, 30.0, (), "at 1.0x, as drawn, along z")
+MODULUS = Parameter("lattice_modulus_kPa", "kPa", 0.1, 1e7, 30.0, (), "at 1.0x, as drawn, along z")
 DENSITY = Parameter("lattice_density_g_cm3", "g/cm3", 0.005, 2.0, 0.15, (), "as drawn")
 
 EFFECTS = (

@@ -39,6 +39,15 @@ STRAIGHT = 0.2
 # Strain up to which a preload is sought.
 FARTHEST = 0.5
 FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, printed plates 0.1")
+# A compliance that falls with the load: grips that settle, wedges that bite. Source of its form: a hyperbolic
+# tangent, as the toe of such records has one scale of load.
+SETTLING = (
+    Parameter("settling_mm_per_N", "mm/N", 0.0, 5.0, 0.0, (0.01, 0.3), "at no load; printed plates 0.1"),
+    Parameter(
+        "settled_at", "", 0.005, 1.0, 0.1, (0.05, 0.3), "of the largest load, where grips have settled"
+    ),
+    Parameter("stays", "", 0.0, 1.0, 0.0, (0.0, 0.3), "share of that compliance that does not settle"),
+)
 _TIMED = {e.name: e.parameters for e in TIMED}
 # Another law of Mullins softening, by the largest strain so far, tried where the first is found.
 BY_PEAK = (
@@ -101,10 +110,13 @@ def machine(kind: str) -> tuple[Effect, ...]:
             ),
             (kind,),
         ),
+        Effect("frame_compliance", (FRAME,), (kind,)),
         Effect(
             "frame_compliance",
-            (FRAME,),
+            SETTLING,
             (kind,),
+            "the testing machine and its grips deform, less the larger the load",
+            refines=True,
         ),
     )
 
@@ -199,19 +211,19 @@ def recorded(
     """Nominal stress (n,) in kPa that the machine records at the experiment's strains, its zero included.
 
     law: stress (n,) in kPa of strain (n,) in slow loading. largest_N: force at which the load cell's curve is
-    straight again. Faces close a gap g while the load builds up: the
-    specimen strains by e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A
-    frame of compliance c in series leaves the specimen e - c A s/L. Relaxation needs time_s, the frame
-    section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the frame's
-    share is not found.
+    straight again. Faces close a gap g while the load builds up: the specimen strains by
+    e - g/L (1 - exp(-e L/g)). The machine's zero is where the preload was reached. A frame of compliance c in
+    series leaves the specimen e - c A s/L, one that settles (`SETTLING`) less of it. Relaxation needs time_s,
+    the frame section_mm and length_mm; without them they have no effect. Raises ConvergenceError where the
+    frame's share is not found.
     """
     timed = "time_s" in experiment.columns
     if timed and any(values.get(key) for key in FILTERED):
         # A filter also depends on where the machine turned.
         dense, rows = _with_turns(experiment)
-        found = filtered(dense["time_s"], _borne(dense, law, values, past), values)[rows]
+        found = filtered(dense["time_s"], _borne(dense, law, values, past, largest_N), values)[rows]
     else:
-        found = _borne(experiment, law, values, past)
+        found = _borne(experiment, law, values, past, largest_N)
     if timed:
         found = amplified(found, values, largest_N * _kPa_per_N(experiment))
         found = found + _kPa_per_N(experiment) * drift("force_drift", experiment["time_s"], values)
@@ -228,27 +240,48 @@ def _with_turns(experiment: Experiment) -> tuple[Experiment, Array]:
     return attrs.evolve(experiment, columns=columns, rows=np.arange(len(time))), rows
 
 
-def _borne(experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory) -> Array:
+def _borne(
+    experiment: Experiment, law: Law, values: Mapping[str, float], past: StrainHistory, largest_N: float
+) -> Array:
     """Nominal stress (n,) in kPa of the specimen in the machine, as `recorded` without its zero."""
     strain = experiment["strain"]
     factor = _factor(experiment, values, past)
     seated = _seated(experiment, (lambda e: factor * law(e)) if factor != 1 else law, values)
     compliance = values.get("frame_compliance.mm_per_N", 0.0)
+    settling = values.get("frame_compliance.settling_mm_per_N", 0.0)
     stress = _remembering(experiment, seated, strain, values, past)
-    if not compliance or experiment.section_mm is None or experiment.length_mm is None:
+    if not (compliance or settling) or experiment.section_mm is None or experiment.length_mm is None:
         return stress
     # Strain the frame takes a kPa, which is 1e-3 N/mm2.
-    give = 1e-3 * compliance * experiment.section_mm[0] * experiment.section_mm[1] / experiment.length_mm
-    return _shared(stress, strain, give, seated, lambda e: _remembering(experiment, seated, e, values, past))
+    per_kPa = 1e-3 * experiment.section_mm[0] * experiment.section_mm[1] / experiment.length_mm
+    stays = values.get("frame_compliance.stays", 0.0) if settling else 1.0
+    at = values.get("frame_compliance.settled_at", 0.1) * (largest_N or 1.0) * _kPa_per_N(experiment)
+    first = per_kPa * (settling or compliance)
+
+    def taken(stress: Array) -> Array:
+        """Strain (n,) that the frame takes at stresses (n,) in kPa."""
+        linear = stays * stress
+        return first * (linear if stays == 1.0 else linear + (1.0 - stays) * at * np.tanh(stress / at))
+
+    return _shared(
+        stress, strain, first, taken, seated, lambda e: _remembering(experiment, seated, e, values, past)
+    )
 
 
-def _shared(alone: Array, strain: Array, give: float, law: Law, stress_of: Callable[[Array], Array]) -> Array:
-    """Stress s (n,) in kPa with s = stress_of(strain - give s): a specimen in series with a frame.
+def _shared(
+    alone: Array,
+    strain: Array,
+    give: float,
+    taken: Callable[[Array], Array],
+    law: Law,
+    stress_of: Callable[[Array], Array],
+) -> Array:
+    """Stress s (n,) in kPa with s = stress_of(strain - taken(s)): a specimen in series with a frame.
 
-    alone (n,): in kPa, without the frame. strain (n,): of both. give: strain that the frame takes a kPa. law:
-    in slow loading; stress_of: with history, whose slope by a sample's own strain is not known, and arbitrary
-    where it turns. So the slope between each sample's last two values is used, which changes little at a
-    time. Raises ConvergenceError.
+    alone (n,): in kPa, without the frame. strain (n,): of both. taken: strain (n,) that the frame takes, at
+    most `give` a kPa. law: in slow loading; stress_of: with history, whose slope by a sample's own strain is
+    not known, and arbitrary where it turns. So the slope between each sample's last two values is used, which
+    changes little at a time. Raises ConvergenceError.
     """
     small = 1e-6
     slope = np.maximum((law(strain + small) - law(strain - small)) / (2 * small), 0.0)
@@ -256,7 +289,7 @@ def _shared(alone: Array, strain: Array, give: float, law: Law, stress_of: Calla
     stress, rate = alone / (1 + give * np.maximum(chord, 0.0)), 1 + give * slope
     step = miss = np.zeros_like(alone)
     for _ in range(_MOST):
-        off = stress - stress_of(strain - give * stress)
+        off = stress - stress_of(strain - taken(stress))
         if np.abs(off).max() <= 1e-11 * np.abs(stress).max():
             return stress
         seen = np.divide(off - miss, step, out=rate.copy(), where=step != 0.0)

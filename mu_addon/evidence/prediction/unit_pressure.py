@@ -23,6 +23,7 @@ from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
 from .instruments import before_the_gauge, gauge
 from .marker_slip import Recordings, slip_effects, slipped
+from .supply import supplied, supply
 
 Array = np.ndarray[Any, Any]
 
@@ -410,6 +411,7 @@ class UnitPressure:
             TWO_VOLUMES,
             *static.values(),
             *drifting,
+            *supply(self.kind, experiments),
             *camera,
             *slips,
         )
@@ -480,8 +482,8 @@ class UnitPressure:
         """Pressure (n,) in kPa at which the base unit has the state of the unit with these values.
 
         values: by key, as in `Simulator`. Applied in this order: clock offset, drift, offset, gain and curve
-        of the gauge, leak and line lag (with an open valve), modulus with temperature and fatigue,
-        viscoelasticity, hysteresis, Mullins softening.
+        of the gauge, limits of the supply, leak and line lag (with an open valve), modulus with temperature
+        and fatigue, viscoelasticity, hysteresis, Mullins softening.
         """
         t, p = experiment["time_s"], experiment["pressure_kPa"]
         past = self._past.get(experiment.name, PressureHistory())
@@ -490,6 +492,7 @@ class UnitPressure:
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
         p = before_the_gauge(p, values, self._largest_kPa)
+        p = supplied(t, p, values, self._largest_kPa)
         # With a valve shut nothing flows between gauge and chambers: both see a leak.
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)

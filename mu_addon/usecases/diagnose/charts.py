@@ -58,8 +58,11 @@ def panel(curve: Curve, extends: bool) -> str:
     every = max(1, math.ceil(len(x) / DOTS))
     spread = curve.spread
     with canvas(2.75, 2.5) as (figure, svg):
-        above = figure.add_axes((0.22, 0.45, 0.75, 0.44))
-        beneath = figure.add_axes((0.22, 0.17, 0.75, 0.22), sharex=above)
+        # Long numbers at the ticks would push the axis's title out of the picture.
+        digits = len(f"{float(np.nanmax(np.abs(curve.measured), initial=0.0)):.0f}")
+        aside = 0.22 + 0.02 * max(digits - 4, 0)
+        above = figure.add_axes((aside, 0.45, 0.97 - aside, 0.44))
+        beneath = figure.add_axes((aside, 0.17, 0.97 - aside, 0.22), sharex=above)
         above.tick_params(labelbottom=False)
         order = np.argsort(x, kind="stable")
         if spread is not None:
@@ -205,7 +208,8 @@ def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, nam
     """Share of the base model's misfit left by each single effect; the named ones in colour."""
     high = 0.75 + 0.24 * len(names)
     with canvas(WIDTH, high) as (figure, svg):
-        aside = (0.15 + 0.066 * max(map(len, names))) / WIDTH
+        shown = [_short(readable(n), 52) for n in names]
+        aside = (0.15 + 0.066 * max(map(len, shown))) / WIDTH
         axes = figure.add_axes((aside, 0.48 / high, 0.95 - aside, 1 - 0.58 / high))
         rows = np.arange(len(names))
         floor = max(min([*left, chosen]), 1e-6)
@@ -232,11 +236,11 @@ def rivals_chart(names: Sequence[str], left: Sequence[float], chosen: float, nam
 
         axes.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{100 * v:g} %"))
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.set_yticks(rows, [readable(n) for n in names], fontsize=8)
+        axes.set_yticks(rows, shown, fontsize=8)
         axes.tick_params(axis="y", length=0)
         axes.invert_yaxis()
         axes.grid(False, axis="y")
-        axes.set_xlabel("remaining misfit relative to the base model")
+        axes.set_xlabel("remaining misfit relative to the base model", loc="right")
     return svg()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...evidence.effect import SLIP, THICKNESS
+from ...evidence.effect import SLIP, SUPPLY_LIMIT, SUPPLY_RATE, THICKNESS
 
 _INSTRUMENT = "the simulation is not at fault"
 _MODEL = "simulate with --model model.toml, which has it"
@@ -37,6 +37,8 @@ TO_DO = {
     "force_drift": f"let the load cell warm up, and read its zero before and after; {_INSTRUMENT}",
     "force_lag": f"switch off the load cell's filter, or test slower; {_INSTRUMENT}",
     "line_lag": f"{_MODEL}; a shorter or wider line, or a gauge at the unit",
+    SUPPLY_LIMIT: f"set the supply to give that pressure, or log a gauge at the unit; {_INSTRUMENT}",
+    SUPPLY_RATE: f"ask for slower changes, or log a gauge at the unit; {_INSTRUMENT}",
     "leak": "find the leak (soapy water at joints and inlet) and seal it, then measure again",
     "clogged_chamber": "drain and clean the unit, and look for cured resin in its necks; print with drains",
     "gravity": f"{_MODEL}, and give the direction in which the unit hangs by --orientation",
@@ -65,7 +67,15 @@ TO_DO = {
 }
 
 
-def what_to_do(effects: tuple[str, ...]) -> str:
-    """Remedies for these causes, a sentence each; empty without any."""
-    sentences = (TO_DO[name] for name in effects)
+def in_the_simulation(effect: str) -> bool:
+    """Return True if a cause is physics that a simulation should have, not an instrument's fault."""
+    return _INSTRUMENT not in TO_DO[effect]
+
+
+def what_to_do(effects: tuple[str, ...], sure: bool = True) -> str:
+    """Remedies for these causes, a sentence each; empty without any.
+
+    sure: nothing inside the simulation would do as well; only then is it said to be right.
+    """
+    sentences = (TO_DO[name] if sure else TO_DO[name].replace(f"; {_INSTRUMENT}", "") for name in effects)
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in dict.fromkeys(sentences))

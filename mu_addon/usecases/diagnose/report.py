@@ -303,13 +303,16 @@ def _against(found: JudgedData, f: Fit, rivals: set[str]) -> str:
         return "none: named" if found.verdict.kind == "named" else "none: best fit"
     if e.title in _titles(selection.chosen):
         return "part of the best fit"
-    if e.title in rivals:
+    more = f.chi2 - selection.chosen.chi2
+    alike = min(o.chi2 for o in selection.singles if o.effects[0].title == e.title)
+    if e.title in rivals and f.chi2 < alike + RIVAL_DELTA_CHI2:
         return f"none: a rival that these data do not distinguish{bound}"
+    if e.title in rivals:
+        return f"by this law it leaves {more:.3g} more; by another one it is not distinguished{bound}"
     if gained < RIVAL_DELTA_CHI2:
         return f"no significant gain ({_figures(max(gained, 0.0))}){bound}"
     if not selection.chosen.effects:
         return f"gains {gained:.3g}, which slow noise of these records could as well{bound}"
-    more = f.chi2 - selection.chosen.chi2
     return f"leaves {more:.3g} more than the chosen model{bound}"
 
 

@@ -234,6 +234,7 @@ def _resin(model: ExtendedModel, unit: Unit | None) -> list[str]:
 def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
     """Readings that drove the model after smoothing, as text."""
     noise: dict[str, float] = {}
+    moved: dict[str, float] = {}
     stepped: dict[str, float] = {}
     for e, judged in zip(measured.experiments, verdict.experiments, strict=True):
         for column, values in judged.columns.items():
@@ -245,9 +246,12 @@ def _noisy_gauges(measured: Measured, verdict: Verdict) -> list[str]:
                 stepped[column] = max(stepped.get(column, 0.0), quantum(read))
             else:
                 noise[column] = max(noise.get(column, 0.0), reading_noise(e["time_s"], read))
+                if len(read) == len(values):
+                    far = float(np.nanmax(np.abs(read - values)))
+                    moved[column] = max(moved.get(column, 0.0), far)
     return [
-        f"the noise of {column}, up to {sd:.2g}, was averaged over straight stretches; no effect "
-        "is named for the rest"
+        f"the noise of {column}, up to {sd:.2g}, was averaged over straight stretches, by which readings "
+        f"moved by up to {moved.get(column, sd):.2g}; no effect is named for the rest"
         for column, sd in noise.items()
     ] + [
         f"{column} was read in steps of {step:.2g}; the model takes straight lines between the changes"

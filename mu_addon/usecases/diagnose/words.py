@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...evidence.effect import FORCE_SCALE, OF, SLIP, THICKNESS, Effect, Parameter
+from ...evidence.acceptance import BOUND
+from ...evidence.effect import BATCH, FORCE_SCALE, OF, SLIP, STEP, THICKNESS, Effect, Parameter
 from ...evidence.found_causes import Cause
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
@@ -17,7 +18,7 @@ from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
-from .remedies import what_to_do
+from .remedies import in_the_simulation, what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
 SPREAD = "spread"
@@ -29,6 +30,24 @@ _INSTEAD = {
 }
 _HYPHENED = re.compile(r"\b(rate|self)_(independent|heating)")
 _LATER = re.compile(r"^of tests from (.*) on$")
+_ALONE = re.compile(r": (\d+) of (\d+) readings stand alone")
+# Most names of a set in its headline.
+MOST_NAMES = 4
+# Units mistaken for others, by what they scale: the first is so many of the second's numbers.
+_FORCES = {("lbf", "N"): 0.224809, ("kgf", "N"): 0.101972}
+_PRESSURES = {
+    ("psi", "kPa"): 0.145038,
+    ("mmHg", "kPa"): 7.50062,
+    ("inHg", "kPa"): 0.2953,
+    ("mH2O", "kPa"): 0.101972,
+}
+SLIPS = {
+    FORCE_SCALE: _FORCES,
+    BATCH: _FORCES,
+    STEP: _FORCES,
+    "pressure_gain": _PRESSURES,
+}
+SLIP_SHARE = 0.03
 # Least share of a misfit for an explanation to be reported.
 LEAST_SHARE = 0.1
 # Number of intervals from which a table is used.
@@ -165,7 +184,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
             for c in found.causes
         ]
         names = listed([called(c.effect) for c in found.causes])
-        sizes += [struts] if (struts := _struts(verdict)) else []
+        sizes += [more for more in (_struts(verdict), _unit_slip(verdict), _left_out(verdict)) if more]
         if not found.left:
             return names, " ".join(sizes)
         return f"mainly {names}", " ".join([*sizes, _what_remains(verdict)])
@@ -175,16 +194,24 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         message = "Each of these effects explains the data, and these data do not distinguish them." + (
             "" if tabled else f" Fitted values: {'; '.join(sizes)}."
         )
-        message = f"{struts} {message}" if (struts := _struts(verdict)) else message
+        head = " and ".join(choices)
+        struts, more = _struts(verdict), [_unit_slip(verdict), _left_out(verdict)]
+        if sum(1 + len(c.rivals) for c in found.causes) > MOST_NAMES:
+            # Numbers first: what all these names have in common.
+            first = found.causes[0]
+            one = f"{called(first.effect)} or one of {len(first.rivals)} effects that act alike"
+            message = f"It may be {head}. {message}"
+            head = struts.rstrip(".") if struts and struts != ASK_STRUTS else one
+        message = " ".join(w for w in (struts, message, *more) if w)
         if not found.left:
-            return " and ".join(choices), message
+            return head, message
         message = message.replace("explains the data", "explains nearly all of the data")
-        return f"mainly {' and '.join(choices)}", f"{message} {_what_remains(verdict)}"
+        return f"mainly {head}" if head != struts.rstrip(".") else head, f"{message} {_what_remains(verdict)}"
     if verdict.kind == "none":
         return (
             "no model error detected",
             f"The error, {_error(verdict)}, is no larger than the noise that {_shown(verdict)}. "
-            f"{_zeros(verdict)}"
+            f"{left_out + ' ' if (left_out := _left_out(verdict)) else ''}{_zeros(verdict)}"
             f"{_limits(verdict)}",
         )
     if verdict.kind == "unidentifiable":
@@ -200,11 +227,39 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
     tried += f"The residual depends on {listed(where)}. " if where else ""
     if found.doubted:
         tried += f"{_upper(readable(found.doubted))}. "
+    at_bound = found.doubted.partition(", which")[0] if BOUND in found.doubted else ""
     return (
-        "unexplained by any known effect",
+        f"unexplained by any known effect{f'; {readable(at_bound)}' if at_bound else ''}",
         f"The model misses these data by {_error(verdict)}, and no effect of the library explains that. "
-        f"{tried}{_near(verdict)}".strip(),
+        f"{tried}{_near(verdict)} {_left_out(verdict)}".strip(),
     )
+
+
+def _left_out(verdict: Verdict) -> str:
+    """Number of readings that stand alone and do not count, as a sentence; empty without any."""
+    found = [m for words in verdict.set_aside if (m := _ALONE.search(words))]
+    count, every = (sum(int(m[k]) for m in found) for k in (1, 2))
+    return (
+        f"{count} of {every} readings of {len(found)} records stand alone and do not count." if count else ""
+    )
+
+
+def _unit_slip(verdict: Verdict) -> str:
+    """Unit in which some readings would be as others are, by a fitted factor on them; empty without any."""
+    for c in verdict.selection.causes:
+        key = c.effect.keys[0]
+        if c.effect.among or not c.effect.whose or c.effect.name not in SLIPS:
+            continue
+        factor, (low, high) = 1.0 + verdict.selection.chosen.values[key], verdict.intervals[key]
+        for (unit, other), known in SLIPS[c.effect.name].items():
+            for written, under, times in ((unit, other, known), (other, unit, 1.0 / known)):
+                near = abs(factor / times - 1.0) < SLIP_SHARE or low < times - 1.0 < high
+                if near and high - low < SLIP_SHARE * 10.0 * factor:
+                    return (
+                        f"Readings {factor:.3g} times as large: as if {c.effect.whose} were in {written} "
+                        f"under a heading in {under}; check the unit."
+                    )
+    return ""
 
 
 def _limits(verdict: Verdict) -> str:
@@ -332,7 +387,8 @@ def _asked(verdict: Verdict) -> str:
         return f"{_upper(verdict.proposal.what)}. It {it}."
     found = verdict.selection
     if verdict.kind == "named":
-        return f"To confirm it on new data: {'; '.join(c.effect.reveals for c in found.causes)}."
+        shown = dict.fromkeys(c.effect.reveals for c in found.causes)
+        return f"To confirm it on new data: {'; '.join(shown)}."
     if verdict.kind == "unexplained":
         places = [d for d in found.table if d.against in found.left and d.where and d.against != SPREAD]
         places.sort(key=lambda d: d.p_value)
@@ -342,7 +398,7 @@ def _asked(verdict: Verdict) -> str:
         return f"Repeat {which} unchanged: a deviation that does not recur is not a model error.{at}"
     hidden = [s for s in best_seen(verdict.seen).values() if not s.identifiable]
     if not hidden:
-        return ""
+        return 'One more experiment like those it is needed for, with role = "held_out", checks that.'
     shows: dict[str, list[str]] = {}
     for s in hidden:
         shows.setdefault(s.effect.reveals, []).append(s.effect.name)
@@ -365,7 +421,8 @@ def to_do(verdict: Verdict) -> str:
         return "Make the next measurement below before anything is changed."
     if verdict.kind == "unexplained":
         return f"Do not trust the simulation to better than {_error(verdict)} until this is explained."
-    return what_to_do(verdict.names)
+    doubtful = any(in_the_simulation(name) for name in verdict.in_question - {*verdict.names})
+    return what_to_do(verdict.names, not (doubtful or verdict.refused or verdict.selection.left))
 
 
 def _with_moduli(verdict: Verdict) -> str:
