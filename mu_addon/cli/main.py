@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from . import all_commands
 from .completion import SHELLS, Complete
+from .resume import KEPT
 
 if TYPE_CHECKING:
     from ..run.progress import Sink
@@ -131,7 +132,9 @@ def main(arguments: list[str]) -> int:
     progress = Progress([to_watcher(send), sink_of(options)])
     with run_to_end(progress) as context:
         _require_usable(options)
-        context.wants_report = getattr(options, "report", True)
+        context.wants_report = getattr(options, "report", True) is not False
+        if given := {name: getattr(options, name) for name in KEPT if hasattr(options, name)}:
+            context.summary["options"] = given
         context.short_report = _short_report
         with context.progress.beating():
             command.run(options, context)

@@ -51,7 +51,7 @@ RECORD = 10
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
     """Prepare a folder for a diagnosis; a complete verdict on the same inputs goes into the summary."""
     inputs = job.texts()
-    context.summary |= _kept(folder, inputs)
+    context.summary = _kept(folder, inputs) | context.summary
     begin(context, folder, LAYOUT, inputs)
 
 
