@@ -298,7 +298,14 @@ def modelled_unit(options: argparse.Namespace, context: RunContext) -> Unit:
 
 
 def _report_applied(found: Extended, options: argparse.Namespace, context: RunContext) -> Extended:
+    if found.doubt:
+        remedy = "make the measurement that the diagnosis proposes before you trust this simulation"
+        context.progress.warning(f"the model's {found.doubt}", str(options.model), remedy)
     for words in found.left_out:
         context.progress.warning(f"not applied here: {words}", str(options.model))
-    context.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
+    context.summary["model"] = {
+        "applied": found.applied,
+        "left_out": found.left_out,
+        "doubt": found.doubt,
+    }
     return found

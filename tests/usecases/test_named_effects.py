@@ -392,18 +392,21 @@ def test_what_has_no_place_in_a_simulation_is_left_out_and_says_why():
         "mesh_error": {"share": Fitted(1.0, 0, 0, 0)},
         "gravity": {"density_kg_m3": Fitted(1100.0, 0, 0, 0)},
     }
-    found = extend(UNIT, ExtendedModel("ambiguous", effects, {}))
+    found = extend(UNIT, ExtendedModel("ambiguous", effects, {}, rivals=("line_lag", "leak of specimen B")))
     assert found.unit == UNIT
     assert found.effects.sizes == {"gravity": 1100.0}
     assert found.applied == ("solid parts have a density of 1100 kg/m³",)
-    ambiguous, gain, contact, finer = found.left_out
-    assert "ambiguous" in ambiguous
+    assert "gravity" in found.doubt
+    assert "line lag or leak of specimen B" in found.doubt
+    gain, contact, finer = found.left_out
     assert "gauge" in gain
     assert "--obstacle" in contact
     assert "--refine" in finer
     # What a file keeps of it says as much of gravity, and nothing of the rest.
     assert list(found.kept.effects) == ["gravity"]
-    assert extend(UNIT, found.kept).effects == found.effects
+    again = extend(UNIT, found.kept)
+    assert again.effects == found.effects
+    assert "line lag" in again.doubt
     part = found.of_parameters()
     assert not part.effects
     assert part.applied == ()

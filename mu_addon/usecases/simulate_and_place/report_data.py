@@ -91,7 +91,9 @@ def _panel_pictures(study: Study) -> None:
 def _of_model(study: Study) -> list[str]:
     """Changes that an extended model made to the unit, and those that were left out, as text."""
     model = study.context.summary.get("model", {})
+    doubt = model.get("doubt")
     return [
+        *([f"The extended model's {doubt}."] if doubt else []),
         *(f"Applied from the extended model: {words}." for words in model.get("applied", ())),
         *(f"Not applied from the extended model: {words}." for words in model.get("left_out", ())),
     ]
