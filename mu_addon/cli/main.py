@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from . import all_commands
+from .closed_pipe import leave_quietly, until_closed
 from .completion import SHELLS, Complete
 from .resume import KEPT
 
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 STATUSES = (
     "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
-    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 143 terminated"
+    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 141 output closed, "
+    "143 terminated"
 )
 
 
@@ -113,12 +115,22 @@ def sink_of(options: argparse.Namespace) -> Sink:
     """Sink of messages by --json and --quiet: lines on a terminal, or JSON; all, or only the outcome."""
     from ..run.progress import json_lines, outcome, terminal
 
-    sink = json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr)
+    sink = until_closed(json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr))
     return outcome(sink) if options.quiet else sink
 
 
 def main(arguments: list[str]) -> int:
     """Run one command line; returns its exit status and never raises."""
+    try:
+        return _main(arguments)
+    except BrokenPipeError:
+        # While the results were printed: the run itself has ended.
+        return 0
+    finally:
+        leave_quietly()
+
+
+def _main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments)
     command = all_commands()[options.command]
 

@@ -74,7 +74,8 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
             sys.stderr.flush()
 
     def hear(words: bytes) -> None:
-        with suppress(ModuleNotFoundError):
+        # Without a reader the worker ends by itself.
+        with suppress(ModuleNotFoundError, BrokenPipeError, MuError):
             heartbeat().hear(words)
 
     return hear
