@@ -219,6 +219,9 @@ def test_parameters_are_changed_by_their_names_all_at_once():
         unit.evolve(wal_mm=1.0)
     with pytest.raises(InputError, match="wall_mm = 60 mm is out of bounds"):
         unit.evolve(wall_mm=60)
+    # A section's name is no parameter's: its value would have been kept beside a wall that stays.
+    with pytest.raises(InputError, match="did you mean 'wall_mm'"):
+        unit.evolve(wall=1.0)
 
 
 def test_unknown_preset_names_those_there_are():
