@@ -9,7 +9,7 @@ import numpy as np
 
 from ...design.parameters import assumed, stated
 from ...errors import InputError
-from ...files import write_bytes
+from ...files import write_bytes, write_text
 from ...report.results import (
     Gate,
     PaintedStates,
@@ -37,12 +37,13 @@ FILES = {
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
     "mesh.vtu": "analysis mesh with regions and moduli",
-    "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
-    "angle.csv": "bending angle of every converged state",
+    "model_a.pvd": "motion without a sensor: displacement, stress and stretch of each sample (ParaView)",
+    "motion.csv": "pressure, bending angle, tip and volume of the cavity over time",
+    "angle.svg": "bending angle against pressure",
     "stretch.csv": "largest stretch of wall, struts and joints in every state, and how near to break",
     "self_contact.csv": "force, gap and largest pressure of the unit's contact with itself in every state",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
-    "deviation.csv": "deviation and rank of every path",
+    "deviation.csv": "deviation and rank of every path, its mesh uncertainty and ties",
     "delta.npz": "deviation over time and length of every path, mm",
     "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
     "signals.csv": "light signal of each path, and its deviation",
@@ -77,11 +78,13 @@ def write_report(study: Study, stopped: str = "") -> None:
 
 def _panel_pictures(study: Study) -> None:
     """Write pictures of the study's results for panels, into its folder of the motion."""
+    from ...report.plots import angle_against_pressure
     from .charts import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
         return
     write_angle(study.folder, *study.motion_in_order())
+    write_text(study.folder / "angle.svg", angle_against_pressure(*study.motion_in_order()))
     found = study.ranking.evaluations.values()
     top = max((float(np.nanmax(e.deviation.delta)) for e in found), default=0.0)
     for e in found:
