@@ -28,11 +28,26 @@ STATUSES = (
 _OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
 
 
+# The page of the guide on each command.
+PAGES = {
+    **dict.fromkeys(("presets", "design"), "design"),
+    **dict.fromkeys(("check", "export", "specimens"), "print"),
+    **dict.fromkeys(("simulate", "homogenize"), "simulate"),
+    **dict.fromkeys(("resume", "compare"), "runs"),
+    **dict.fromkeys(("sweep", "optimize", "graph"), "search"),
+    **dict.fromkeys(("grip", "chain"), "assemblies"),
+    **dict.fromkeys(("fit-material", "import", "track", "diagnose", "design-experiments"), "measure"),
+    **dict.fromkeys(("ports", "stream", "record", "replay", "calibrate"), "bench"),
+    "place": "sense",
+}
+
+
 class _Commands(argparse._SubParsersAction):
-    """Shows a subcommand's summary in its own --help, too, and gives every subcommand --quiet."""
+    """Shows a subcommand's summary and page in its own --help, too, and gives every subcommand --quiet."""
 
     def add_parser(self, name: str, **options: Any) -> Any:
-        command = super().add_parser(name, description=options["help"], **options)
+        words = f"{options['help']} Page: docs/guide/{PAGES[name]}.md."
+        command = super().add_parser(name, description=words, allow_abbrev=False, **options)
         command.add_argument(
             "--quiet",
             action="store_true",
@@ -43,6 +58,31 @@ class _Commands(argparse._SubParsersAction):
 
 class _Parser(argparse.ArgumentParser):
     """Reports an error in one line, with the closest valid word, and where help is."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """The options; an option that a command does not have ends the process, with what may be meant."""
+        options, unknown = self.parse_known_args(args, namespace)
+        for word in unknown:
+            if word.startswith("-"):
+                self._refuse(options.command, word.partition("=")[0])
+        if unknown:
+            self.error(f"unexpected: {' '.join(unknown)}")
+        return options
+
+    def _refuse(self, command: str, flag: str) -> None:
+        from ..design.parameters import SECTIONS
+        from ..design.quantity import describe
+        from ..errors import did_you_mean
+
+        (choices,) = [action.choices for action in self._actions if isinstance(action, _Commands)]
+        known = [own for action in choices[command]._actions for own in action.option_strings]
+        name, hint = flag.lstrip("-").replace("-", "_"), did_you_mean(flag, known, 0.75)
+        for section in () if hint else SECTIONS:
+            table = str(section.section)  # type: ignore[attr-defined]
+            for d in describe(section):
+                if not hint and name in (table, d.name, d.name.removesuffix(f"_{d.unit}")):
+                    hint = f": the file of --unit sets [{table}] {d.name}, see docs/guide/parameters.md"
+        choices[command].error(f"{command} has no option {flag}{hint}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:

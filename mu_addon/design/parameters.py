@@ -619,9 +619,13 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Unit:
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
     document = toml_text.parse(text, keys, origin)
     with toml_text.located(text, origin):
-        if document.get("format") != FORMAT or document["format"] is True:
+        if "format" not in document:
             raise InputError(
-                f"format = {document.get('format', 'missing')} is not known here",
+                "the file does not say its format", "format", f"add format = {FORMAT} at its top"
+            )
+        if document["format"] != FORMAT or document["format"] is True:
+            raise InputError(
+                f"format = {document['format']} is not known here",
                 "format",
                 f"write format = {FORMAT}, the only one so far",
             )
