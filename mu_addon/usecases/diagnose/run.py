@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -160,7 +161,9 @@ def _first_look(
     with _stages(progress) as on_model:
         verdict = diagnose(experiments, simulator, on_model)
     headline, words = sentence(verdict)
-    with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
+    look = f"first look, without weight, walls and print: {verdict.kind}, {headline}"
+    # With share and seconds a line of at most 100 columns.
+    with progress.stage(shorten(look, 76, placeholder=" ...")):
         pass
     return {"verdict": verdict.kind, "headline": headline, "sentence": words}
 

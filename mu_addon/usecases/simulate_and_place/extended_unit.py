@@ -186,7 +186,8 @@ def _as_printed(model: ExtendedModel) -> Put:
             raise InputError(f"its lattice modulus would be {modulus}", "lattice_modulus_kPa", "")
         material = attrs.evolve(unit.material, lattice_modulus_kPa=modulus)
         return attrs.evolve(unit, material=material), (
-            f"the lattice's modulus at {unit.scale:g}x is {modulus:.4g} kPa ({drawn_kPa:.4g} kPa as drawn)"
+            f"a block of the lattice between plates has {modulus:.4g} kPa at {unit.scale:g}x as printed, "
+            f"{drawn_kPa:.4g} kPa as drawn; a printed body takes neither"
         )
 
     return put
