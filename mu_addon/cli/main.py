@@ -46,7 +46,8 @@ class _Commands(argparse._SubParsersAction):
     """Shows a subcommand's summary and page in its own --help, too, and gives every subcommand --quiet."""
 
     def add_parser(self, name: str, **options: Any) -> Any:
-        words = f"{options['help']} Page: docs/guide/{PAGES[name]}.md."
+        page = f" Page: docs/guide/{PAGES[name]}.md." if name in PAGES else ""
+        words = f"{options['help']}{page}"
         command = super().add_parser(name, description=words, allow_abbrev=False, **options)
         command.add_argument(
             "--quiet",

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import mu_addon
+from mu_addon.cli import all_commands
 from mu_addon.cli.main import PAGES, main
 
 ROOT = Path(mu_addon.__file__).parents[1]
@@ -52,5 +53,6 @@ def test_an_option_that_a_command_lacks_is_told_with_what_may_be_meant(option, t
 
 
 def test_every_command_names_its_page():
+    assert PAGES.keys() == all_commands().keys()
     for name, page in PAGES.items():
         assert (ROOT / "docs" / "guide" / f"{page}.md").is_file(), name

@@ -21,7 +21,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
-from mu_addon.usecases.simulate_and_place.run import console_summary, run_stages
+from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 from tests.design.kinds import custom, octet
 
@@ -144,6 +144,23 @@ def test_a_change_costs_only_what_depends_on_it(copied, change, mesh, states):
         after = times(folder, kind)
         assert len(after) == count
         assert before[kind].items() <= after.items()
+
+
+def test_a_report_of_the_same_figures_is_not_drawn_again(tmp_path):
+    job = attrs.evolve(JOB, stages=("design",), unit=JOB.unit.evolve(count=3))
+
+    def drawn(wanted):
+        """When the report was written, after a run of a job."""
+        with run_to_end(Progress()) as context:
+            USE_CASE.start(wanted, tmp_path, context)
+        assert context.status == 0
+        return (tmp_path / "report.html").stat().st_mtime_ns
+
+    first = drawn(job)
+    assert drawn(job) == first
+    (tmp_path / "report.html").unlink()
+    assert drawn(job) > first
+    assert drawn(with_wall(job, 1.0)) > first
 
 
 @pytest.mark.parametrize("stages", [("design",), ("design", "simulate")])

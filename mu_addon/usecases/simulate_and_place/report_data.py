@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -9,7 +10,7 @@ import numpy as np
 
 from ...design.parameters import assumed, stated
 from ...errors import InputError
-from ...files import write_bytes, write_text
+from ...files import plain, write_bytes, write_text
 from ...report.results import (
     Gate,
     PaintedStates,
@@ -20,6 +21,7 @@ from ...report.results import (
     ReportData,
     SideView,
 )
+from ...run.cache import key
 from ...run.versions import package_versions
 from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
@@ -57,13 +59,16 @@ FILES = {
 def write_report(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped`: why an incomplete study stopped.
 
-    Pictures take most of the time: a run that was asked to stop leaves them out. An existing report on more
-    stages, from the same inputs, is kept.
+    Pictures take most of the time: a run that was asked to stop leaves them out. An existing report on the
+    same figures, or on more stages from the same inputs, is kept.
     """
     from .report import write_html
 
-    if study.has_more and (study.folder / "report.html").is_file():
+    summary, figures = study.context.summary, _figures(study)
+    same = summary.get("report_of") == figures and not stopped
+    if (study.has_more or same) and (study.folder / "report.html").is_file():
         return
+    summary.pop("report_of", None)
     with study.progress.stage("report"):
         versions = package_versions()
         view, pictures = _pictures(study)
@@ -74,6 +79,18 @@ def write_report(study: Study, stopped: str = "") -> None:
         data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
         study.progress.update(0.9)
         write_html(study.folder / "report.html", data)
+    if not stopped:
+        summary["report_of"] = figures
+
+
+# Of a summary what no report shows, or differs each time.
+_NOT_SHOWN = ("seconds", "options", "status", "report_of")
+
+
+def _figures(study: Study) -> str:
+    """Hash of the figures that a report shows: those of summary.json, with the versions of the packages."""
+    shown = {name: value for name, value in study.context.summary.items() if name not in _NOT_SHOWN}
+    return key(json.dumps(plain(shown), sort_keys=True), study.job.text())
 
 
 def _panel_pictures(study: Study) -> None:
