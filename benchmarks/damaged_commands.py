@@ -279,16 +279,16 @@ def attack(work, make, count, seed, run, reference=None):
 
 def same_angles(study, work, count, seed):
     """How many studies of so many, entries of whose cache were damaged, found other angles, or none."""
-    reference, wrong = (study / "angle.csv").read_bytes(), 0
+    reference, wrong = (study / "motion.csv").read_bytes(), 0
     for number in range(count):
         random_, folder = random.Random(f"angles {seed} {number}"), work / "again"
         shutil.copytree(study, folder)
         for path in sorted(folder.glob("cache/*.npz")):
             path.write_bytes(mutated(random_, path.read_bytes()))
-        (folder / "angle.csv").unlink()
+        (folder / "motion.csv").unlink()
         line = [sys.executable, str(ROOT / "headless" / "run.py"), "resume", str(folder), "--no-report"]
         status = subprocess.run(line, capture_output=True, check=False).returncode
-        wrong += status != 0 or (folder / "angle.csv").read_bytes() != reference
+        wrong += status != 0 or (folder / "motion.csv").read_bytes() != reference
         shutil.rmtree(folder)
     return wrong
 
@@ -313,7 +313,7 @@ def main():
         study = Path(name) / "reference"
         assert command_line.main([*SIMULATE, "--out", str(study)]) == 0
         assert json.loads((study / "summary.json").read_text())["status"] == "complete"
-        assert np.isfinite(np.loadtxt(study / "angle.csv", delimiter=",", comments="#", skiprows=1)).all()
+        assert np.isfinite(np.loadtxt(study / "motion.csv", delimiter=",", comments="#", skiprows=1)).all()
         placed = Path(name) / "placed"
         reference = placed_in(placed)
         found = kinds(study, placed)

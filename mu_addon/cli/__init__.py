@@ -21,6 +21,7 @@ NAMES = (
     "simulate",
     "place",
     "resume",
+    "compare",
     "sweep",
     "optimize",
     "graph",

@@ -60,13 +60,20 @@ def add(commands: Commands[Any]) -> None:
         help="Vent the cups that trap resin when the unit is built along this direction, away from the "
         "platform: a hole through the wall for each cup, in STL and 3MF, and plug-1.stl, ... to close it.",
     )
+    command.add_argument(
+        "--deformed",
+        nargs=2,
+        metavar=("KPA", "RUN"),
+        help="Also write the unit as it is at a pressure, by the motion in the folder of a `simulate` or "
+        "`place` run of it (with --path: of a `place` run).",
+    )
     add_setting(command, RESIN, "NAME|FILE")
 
 
 def run(options: argparse.Namespace, context: RunContext) -> None:
     """Export the unit."""
     from ..design.printing.sheets import compensation_offsets
-    from ..usecases.export.job import Job, path_of, resin_of
+    from ..usecases.export.job import Job, deformed_in, path_of, resin_of
     from ..usecases.export.run import USE_CASE
 
     unit = modelled_unit(options, context)
@@ -82,5 +89,17 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
         take_off=offsets,
         offset_source=source,
         vent_along=None if options.vent_along is None else tuple(options.vent_along),
+        deformed=None
+        if options.deformed is None
+        else deformed_in(Path(options.deformed[1]), unit, _pressure_kPa(options.deformed[0])),
     )
     USE_CASE.start(job, Path(options.out), context)
+
+
+def _pressure_kPa(words: str) -> float:
+    from ..errors import InputError
+
+    try:
+        return float(words)
+    except ValueError:
+        raise InputError(f"{words!r} is not a number", "--deformed", "give kPa, then a folder") from None

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from . import all_commands
+from .closed_pipe import leave_quietly, until_closed
 from .completion import SHELLS, Complete
+from .resume import KEPT
 
 if TYPE_CHECKING:
     from ..run.progress import Sink
 
 STATUSES = (
     "exit status: 0 success, 1 other failure, 2 invalid input, 3 meshing failed, 4 no equilibrium found, 5 "
-    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 143 terminated"
+    "cannot write, 6 not printable, 70 internal error, 71 crashed or killed, 130 Ctrl-C, 141 output closed, "
+    "143 terminated"
 )
 
 
@@ -25,11 +28,27 @@ STATUSES = (
 _OPTIONS = {"wall_resin": "--resin", "obstacles": "--obstacle"}
 
 
+# The page of the guide on each command.
+PAGES = {
+    **dict.fromkeys(("presets", "design"), "design"),
+    **dict.fromkeys(("check", "export", "specimens"), "print"),
+    **dict.fromkeys(("simulate", "homogenize"), "simulate"),
+    **dict.fromkeys(("resume", "compare"), "runs"),
+    **dict.fromkeys(("sweep", "optimize", "graph"), "search"),
+    **dict.fromkeys(("grip", "chain"), "assemblies"),
+    **dict.fromkeys(("fit-material", "import", "track", "diagnose", "design-experiments"), "measure"),
+    **dict.fromkeys(("ports", "stream", "record", "replay", "calibrate"), "bench"),
+    "place": "sense",
+}
+
+
 class _Commands(argparse._SubParsersAction):
-    """Shows a subcommand's summary in its own --help, too, and gives every subcommand --quiet."""
+    """Shows a subcommand's summary and page in its own --help, too, and gives every subcommand --quiet."""
 
     def add_parser(self, name: str, **options: Any) -> Any:
-        command = super().add_parser(name, description=options["help"], **options)
+        page = f" Page: docs/guide/{PAGES[name]}.md." if name in PAGES else ""
+        words = f"{options['help']}{page}"
+        command = super().add_parser(name, description=words, allow_abbrev=False, **options)
         command.add_argument(
             "--quiet",
             action="store_true",
@@ -40,6 +59,31 @@ class _Commands(argparse._SubParsersAction):
 
 class _Parser(argparse.ArgumentParser):
     """Reports an error in one line, with the closest valid word, and where help is."""
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """The options; an option that a command does not have ends the process, with what may be meant."""
+        options, unknown = self.parse_known_args(args, namespace)
+        for word in unknown:
+            if word.startswith("-"):
+                self._refuse(options.command, word.partition("=")[0])
+        if unknown:
+            self.error(f"unexpected: {' '.join(unknown)}")
+        return options
+
+    def _refuse(self, command: str, flag: str) -> None:
+        from ..design.parameters import SECTIONS
+        from ..design.quantity import describe
+        from ..errors import did_you_mean
+
+        (choices,) = [action.choices for action in self._actions if isinstance(action, _Commands)]
+        known = [own for action in choices[command]._actions for own in action.option_strings]
+        name, hint = flag.lstrip("-").replace("-", "_"), did_you_mean(flag, known, 0.75)
+        for section in () if hint else SECTIONS:
+            table = str(section.section)  # type: ignore[attr-defined]
+            for d in describe(section):
+                if not hint and name in (table, d.name, d.name.removesuffix(f"_{d.unit}")):
+                    hint = f": the file of --unit sets [{table}] {d.name}, see docs/guide/parameters.md"
+        choices[command].error(f"{command} has no option {flag}{hint}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
@@ -112,12 +156,22 @@ def sink_of(options: argparse.Namespace) -> Sink:
     """Sink of messages by --json and --quiet: lines on a terminal, or JSON; all, or only the outcome."""
     from ..run.progress import json_lines, outcome, terminal
 
-    sink = json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr)
+    sink = until_closed(json_lines(sys.stdout) if getattr(options, "json", False) else terminal(sys.stderr))
     return outcome(sink) if options.quiet else sink
 
 
 def main(arguments: list[str]) -> int:
     """Run one command line; returns its exit status and never raises."""
+    try:
+        return _main(arguments)
+    except BrokenPipeError:
+        # While the results were printed: the run itself has ended.
+        return 0
+    finally:
+        leave_quietly()
+
+
+def _main(arguments: list[str]) -> int:
     options = parser().parse_args(arguments)
     command = all_commands()[options.command]
 
@@ -131,7 +185,9 @@ def main(arguments: list[str]) -> int:
     progress = Progress([to_watcher(send), sink_of(options)])
     with run_to_end(progress) as context:
         _require_usable(options)
-        context.wants_report = getattr(options, "report", True)
+        context.wants_report = getattr(options, "report", True) is not False
+        if given := {name: getattr(options, name) for name in KEPT if hasattr(options, name)}:
+            context.summary["options"] = given
         context.short_report = _short_report
         with context.progress.beating():
             command.run(options, context)

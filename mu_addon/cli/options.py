@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from ..usecases.simulate_and_place.extended_unit import Extended
     from ..usecases.simulate_and_place.named_effects import NamedEffects
 
-Commands = argparse._SubParsersAction  # what add_subparsers returns; argparse gives it no public name
+# What add_subparsers returns, and what takes an option: argparse gives them no public names.
+Commands = argparse._SubParsersAction
+Group = argparse._ArgumentGroup | argparse.ArgumentParser
 
 
-def add_setting(
-    command: argparse.ArgumentParser, d: Description, metavar: Any = None, many: bool = False
-) -> None:
+def add_setting(command: Group, d: Description, metavar: Any = None, many: bool = False) -> None:
     """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
 
     Its name is the setting's without the unit; many: it takes several words. Bounds are checked by the job. A
@@ -98,7 +98,7 @@ def add_scheduler(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_model(command: argparse.ArgumentParser) -> None:
+def add_model(command: Group) -> None:
     """--model, the result of a diagnosis."""
     command.add_argument(
         "--model",
@@ -109,7 +109,7 @@ def add_model(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_orientation(command: argparse.ArgumentParser) -> None:
+def add_orientation(command: Group) -> None:
     """--orientation, the direction of gravity."""
     from ..usecases.simulate_and_place.settings import ORIENTATION
 
@@ -118,7 +118,7 @@ def add_orientation(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_resin(command: argparse.ArgumentParser) -> None:
+def add_resin(command: Group) -> None:
     """--resin, the material of the wall."""
     command.add_argument(
         "--resin",
@@ -130,7 +130,7 @@ def add_resin(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_device(command: argparse.ArgumentParser) -> None:
+def add_device(command: Group) -> None:
     """--device."""
     from ..fem.device import DEVICE
 
@@ -143,14 +143,14 @@ def add_measured_folder(command: argparse.ArgumentParser, help_: str = "") -> No
     command.add_argument("folder", metavar="FOLDER", help=words)
 
 
-def add_solid(command: argparse.ArgumentParser) -> None:
+def add_solid(command: Group) -> None:
     """Add the option for the STL's facet resolution."""
     from ..design.settings import QUALITY
 
     add_setting(command, QUALITY)
 
 
-def add_body(command: argparse.ArgumentParser) -> None:
+def add_body(command: Group) -> None:
     """Options of a user-defined body."""
     command.add_argument(
         "--body",
@@ -160,7 +160,7 @@ def add_body(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_obstacles(command: argparse.ArgumentParser) -> None:
+def add_obstacles(command: Group) -> None:
     """Rigid bodies that the unit may touch, each with its friction."""
     from ..design.settings import FRICTION
 
@@ -199,7 +199,7 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_struts(command: argparse.ArgumentParser) -> None:
+def add_struts(command: Group) -> None:
     """--solid-struts and --self-contact of a printed body."""
     from ..meshing.settings import SOLID_STRUTS
 
@@ -207,7 +207,7 @@ def add_struts(command: argparse.ArgumentParser) -> None:
     add_self_contact(command)
 
 
-def add_self_contact(command: argparse.ArgumentParser) -> None:
+def add_self_contact(command: Group) -> None:
     """--self-contact and --no-self-contact."""
     from ..meshing.settings import SELF_CONTACT
 
@@ -217,19 +217,6 @@ def add_self_contact(command: argparse.ArgumentParser) -> None:
         default=SELF_CONTACT.default,
         help=help_of(SELF_CONTACT),
     )
-
-
-def add_simulation(command: argparse.ArgumentParser) -> None:
-    """Protocol, mesh and material of a simulation."""
-    from ..meshing.settings import REFINE
-    from ..usecases.simulate_and_place.settings import PROTOCOL, SELF_FRICTION, TIMES
-
-    add_setting(command, PROTOCOL, "CSV")
-    add_setting(command, REFINE, "F")
-    add_struts(command)
-    add_setting(command, SELF_FRICTION, "MU")
-    add_setting(command, TIMES, "K")
-    add_device(command)
 
 
 def require_out(options: argparse.Namespace) -> None:
@@ -298,7 +285,14 @@ def modelled_unit(options: argparse.Namespace, context: RunContext) -> Unit:
 
 
 def _report_applied(found: Extended, options: argparse.Namespace, context: RunContext) -> Extended:
+    if found.doubt:
+        remedy = "make the measurement that the diagnosis proposes before you trust this simulation"
+        context.progress.warning(f"the model's {found.doubt}", str(options.model), remedy)
     for words in found.left_out:
         context.progress.warning(f"not applied here: {words}", str(options.model))
-    context.summary["model"] = {"applied": found.applied, "left_out": found.left_out}
+    context.summary["model"] = {
+        "applied": found.applied,
+        "left_out": found.left_out,
+        "doubt": found.doubt,
+    }
     return found

@@ -118,8 +118,9 @@ def shown(options: argparse.Namespace) -> Sink | None:
         return None
     from ..run.progress import json_lines
     from ..usecases.sensor.stream import Display
+    from .closed_pipe import until_closed
 
-    return json_lines(sys.stdout) if options.json else Display(sys.stdout)
+    return until_closed(json_lines(sys.stdout) if options.json else Display(sys.stdout))
 
 
 def add_replay(commands: Commands[Any]) -> None:

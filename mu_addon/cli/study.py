@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from .options import (
     add_body,
+    add_device,
     add_model,
     add_obstacles,
     add_orientation,
     add_report,
     add_resin,
     add_setting,
-    add_simulation,
     add_solid,
+    add_struts,
     add_unit,
     modelled,
     unit_of,
@@ -24,7 +25,7 @@ from .options import (
 if TYPE_CHECKING:
     from ..run.context import RunContext
     from ..usecases.simulate_and_place.job import Job
-    from .options import Commands
+    from .options import Commands, Group
 
 
 def add_design(commands: Commands[Any]) -> None:
@@ -50,24 +51,36 @@ def add_simulate(commands: Commands[Any]) -> None:
     """Add the parser of `simulate`."""
     command = commands.add_parser(
         "simulate",
-        help="Run `design`, then simulate the unit's motion under a pressure protocol.",
+        help="Run `design`, then simulate the unit's motion under a pressure protocol: the stage Model A, "
+        "without a sensor.",
         epilog="example: run.py simulate --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
     )
     _add_motion(command)
     command.set_defaults(stages=("design", "simulate"))
 
 
-def _add_motion(command: argparse.ArgumentParser) -> None:
-    """Add the options that `simulate` and `place` share."""
+def _add_motion(command: argparse.ArgumentParser) -> Group:
+    """Add the options that `simulate` and `place` share; return the group of those of mesh and solver."""
+    from ..meshing.settings import REFINE
+    from ..usecases.simulate_and_place.settings import PROTOCOL, SELF_FRICTION, TIMES
+
     add_unit(command)
     add_report(command)
-    add_model(command)
-    add_orientation(command)
-    add_resin(command)
-    add_solid(command)
-    add_body(command)
-    add_obstacles(command)
-    add_simulation(command)
+    add_setting(command, PROTOCOL, "CSV")
+    add_setting(command, REFINE, "F")
+    around = command.add_argument_group("unit and surroundings")
+    add_resin(around)
+    add_model(around)
+    add_orientation(around)
+    add_body(around)
+    add_obstacles(around)
+    solver = command.add_argument_group("mesh and solver")
+    add_setting(solver, TIMES, "K")
+    add_struts(solver)
+    add_setting(solver, SELF_FRICTION, "MU")
+    add_solid(solver)
+    add_device(solver)
+    return solver
 
 
 def add_place(commands: Commands[Any]) -> None:
@@ -82,22 +95,22 @@ def add_place(commands: Commands[Any]) -> None:
     command = commands.add_parser(
         "place",
         help="Run `design` and `simulate`, then rank the sensor paths by how much each disturbs the "
-        "motion (the main job).",
+        "motion of Model A, the unit without a sensor (the main job).",
         epilog="example: run.py place --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
     )
-    _add_motion(command)
-    add_setting(command, STATIONS, "J")
+    solver = _add_motion(command)
     add_setting(command, WORKERS, "N")
-    add_setting(command, MESH_CHECK)
-    add_setting(command, PATHS)
-    command.add_argument(
+    add_setting(solver, STATIONS, "J")
+    add_setting(solver, MESH_CHECK)
+    search = command.add_argument_group("paths, and limits of --paths graph")
+    add_setting(search, PATHS)
+    search.add_argument(
         "--light",
         nargs="+",
         default=(),
         metavar="NAME=VALUE",
         help=f"Optical constants of the resin, assumed by default: {constants}.",
     )
-    search = command.add_argument_group("limits of --paths graph")
     add_setting(search, SHORTEST, "C")
     add_setting(search, LONGEST, "C")
     add_setting(search, BEND, "A")

@@ -74,7 +74,8 @@ def _heartbeat(line: Sequence[str]) -> Callable[[bytes], None]:
             sys.stderr.flush()
 
     def hear(words: bytes) -> None:
-        with suppress(ModuleNotFoundError):
+        # Without a reader the worker ends by itself.
+        with suppress(ModuleNotFoundError, BrokenPipeError, MuError):
             heartbeat().hear(words)
 
     return hear
@@ -97,7 +98,7 @@ def tell_crash(line: Sequence[str], crash: Crash) -> None:
     error = asked_to_stop(crash.asked, folder) if crash.asked else _error(options, folder, stage, made, crash)
     if folder is not None:
         record_crash(folder, error, crash.stack)
-    if folder is not None and crash.asked and getattr(options, "report", True):
+    if folder is not None and crash.asked and getattr(options, "report", True) is not False:
         from ..report.stopped import write_stopped_report
 
         # Whatever the error, the message below must be printed.

@@ -425,6 +425,17 @@ def _printable(unit: Any, field: Any, value: Any) -> None:
         )
 
 
+def _is_section(unit: Any, field: Any, value: Any) -> None:
+    kind = field.default.factory
+    if not isinstance(value, kind):
+        names = [d.name for section in SECTIONS for d in describe(section)]
+        raise InputError(
+            f"{field.name} is a section of parameters, not a value{did_you_mean(field.name, names)}",
+            f"{field.name} = {value!r}",
+            f"give a parameter by its name, or the whole section as a {kind.__name__}",
+        )
+
+
 @attrs.frozen
 class Unit:
     """All parameters of one Monolithic Unit, at scale 1; `dimensions` are the lengths at its scale.
@@ -442,13 +453,13 @@ class Unit:
 
     name: str = attrs.field(default="custom", validator=_printable)
     scale: float = quantity(1.0, "", 0.2, 5.0, "factor on every length that is not fixed", PAPER)
-    chambers: Chambers = Chambers()
-    lattice: Envelope = Envelope()
-    grading: Grading = attrs.field(factory=Grading)
-    waveguide: Waveguide = Waveguide()
-    print: Printing = Printing()
-    material: Material = Material()
-    wall: Wall = attrs.field(factory=Wall)
+    chambers: Chambers = attrs.field(factory=Chambers, validator=_is_section)
+    lattice: Envelope = attrs.field(factory=Envelope, validator=_is_section)
+    grading: Grading = attrs.field(factory=Grading, validator=_is_section)
+    waveguide: Waveguide = attrs.field(factory=Waveguide, validator=_is_section)
+    print: Printing = attrs.field(factory=Printing, validator=_is_section)
+    material: Material = attrs.field(factory=Material, validator=_is_section)
+    wall: Wall = attrs.field(factory=Wall, validator=_is_section)
 
     def __attrs_post_init__(self) -> None:
         rules.check(self.dimensions, self.lattice.allow_symmetric)
@@ -608,9 +619,13 @@ def from_toml(text: str, origin: str = "", beside: Path | None = None) -> Unit:
     keys = {"": list(head)} | {_attribute(s): [d.name for d in describe(s)] for s in SECTIONS}
     document = toml_text.parse(text, keys, origin)
     with toml_text.located(text, origin):
-        if document.get("format") != FORMAT or document["format"] is True:
+        if "format" not in document:
             raise InputError(
-                f"format = {document.get('format', 'missing')} is not known here",
+                "the file does not say its format", "format", f"add format = {FORMAT} at its top"
+            )
+        if document["format"] != FORMAT or document["format"] is True:
+            raise InputError(
+                f"format = {document['format']} is not known here",
                 "format",
                 f"write format = {FORMAT}, the only one so far",
             )

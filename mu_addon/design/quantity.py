@@ -75,7 +75,11 @@ class Description(NamedTuple):
             value = int(value)
         if type(value) is not self.type:
             words = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-            raise InputError(f"{self.name} = {value!r} is not {words[self.type]}", self.name, self.text)
+            raise InputError(
+                f"{self.name} = {value!r} is not {words[self.type]}",
+                self.name,
+                _correction(value, self.type, self.unit, self.text),
+            )
         if self.choices and value not in self.choices:
             raise InputError(f"{self.name} = {value!r} is not known", self.name, f"choose {self.allowed}")
         if self._is_out_of_bounds(value):
@@ -213,12 +217,28 @@ def _real(value: Any) -> Any:
         return math.inf
 
 
+def _correction(value: Any, kind: type, unit: str, text: str) -> str:
+    """What to write in place of a value of another type; of a number in quotes, with its unit, the number."""
+    number, _, given = value.strip().partition(" ") if isinstance(value, str) else ("", "", "")
+    try:
+        float(number)
+    except ValueError:
+        return text
+    if kind not in (int, float) or given not in ("", unit):
+        return f"{text}, in {unit}" if unit else text
+    return f"write {number}, without quotes{' and unit' if given else ''}: {text}"
+
+
 def _check(instance: Any, field: Any, value: Any) -> None:
     m = field.metadata
     kind, unit = m["type"], f" {m['unit']}" if m["unit"] else ""
     if type(value) is not kind:
         named = {bool: "true or false", int: "a whole number", float: "a number"}[kind]
-        raise InputError(f"{field.name} = {value!r} is not {named}", where(instance, field.name), m["text"])
+        raise InputError(
+            f"{field.name} = {value!r} is not {named}",
+            where(instance, field.name),
+            _correction(value, kind, m["unit"], m["text"]),
+        )
     if kind is bool:
         return
     if not (math.isfinite(value) and m["low"] <= value <= m["high"]):

@@ -37,13 +37,15 @@ class ExtendedModel:
     """Fitted parameters of a verdict for simulations: of effects by effect and name, nuisances by name.
 
     verdict: kind of the verdict, one of `verdict.KINDS`. lattice: response of the printed lattice to a print
-    offset, from virtual tests; None where a power law of slender struts was used.
+    offset, from virtual tests; None where a power law of slender struts was used. rivals: titles of effects
+    that explain the data as well as these.
     """
 
     verdict: str
     effects: Mapping[str, Mapping[str, Fitted]]
     nuisances: Mapping[str, Fitted]
     lattice: OffsetResponse | None = None
+    rivals: tuple[str, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:
@@ -70,6 +72,7 @@ class ExtendedModel:
         words = "The block that was compressed, by print offset at 1.0x: modulus over the resin's."
         values = {
             "verdict": self.verdict,
+            "rivals": list(self.rivals) or None,
             "effect": effects or None,
             "nuisance": nuisances or None,
             "lattice": Commented(lattice, (words,)) if lattice else None,
@@ -89,6 +92,7 @@ def stacked(before: ExtendedModel, found: ExtendedModel) -> ExtendedModel:
         {n: {**before.effects.get(n, {}), **found.effects.get(n, {})} for n in names},
         {**before.nuisances, **found.nuisances},
         found.lattice or before.lattice,
+        found.rivals,
     )
 
 
@@ -123,7 +127,8 @@ def extended_model(verdict: Verdict, nuisances: Iterable[Parameter] = ()) -> Ext
     units = {p.name: p.unit for p in nuisances}
     seen = {k for k, column in zip(fit.keys, fit.jacobian.T, strict=True) if column.any()}
     known = {k: fitted(k, units.get(k, "")) for k in fit.keys if "." not in k and k in seen}
-    return ExtendedModel(verdict.kind, effects, known)
+    rivals = dict.fromkeys(title for c in found.causes for title in c.rivals) if verdict.names else ()
+    return ExtendedModel(verdict.kind, effects, known, rivals=tuple(rivals))
 
 
 def load_model(path: Path) -> ExtendedModel:
@@ -146,6 +151,11 @@ def load_model(path: Path) -> ExtendedModel:
     for table in ("effect", "nuisance", "lattice"):
         if not isinstance(document.get(table, {}), dict):
             raise InputError(f"{table} is not a table", str(path), f"write it as [{table}]")
+    rivals = document.get("rivals", [])
+    if not isinstance(rivals, list) or not all(isinstance(title, str) for title in rivals):
+        raise InputError(
+            "rivals is not a list of names", str(path), "write it as diagnose does, or leave it out"
+        )
     effects = {}
     for name, parameters in document.get("effect", {}).items():
         if name not in LIBRARY:
@@ -155,7 +165,7 @@ def load_model(path: Path) -> ExtendedModel:
         effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}
     nuisances = {n: _fitted(path, f"nuisance.{n}", t) for n, t in document.get("nuisance", {}).items()}
     lattice = _response(path, document["lattice"]) if "lattice" in document else None
-    return ExtendedModel(str(document.get("verdict", "")), effects, nuisances, lattice)
+    return ExtendedModel(document["verdict"], effects, nuisances, lattice, tuple(rivals))
 
 
 def _response(path: Path, table: Any) -> OffsetResponse:

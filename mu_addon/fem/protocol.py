@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ..errors import InputError
+from ..measured.kinds import CONVERTED
 from ..reading import require_rows
 from ..table_cells.own_tables import own_lines, own_rows, own_text
 
@@ -56,17 +57,18 @@ class ProtocolText:
     rows: tuple[tuple[int, str, tuple[str, ...]], ...]
 
     def values(self, names: Sequence[str]) -> Array:
-        """Values (c, k) of k columns of numbers, the first of them time; needs their names in the heading.
+        """Values (c, k) of k columns of numbers, the first of them time.
 
-        Raises InputError with file and line if a value is missing or not finite, a pressure (a column in kPa)
-        is out of range, time does not increase, or there are fewer than two rows.
+        Columns in other units, such as pressure_bar, are converted. Raises InputError with file and line if a
+        column or value is missing, a value is not finite, a pressure (a column in kPa) is out of range, time
+        does not increase, or there are fewer than two rows.
         """
-        columns = [self.names.index(name) for name in names]
+        columns, factors = zip(*map(self._column, names), strict=True)
         found: list[list[float]] = []
         for number, line, cells in self.rows:
             where = f"{self.path}, line {number}: {line}"
             try:
-                row = [float(cells[column]) for column in columns]
+                row = [float(cells[c]) * factor for c, factor in zip(columns, factors, strict=True)]
             except (ValueError, IndexError):
                 raise InputError("a value is missing or not a number", where, "give numbers only") from None
             if not np.isfinite(row).all():
@@ -86,6 +88,19 @@ class ProtocolText:
                 "the protocol has fewer than two rows", str(self.path), "give at least a start and an end"
             )
         return np.array(found)
+
+    def _column(self, name: str) -> tuple[int, float]:
+        """Position of a column, and the factor from its unit to that of `name`."""
+        quantity, _, unit = name.rpartition("_")
+        for other, factor in {unit: 1.0, **CONVERTED[unit]}.items():
+            if f"{quantity}_{other}" in self.names:
+                return self.names.index(f"{quantity}_{other}"), factor
+        number, line = self.heading
+        raise InputError(
+            f"the protocol lacks the column {name}",
+            f"{self.path}, line {number}: {line}",
+            f"name it {name}, or with the unit it has: {', '.join(CONVERTED[unit])}",
+        )
 
 
 def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
@@ -112,20 +127,12 @@ def read_protocol_text(path: Path, columns: Sequence[str]) -> ProtocolText:
 
 
 def read_protocol(path: Path) -> Protocol:
-    """Read a protocol: columns time_s and pressure_kPa, `#` comments allowed.
+    """Read a protocol: columns time_s and pressure_kPa, or in other units; `#` comments allowed.
 
     Raises InputError with file and line if the file is unreadable, a value is missing or not finite, a
     pressure is out of range, time does not increase, or the protocol does not start at atmospheric pressure.
     """
     text = read_protocol_text(path, COLUMNS)
-    number, line = text.heading
-    for name in COLUMNS:
-        if name not in text.names:
-            raise InputError(
-                f"the protocol lacks the column {name}",
-                f"{path}, line {number}: {line}",
-                f"name the columns {', '.join(COLUMNS)}",
-            )
     time, pressure = text.values(COLUMNS).T
     if pressure[0] != 0:
         raise InputError(

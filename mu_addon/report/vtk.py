@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -41,11 +41,17 @@ def write_fields(path: Path, mesh: Mesh, fields: dict[str, Array]) -> None:
     _write(path, mesh, {}, {"region": mesh.region.astype(np.int32), **cells})
 
 
-def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State]]) -> None:
+def write_trajectory(
+    path: Path,
+    mesh: Mesh,
+    states: Sequence[tuple[float, State]],
+    cells: Callable[[State], dict[str, Array]] = lambda state: {},
+) -> None:
     """Write states, each with its time in s, to a .pvd file and one .vtu file a state, displacement in mm.
 
-    They lie in a folder of the .pvd file's name, from which files of an earlier run are removed. A state that
-    holds at several times is written once. Raises OutputError.
+    cells: values (m,) of the elements in a state, by name, written in single precision. The .vtu files lie in
+    a folder of the .pvd file's name, from which those of an earlier run are removed. A state that holds at
+    several times is written once. Raises OutputError.
     """
     folder = make_folder(path.with_suffix(""))
     files: dict[int, str] = {}
@@ -55,7 +61,8 @@ def write_trajectory(path: Path, mesh: Mesh, states: Sequence[tuple[float, State
         if id(state) not in files:
             name = files[id(state)] = f"{len(files):04d}.vtu"
             moved = {"displacement_mm": state.u.astype(np.float32)}
-            _write(folder / name, mesh, moved, {"region": mesh.region.astype(np.int32)})
+            values = {name: np.asarray(v, np.float32) for name, v in cells(state).items()}
+            _write(folder / name, mesh, moved, {"region": mesh.region.astype(np.int32), **values})
         file = quoteattr(f"{folder.name}/{files[id(state)]}")
         pressure = f"{state.pressure_kPa:.9g} kPa"
         lines.append(f'    <DataSet timestep="{time:.9g}" name="{pressure}" file={file}/>')

@@ -166,7 +166,7 @@ BAD_FILES = {
     ),
     "not a table": (HEAD + "chambers = 1\n", "chambers is not a table", "line 3"),
     "format": ("format = 2\n", "format = 2 is not known here", "line 1"),
-    "no format": ("scale = 1.0\n", "format = missing is not known here", "format"),
+    "no format": ("scale = 1.0\n", "does not say its format", "format"),
     "name": (HEAD + "name = 3\n", "name = 3 is not a name", "line 3"),
     "text": (HEAD + '[chambers]\nwall_mm = "thin"\n', "wall_mm = 'thin' is not a number", "line 4"),
     "flag": (HEAD + "[chambers]\nwall_mm = true\n", "wall_mm = True is not a number", "line 4"),
@@ -198,6 +198,16 @@ def test_bad_files_are_refused_with_file_and_line(tmp_path, case):
     assert caught.value.remedy
 
 
+@pytest.mark.parametrize(
+    ("value", "remedy"),
+    [('"0.9 mm"', "write 0.9, without"), ('"0.9"', "write 0.9, without"), ('"1 cm"', "in mm")],
+)
+def test_a_number_in_quotes_is_told_how_to_be_written(value, remedy):
+    with pytest.raises(InputError) as caught:
+        from_toml(f"{HEAD}[chambers]\nwall_mm = {value}\n")
+    assert remedy in caught.value.remedy
+
+
 def test_unreadable_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="No such file"):
         read_unit(tmp_path / "none.toml")
@@ -219,6 +229,9 @@ def test_parameters_are_changed_by_their_names_all_at_once():
         unit.evolve(wal_mm=1.0)
     with pytest.raises(InputError, match="wall_mm = 60 mm is out of bounds"):
         unit.evolve(wall_mm=60)
+    # A section's name is no parameter's: its value would have been kept beside a wall that stays.
+    with pytest.raises(InputError, match="did you mean 'wall_mm'"):
+        unit.evolve(wall=1.0)
 
 
 def test_unknown_preset_names_those_there_are():

@@ -76,7 +76,7 @@ def test_it_says_where_it_stood_and_resumes_to_the_same_digits(whole, tmp_path, 
     again = run("resume", tmp_path, "--no-report")
     assert again.returncode == 0, again.stderr
     assert "interrupted" not in again.stderr
-    for name in ("angle.csv", "stretch.csv"):
+    for name in ("motion.csv", "stretch.csv"):
         assert (tmp_path / name).read_bytes() == (whole / name).read_bytes()
     for path in whole.glob("cache/state-*"):
         with np.load(path) as a, np.load(tmp_path / "cache" / path.name) as b:

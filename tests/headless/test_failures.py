@@ -118,7 +118,8 @@ def test_a_units_file_is_refused_in_its_own_words(tmp_path, text, told):
     [
         ("time_s,pressure_kPa\n0,0\n1,abc\n", ("line 3", "not a number")),
         ("time_s,pressure_kPa\n0,0\n1,5\n1,6\n", ("line 4", "time does not increase")),
-        ("time_s,pressure_Pa\n0,0\n1,5\n", ("pressure_kPa", "line 1")),
+        ("time_s,pressure\n0,0\n1,5\n", ("pressure_kPa", "line 1", "bar, psi")),
+        ("time_s,pressure_bar\n0,0\n1,11\n", ("line 3", "a pressure of 1100 kPa")),
         ("time_s,pressure_kPa\n0,0\n1,nan\n", ("line 3", "not finite")),
         ("time_s,pressure_kPa\n0,0\n1,-20000\n", ("line 3", "a pressure of -20000 kPa", "-101.325")),
         ("time_s,pressure_kPa\n0,5\n1,6\n", ("0 kPa",)),

@@ -73,7 +73,7 @@ def test_a_thicker_wall_bends_less_and_the_table_says_so(whole):
     assert more == pytest.approx(thick - thin)
     assert float(summary["nodes"]["Angle 0.8"]["remark"]) == pytest.approx(thin, rel=1e-5)
     for wall in (0.8, 1.0):
-        assert (out / summary["nodes"][f"Motion {wall}"]["folder"] / "angle.csv").is_file()
+        assert (out / summary["nodes"][f"Motion {wall}"]["folder"] / "motion.csv").is_file()
     assert "Angle minus that of Motion 0.8" in (out / "report.html").read_text()
 
 

@@ -62,7 +62,7 @@ def test_every_file_is_there(finished):
         "anchors.txt",
         "mesh.vtu",
         "model_a.pvd",
-        "angle.csv",
+        "motion.csv",
         "deviation.csv",
         "delta.npz",
         "sensitivity.vtu",
@@ -88,11 +88,18 @@ def test_the_terminal_shows_each_stage_and_the_answer(finished):
 def test_deviation_has_a_row_a_path(finished):
     folder, _ = finished
     found = rows(folder)
-    assert list(found[0]) == ["path", "start", "length", "J_hat_mm", "J_cont_mm", "rank"]
+    assert list(found[0])[:6] == ["path", "start", "length", "J_hat_mm", "J_cont_mm", "rank"]
     assert [row["path"] for row in found] == PATHS
     J = np.array([float(row["J_hat_mm"]) for row in found])
     assert (J > 0).all()
     assert [int(row["rank"]) for row in found] == list(np.argsort(np.argsort(J)) + 1)
+    # A path is tied if the mesh's uncertainty does not part it from the chosen one, which is its own.
+    summary = json.loads((folder / "summary.json").read_text())
+    (limit,) = {float(row["mesh_uncertainty_mm"]) for row in found}
+    assert limit == pytest.approx(summary["mesh_uncertainty_mm"], rel=0.01)
+    tied = [row["path"] for row in found if row["tied_with_chosen"] == "yes"]
+    assert tied == summary["tied_with_chosen"]
+    assert all((J[PATHS.index(path)] - J.min()) < 1.01 * limit for path in tied)
 
 
 def test_delta_agrees_with_the_table(finished):
@@ -310,4 +317,4 @@ runpy.run_path({str(RUN)!r}, run_name="__main__")
     else:
         other = tmp_path / "here"
         assert here(*quick_in(other, stages=stages), "--no-report").returncode == 0
-    assert (out / "angle.csv").read_bytes() == (other / "angle.csv").read_bytes()
+    assert (out / "motion.csv").read_bytes() == (other / "motion.csv").read_bytes()

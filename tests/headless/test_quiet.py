@@ -2,13 +2,14 @@
 
 import json
 import shlex
+import subprocess
 
 import pytest
 
 from mu_addon.cli import all_commands
 from mu_addon.cli.main import main, parser
 
-from .processes import here
+from .processes import command, here
 
 SECOND = ("stream", "--simulate", "--seconds", "1", "--out")
 
@@ -61,3 +62,19 @@ def test_quiet_json_is_the_last_message(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (line,) = here(*SECOND, "out", "--quiet", "--json").stdout.splitlines()
     assert json.loads(line)["type"] == "result"
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [(("presets",), 0), (("--help",), 0), ((*SECOND, "out"), 141), ((*SECOND, "out", "--json"), 141)],
+)
+def test_an_output_that_nobody_reads_any_more_ends_it_quietly(tmp_path, line, status):
+    """As of `| head -1`: no fault of this program, no words, and no more work."""
+    ends = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": tmp_path}
+    with subprocess.Popen(command(*line), **ends) as process:
+        process.stdout.close()
+        words = process.stderr.read().decode()
+    assert words == ""
+    assert process.returncode == status
+    if status:
+        assert "closed" in json.loads((tmp_path / "out" / "summary.json").read_text())["reason"]["what"]

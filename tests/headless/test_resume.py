@@ -15,7 +15,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
-from .processes import assert_clear_failure, command, here, is_running, run, worker_of
+from .processes import ROOT, assert_clear_failure, command, here, is_running, run, worker_of
 
 UNIT = load_preset("mu-1.0x")
 JOB = Job(
@@ -32,6 +32,30 @@ def resumed(folder):
     done = here("resume", folder, "--no-report", "--workers", "1", "--json")
     assert done.returncode == 0, done.stdout
     return json.loads(done.stdout.splitlines()[-1])["summary"]
+
+
+@pytest.mark.parametrize(("given", "report"), [((), False), (("--report",), True)])
+def test_it_keeps_the_options_of_the_command(tmp_path, given, report):
+    """Those that decide no result are in no file of inputs; the command's own options come before them."""
+    data = ROOT / "assets" / "examples" / "paper-moduli"
+    assert here("diagnose", data, "--no-report", "--out", tmp_path).returncode == 0
+    assert here("resume", tmp_path, *given).returncode == 0
+    assert (tmp_path / "report.html").exists() == report
+
+
+def test_a_folder_chooses_no_scheduler(tmp_path):
+    """Workers run what a scheduler sends: a folder from a stranger would run code. It is said how to."""
+    assert here("design", "--preset", "mu-0.75x", "--no-report", "--out", tmp_path).returncode == 0
+    path = tmp_path / "summary.json"
+    summary = json.loads(path.read_text())
+    summary["options"] = {"report": False, "scheduler": "tcp://there:8786", "workers": 2}
+    path.write_text(json.dumps(summary))
+    done = here("resume", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert f"resume {tmp_path} --scheduler tcp://there:8786" in done.stderr
+    summary["options"] = {"device": 7}
+    path.write_text(json.dumps(summary))
+    assert_clear_failure(here("resume", tmp_path), 2, "device")
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ def test_one_version():
     latest = re.search(r"^## \[(\d+\.\d+\.\d+)\]", changelog, re.MULTILINE)
     assert latest is not None
     assert PROJECT["project"]["version"] == MANIFEST["version"] == latest[1]
+    assert f"\nversion: {latest[1]}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 
 def test_one_name_and_licence():
@@ -58,7 +59,8 @@ def test_ci_runs_the_readme_test_command_and_then_lint_and_types():
 
 
 def test_links_in_the_papers_lead_somewhere():
-    for page in [ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")]:
+    own = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")]
+    for page in [*own, *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             if not target.startswith(("http://", "https://")):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"

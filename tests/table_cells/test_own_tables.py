@@ -37,6 +37,8 @@ def test_a_protocol(tmp_path, encoding):
     assert read.pressure_kPa.tolist() == [0.0, 5.25, -1.5]
     emptied = written(tmp_path, text.replace("\r\n0,5", "\r\n;\r\n0,5") + ";\r\n", encoding)
     assert read_protocol(emptied).pressure_kPa.tolist() == [0.0, 5.25, -1.5]
+    other = read_protocol(written(tmp_path, "time_min,pressure_bar\n0,0\n0.5,0.2\n"))
+    assert (other.time_s[1], other.pressure_kPa[1]) == (30.0, 20.0)
     sep = read_protocol(written(tmp_path, "sep=;\r\n" + european("time_s,pressure_kPa\n0,0\n1,1.234\n")))
     assert sep.pressure_kPa.tolist() == [0.0, 1.234]
 

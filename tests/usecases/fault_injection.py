@@ -211,7 +211,7 @@ def unraisable(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
 
 
 # Tables of a study that hold what has been found so far.
-PARTIAL = ("angle.csv", "stretch.csv", "model_a.pvd")
+PARTIAL = ("motion.csv", "stretch.csv", "model_a.pvd")
 
 
 def computed_once(function: Callable[..., Any]) -> Callable[..., Any]:

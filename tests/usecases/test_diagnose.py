@@ -169,6 +169,13 @@ def test_three_moduli_of_the_paper_are_not_enough_to_tell(tmp_path):
     context, _ = run(PAPER, tmp_path)
     assert context.status == 0
     assert context.summary["verdict"] == "ambiguous"
+    # Whoever applies it is told what else it may be; the same blocks weighed leave one cause.
+    doubt = read_extended(load_preset("mu-1.0x"), tmp_path / "model.toml").doubt
+    assert "overcure" in doubt
+    assert "skin cure or viscoelasticity" in doubt
+    weighed, _ = run(PAPER.parent / "weighed-moduli", tmp_path / "weighed")
+    assert weighed.summary["headline"] == "overcure"
+    assert read_extended(load_preset("mu-1.0x"), tmp_path / "weighed" / "model.toml").doubt == ""
     assert {"overcure", "skin cure"} <= set(re.split(", | or ", context.summary["headline"]))
     assert "weigh" in context.summary["next"].lower()
     # The extended model gives each unit the modulus that was measured at its scale, to the printed spread.

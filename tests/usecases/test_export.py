@@ -5,6 +5,7 @@ import io
 import json
 import tomllib
 import zipfile
+from types import SimpleNamespace
 
 import attrs
 import lib3mf
@@ -15,10 +16,11 @@ import trimesh
 from mu_addon.design.anchors import window
 from mu_addon.design.beams import lattice_beams
 from mu_addon.design.lattice import lattice_of
-from mu_addon.design.parameters import Chambers, Unit
+from mu_addon.design.parameters import Chambers, Unit, to_toml
 from mu_addon.design.printing.printer import load_printer, printer_text, read_printer
 from mu_addon.design.printing.sheets import compensation_offsets, gauge_sheet, measured_limits, read_sheet
 from mu_addon.design.solid import build_solid
+from mu_addon.design.surface import stl_surface
 from mu_addon.design.threemf import Beams, Part, read_3mf, write_3mf
 from mu_addon.design.waveguide import waveguide
 from mu_addon.errors import InputError
@@ -30,9 +32,11 @@ from mu_addon.run.progress import Progress
 from mu_addon.studies.specimens import Specimens
 from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.export import run as exporting
-from mu_addon.usecases.export.job import Job, path_of
+from mu_addon.usecases.export.job import Job, deformed_in, path_of
 from mu_addon.usecases.export.job import read_job as read_export
 from mu_addon.usecases.export.run import USE_CASE as EXPORT
+
+from .bent_motion import ANGLES, PRESSURES, bent, write_bent_motion
 
 SMALL = Unit(name="three", chambers=Chambers(count=3))
 RESIN = load_material("elastic-50a-v1")
@@ -52,6 +56,35 @@ def exported(tmp_path_factory):
     context, _ = run(EXPORT, job, folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
+
+
+def test_the_unit_is_written_as_a_run_bent_it(tmp_path):
+    """Each section of the motion turns by its share of the tip's angle, and so does the printed surface."""
+    run_of = tmp_path / "run"
+    mesh = write_bent_motion(run_of, unit=SMALL)
+    (run_of / "unit.toml").write_text(to_toml(SMALL))
+    job = Job(SMALL, RESIN, formats=(), quality="interactive", deformed=deformed_in(run_of, SMALL, 20.0))
+    context, _ = run(EXPORT, job, tmp_path / "out")
+    assert context.status == 0
+    assert read_export(tmp_path / "out").texts() == job.texts()
+    vertices, triangles = stl_surface((tmp_path / "out" / "unit_at_20_kPa.stl").read_bytes())
+    drawn = build_solid(SMALL, quality="interactive")
+    corners = drawn.vertices[drawn.triangles].reshape(-1, 3)
+    above = corners[:, 2] > 0.0
+    nodes = SimpleNamespace(nodes=np.vstack([corners, [0.0, 0.0, SMALL.dimensions.height]]))
+    angle = ANGLES[list(PRESSURES).index(20.0)]
+    expected = corners + bent(nodes, angle)[:-1]
+    # Linear elements miss the turn's curvature by at most 3/8 of their squared length times it.
+    edges = mesh.nodes[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.nodes[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
+    turn = np.radians(angle) / SMALL.dimensions.height
+    curvature = 2.0 * turn + np.abs(mesh.nodes).max() * turn**2
+    bound = 0.375 * (edges**2).sum(axis=2).max() * curvature
+    off = np.linalg.norm(vertices[triangles].reshape(-1, 3) - expected, axis=1)[above]
+    assert off.max() < bound < 0.2 * np.linalg.norm(expected - corners, axis=1).max()
+    with pytest.raises(InputError, match="no state at 21 kPa"):
+        deformed_in(run_of, SMALL, 21.0)
+    with pytest.raises(InputError, match="another unit"):
+        deformed_in(run_of, Unit(), 20.0)
 
 
 def test_everything_is_there_and_as_the_manifest_says(exported):

@@ -170,7 +170,7 @@ def test_units_are_compared_by_what_differs_and_kinds_are_not_mixed():
     assert rows["chambers.wall_mm"] == (0.8, 0.9, 1.0)
     assert "chambers.cell_mm" not in rows
     np.testing.assert_allclose(rows["wall_mm"], [0.6, 0.675, 0.75])
-    with pytest.raises(InputError, match="only one is linked"):
+    with pytest.raises(InputError, match="only one is given"):
         compare(designs[:1])
 
 

@@ -164,6 +164,20 @@ def test_stress_is_that_of_the_sensors_own_material(study):
         assert np.array_equal(filled[f"membrane_{field}"], before[f"membrane_{field}"])
 
 
+def test_elements_and_nodes_have_one_stress_where_it_is_uniform(study):
+    """A body drawn out by a fifth and let narrow: stretches as they were given, one stress a material."""
+    _, mesh, *_ = study
+    nodes = {region: surface_of(mesh, number).node for region, number in REGIONS.items()}
+    u, elements = mesh.nodes * [-0.08, -0.08, 0.2], []
+    found = SurfaceFields(mesh, nodes).of_states([u], materials_of(UNIT, mesh), of_elements=elements)
+    np.testing.assert_allclose(elements[0]["largest_stretch"], 1.2, rtol=1e-6)
+    np.testing.assert_allclose(elements[0]["smallest_stretch"], 0.92, rtol=1e-6)
+    for region, number in REGIONS.items():
+        for field in FIELDS:
+            values = elements[0][field][mesh.region == number]
+            np.testing.assert_allclose(values, found[f"{region}_{field}"][0, 0], rtol=1e-4)
+
+
 def test_the_lattice_bears_more_where_the_sensor_is(study, motion):
     _, mesh, *_ = study
     path = max(PATHS, key=lambda c: c.length)

@@ -121,7 +121,7 @@ def test_a_unit_that_meets_a_wall(files, capsys):
     assert rubbing[2] > 0.2 * normal[2]
     # Where it presses with less than PRESSURE_MPa the gap is off by less than DEPTH_mm.
     assert 0 < error.max() < 2 * DEPTH_mm
-    angle = [float(r["angle_deg"]) for r in rows(out, "angle.csv")]
+    angle = [float(r["angle_deg"]) for r in rows(out, "motion.csv")]
     # The wall and its friction hold the unit back, also on its way home.
     assert angle[2] < 2 * angle[1]
     assert abs(angle[3] - angle[1]) > 0.01

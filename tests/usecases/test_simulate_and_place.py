@@ -5,6 +5,7 @@ import json
 import shutil
 
 import attrs
+import meshio
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
+from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import RESOLVED, MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.run.context import run_to_end
@@ -19,7 +21,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
-from mu_addon.usecases.simulate_and_place.run import run_stages
+from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 from tests.design.kinds import custom, octet
 
@@ -60,6 +62,36 @@ def placed(tmp_path_factory, with_light):
 def copied(placed, tmp_path):
     folder, summary = placed
     return shutil.copytree(folder, tmp_path / "copied"), summary
+
+
+def test_its_motion_is_a_table_over_time(placed):
+    """Angle, tip and volume at each instant, and for ParaView what bears the pressure."""
+    folder, summary = placed
+    rows = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
+    assert rows["pressure_kPa"].tolist() == [0.0, -10.0, 20.0]
+    for row in rows:
+        assert row["angle_deg"] == pytest.approx(summary["angle_deg"][f"{row['pressure_kPa']:g}"], abs=1e-4)
+    rest, sucked, blown = rows
+    # The tip is on the sagittal plane, at its height at rest; air goes out, comes in, and the tip rises.
+    assert rows["tip_x_mm"].tolist() == [0.0, 0.0, 0.0]
+    assert rest["tip_z_mm"] == pytest.approx(UNIT.evolve(count=4).dimensions.height)
+    assert sucked["tip_z_mm"] < rest["tip_z_mm"] < blown["tip_z_mm"]
+    assert sucked["volume_mm3"] < rest["volume_mm3"] < blown["volume_mm3"]
+    still, _, moved = (meshio.read(folder / "model_a" / f"000{k}.vtu") for k in range(3))
+    assert still.cell_data["largest_stretch"][0] == pytest.approx(1.0)
+    assert still.cell_data["von_mises_kPa"][0] == pytest.approx(0.0, abs=1e-6)
+    in_wall = moved.cell_data["region"][0] == MEMBRANE
+    assert (moved.cell_data["von_mises_kPa"][0][in_wall] > 0.0).all()
+
+
+def test_its_solid_is_said_in_mm_ml_and_g(placed):
+    _, summary = placed
+    found = summary["solid"]
+    assert found["size_mm"][2] == pytest.approx(58.5, abs=10.0)
+    assert found["g"] == pytest.approx(1.01 * found["ml"])
+    (line,) = console_summary({"solid": found})
+    assert line.startswith("solid: ")
+    assert line.endswith(f"{found['ml']:.1f} ml, {found['g']:.1f} g of Elastic 50A V1")
 
 
 def times(folder, kind):
@@ -112,6 +144,23 @@ def test_a_change_costs_only_what_depends_on_it(copied, change, mesh, states):
         after = times(folder, kind)
         assert len(after) == count
         assert before[kind].items() <= after.items()
+
+
+def test_a_report_of_the_same_figures_is_not_drawn_again(tmp_path):
+    job = attrs.evolve(JOB, stages=("design",), unit=JOB.unit.evolve(count=3))
+
+    def drawn(wanted):
+        """When the report was written, after a run of a job."""
+        with run_to_end(Progress()) as context:
+            USE_CASE.start(wanted, tmp_path, context)
+        assert context.status == 0
+        return (tmp_path / "report.html").stat().st_mtime_ns
+
+    first = drawn(job)
+    assert drawn(job) == first
+    (tmp_path / "report.html").unlink()
+    assert drawn(job) > first
+    assert drawn(with_wall(job, 1.0)) > first
 
 
 @pytest.mark.parametrize("stages", [("design",), ("design", "simulate")])
@@ -187,7 +236,7 @@ def test_damaged_states_are_solved_again_to_the_same_digits(placed, copied):
     for number, name in enumerate(sorted(kept)):
         damaged(folder / "cache" / name, DAMAGES[number], rng)
     ran(attrs.evolve(JOB, stages=("design", "simulate")), folder)
-    assert (folder / "angle.csv").read_bytes() == (placed[0] / "angle.csv").read_bytes()
+    assert (folder / "motion.csv").read_bytes() == (placed[0] / "motion.csv").read_bytes()
 
 
 @pytest.mark.nightly("test_damaged_states_are_solved_again_to_the_same_digits")
@@ -288,7 +337,7 @@ def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
     job = of_thin_walls(self_friction=0.3)
     ran(job, tmp_path)
     assert read_job(tmp_path).self_friction == 0.3
-    first = {name: (tmp_path / name).read_bytes() for name in ("angle.csv", "self_contact.csv")}
+    first = {name: (tmp_path / name).read_bytes() for name in ("motion.csv", "self_contact.csv")}
     lost = json.loads((tmp_path / "summary.json").read_text())["self_friction"]["lost_mJ"]
     assert lost > 0
     ran(job, tmp_path)

@@ -140,9 +140,9 @@ def test_further_stages_and_a_new_name_take_up_the_run_of_the_same_inputs(tmp_pa
     renamed = attrs.evolve(FULL, unit=attrs.evolve(FULL.unit, name="renamed"))
     folder, job = unit_runs.place_of(tmp_path, renamed)
     assert folder == run.folder
-    (folder / "angle.csv").write_text("found")
+    (folder / "motion.csv").write_text("found")
     write_study(job, folder)
-    assert (folder / "angle.csv").read_text() == "found", "a new name sets nothing aside"
+    assert (folder / "motion.csv").read_text() == "found", "a new name sets nothing aside"
     assert design_of(renamed) == run.design
     assert unit_runs.place_of(tmp_path, attrs.evolve(FULL, times=5))[0] != run.folder
 

@@ -35,6 +35,7 @@ from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
+from mu_addon.usecases.simulate_and_place.motion_tables import MOTION_COLUMNS
 from mu_addon.usecases.simulate_and_place.study import Study
 
 ROOT = Path(__file__).parents[2]
@@ -161,8 +162,8 @@ def test_a_wall_that_softens_does_not_on_its_first_loading_and_a_stopped_run_goe
     assert soft[3] > 1.05 * plain[3]
     # Back at the largest strain it is as stiff as it was.
     assert soft[4] == pytest.approx(plain[4], rel=1e-4)
-    rows = (tmp_path / "soft" / "angle.csv").read_text().splitlines()
-    assert rows[0] == "time_s,pressure_kPa,angle_deg"
+    rows = (tmp_path / "soft" / "motion.csv").read_text().splitlines()
+    assert rows[0] == ",".join(MOTION_COLUMNS)
     assert len(rows) == 6
     # A stop loses the last two instants; what the wall remembered at the third is there.
     kept = sorted((study.cache.folder).glob("instant*"), key=lambda f: f.stat().st_mtime)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -51,7 +52,7 @@ RECORD = 10
 def begin_diagnosis(job: Job, folder: Path, context: RunContext) -> None:
     """Prepare a folder for a diagnosis; a complete verdict on the same inputs goes into the summary."""
     inputs = job.texts()
-    context.summary |= _kept(folder, inputs)
+    context.summary = _kept(folder, inputs) | context.summary
     begin(context, folder, LAYOUT, inputs)
 
 
@@ -160,7 +161,9 @@ def _first_look(
     with _stages(progress) as on_model:
         verdict = diagnose(experiments, simulator, on_model)
     headline, words = sentence(verdict)
-    with progress.stage(f"first look, without weight, walls and print: {verdict.kind}, {headline}"):
+    look = f"first look, without weight, walls and print: {verdict.kind}, {headline}"
+    # With share and seconds a line of at most 100 columns.
+    with progress.stage(shorten(look, 76, placeholder=" ...")):
         pass
     return {"verdict": verdict.kind, "headline": headline, "sentence": words}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -16,8 +16,8 @@ from ...design.parameters import Unit, read_unit, to_toml
 from ...design.settings import USUAL_RESIN
 from ...errors import InputError
 from ...reading import file_text, unreadable
-from ...run.folder import FolderLayout
-from ...run.inputs import FORMAT, read_inputs, structured
+from ...run.folder import RUN, FolderLayout
+from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
 from ...toml_writer import toml_text
 from .settings import FORMATS, QUALITY
 
@@ -33,8 +33,26 @@ _LONGEST_PATH = 1 << 18
 LAYOUT = FolderLayout(
     "export.toml",
     "# The inputs of this export; unit.toml beside it belongs to them.",
-    results=("unit.stl", "unit.3mf", "unit-beams.3mf", "*.step", "nodes.txt", "plug-*.stl", MANIFEST),
+    results=(
+        "unit.stl",
+        "unit_at_*_kPa.stl",
+        "unit.3mf",
+        "unit-beams.3mf",
+        "*.step",
+        "nodes.txt",
+        "plug-*.stl",
+        MANIFEST,
+    ),
 )
+
+
+@attrs.frozen
+class Deformed:
+    """A pressure in kPa, and the run that simulated the unit's motion, with the motion's SHA-256."""
+
+    kPa: float
+    run: Path
+    sha256: str
 
 
 @attrs.frozen(eq=False)
@@ -42,7 +60,7 @@ class Job:
     """Inputs of an export. path: of the waveguide, or None; take_off: the printer's offsets in mm.
 
     resin: None for the usual one, loaded by the run. vent_along: build direction, away from the platform, for
-    which trapped resin gets vents; None for none.
+    which trapped resin gets vents; None for none. deformed: state in which the solid is written as well.
     """
 
     unit: Unit
@@ -54,6 +72,7 @@ class Job:
     take_off: tuple[float, float] = (0.0, 0.0)
     offset_source: str = ""
     vent_along: tuple[float, float, float] | None = None
+    deformed: Deformed | None = None
 
     def __attrs_post_init__(self) -> None:
         for name in self.formats:
@@ -68,7 +87,7 @@ class Job:
 
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; export.toml is the first."""
-        values = {
+        values: dict[str, Any] = {
             "format": FORMAT,
             "unit": UNIT,
             "path": self.path_name,
@@ -80,6 +99,9 @@ class Job:
             "vent_along": self.vent_along,
             "points_mm": None if self.path is None or isinstance(self.path, Window) else self.path,
         }
+        if self.deformed is not None:
+            values |= {"deformed_kPa": self.deformed.kPa, "motion_sha256": self.deformed.sha256}
+            values[RUN] = {"motion": str(self.deformed.run)}
         return {
             LAYOUT.inputs: toml_text(values, LAYOUT.header),
             UNIT: to_toml(self.unit),
@@ -99,14 +121,22 @@ class _Settings:
     offset_source: str = ""
     points_mm: tuple[tuple[float, float, float], ...] = ()
     vent_along: tuple[float, float, float] | None = None
+    deformed_kPa: float | None = None
+    motion_sha256: str = ""
 
 
 def read_job(folder: Path) -> Job:
     """The job that a folder of `export` describes; raises InputError."""
     path = folder / LAYOUT.inputs
-    values, _ = read_inputs(path)
+    values, run = read_inputs(path)
     values.pop("unit", None)
     asked, unit = structured(_Settings, values, str(path)), read_unit(folder / UNIT)
+    deformed = None
+    if asked.deformed_kPa is not None:
+        folder_of_run = named_path(path, run, "motion", "simulated run")
+        deformed = deformed_in(folder_of_run, unit, asked.deformed_kPa)
+        if deformed.sha256 != asked.motion_sha256:
+            require_digest(folder_of_run, b"", asked.motion_sha256, "simulated motion")
     along = np.array(asked.points_mm) if asked.points_mm else path_of(unit, asked.path or None)[0]
     return Job(
         unit=unit,
@@ -118,7 +148,22 @@ def read_job(folder: Path) -> Job:
         take_off=asked.take_off_mm,
         offset_source=asked.offset_source,
         vent_along=asked.vent_along,
+        deformed=deformed,
     )
+
+
+def deformed_in(run: Path, unit: Unit, kPa: float) -> Deformed:
+    """A state of a unit's motion in the folder of a run; raises InputError if it is not there."""
+    from ..simulate_and_place.motion_files import FOLDER, MODEL_A, read_motion
+
+    motion = read_motion(run)
+    if read_unit(run / UNIT) != unit:
+        remedy = f"give --unit {run / UNIT}, or simulate this unit"
+        raise InputError("that run simulated another unit", f"--deformed {kPa:g} {run}", remedy)
+    if not np.isclose(motion.state_kPa, kPa, rtol=0.0, atol=1e-6).any():
+        known = ", ".join(f"{p:g}" for p in motion.state_kPa)
+        raise InputError(f"that run has no state at {kPa:g} kPa", str(run), f"choose from {known}")
+    return Deformed(kPa, run, digest((run / FOLDER / f"{MODEL_A}.npz").read_bytes()))
 
 
 def resin_text(resin: Material | None) -> dict[str, str]:

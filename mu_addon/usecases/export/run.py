@@ -25,13 +25,13 @@ from ...run.context import RunContext
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .job import LAYOUT, MANIFEST, Job, read_job, resin_of
+from .job import LAYOUT, MANIFEST, Deformed, Job, read_job, resin_of
 
 Array = NDArray[np.float64]
 
 MESH_TOLERANCE = 1e-4
 SOLID_S = {"interactive": 2.0, "export": 11.0}
-FORMAT_S = {"stl": 0.8, "3mf": 7.0, "3mf-beams": 7.0, "step": 8.0, "txt": 0.1}
+FORMAT_S = {"stl": 0.8, "3mf": 7.0, "3mf-beams": 7.0, "step": 8.0, "txt": 0.1, "deformed": 10.0}
 """Approximate seconds to write a format and read it back."""
 """Relative difference of volume allowed between a solid and its STL or 3MF read back."""
 STEP_TOLERANCE = 5e-3
@@ -80,6 +80,9 @@ class Export:
                     "step": self._step,
                     "txt": self._nodes,
                 }[name](solid)
+        if job.deformed is not None:
+            with self.progress.stage("deformed", FORMAT_S["deformed"]):
+                self._deformed(solid, job.deformed)
         manifest = self._manifest(solid)
         write_json(self.folder / MANIFEST, manifest)
         self.context.summary |= manifest
@@ -133,6 +136,22 @@ class Export:
         self._add(
             "unit.stl", "printable unit, binary, mm", self._compared(solid, "unit.stl", vertices, triangles)
         )
+
+    def _deformed(self, solid: Solid, state: Deformed) -> None:
+        """Write the solid as it is in a state of the simulated motion: its surface follows the mesh."""
+        from ..simulate_and_place.motion_files import MODEL_A, read_motion
+
+        motion = read_motion(state.run)
+        number = int(np.abs(motion.state_kPa - state.kPa).argmin())
+        moved = motion.carried(self.job.path_name or MODEL_A, motion.embedding(solid.vertices))[number]
+        vertices = solid.vertices + moved
+        gates = attrs.evolve(solid.gates, volume_mm3=volume(vertices, solid.triangles))
+        bent = attrs.evolve(solid, vertices=vertices, gates=gates)
+        name = f"unit_at_{state.kPa:g}_kPa.stl"
+        write_bytes(self.folder / name, stl_bytes(vertices, solid.triangles))
+        back = stl_surface((self.folder / name).read_bytes())
+        what = f"the unit at {state.kPa:g} kPa, by the motion in {state.run}, mm"
+        self._add(name, what, self._compared(bent, name, *back))
 
     def _3mf(self, solid: Solid) -> None:
         part = Part(self.job.unit.name, solid.vertices, solid.triangles)
@@ -311,7 +330,8 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
 def plan_of(job: Job) -> Plan:
     """Stages of an export with the expected seconds of each on two cores."""
     vents = [("vents", 10.0)] if job.vent_along is not None else []
-    return [("solid", SOLID_S[job.quality]), *vents, *((name, FORMAT_S[name]) for name in job.formats)]
+    names = [*job.formats, *(["deformed"] if job.deformed is not None else [])]
+    return [("solid", SOLID_S[job.quality]), *vents, *((name, FORMAT_S[name]) for name in names)]
 
 
 USE_CASE = UseCase("export", LAYOUT, read_job, export, console_summary, plan=plan_of)

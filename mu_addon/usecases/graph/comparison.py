@@ -19,7 +19,10 @@ from ...materials.library import load_material
 from ...reading import is_number
 from ...report.html import figure, number, table
 from ...report.plots import BY_LENGTH, BY_START, QUIET, canvas
+from ...run.summary import SUMMARY, read_summary
 from ..parameter_study.results import figures
+from ..resume import use_case_of
+from ..simulate_and_place.study_file import LAYOUT as STUDY
 from .orders import Study
 from .parts import Design
 
@@ -31,13 +34,14 @@ class Comparison:
     """Named things side by side; the others are compared with the first.
 
     inputs, results: rows by name of a quantity, a value for each; angles: (pressure in kPa, angle in deg) of
-    each study, ascending.
+    each study, ascending; unfinished: names of runs that are not complete, with their status.
     """
 
     names: tuple[str, ...]
     inputs: Mapping[str, tuple[Any, ...]]
     results: Mapping[str, tuple[Any, ...]]
     angles: tuple[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]], ...] = ()
+    unfinished: tuple[tuple[str, str], ...] = ()
 
     def remark(self) -> str:
         """Number of studies, and their largest angles minus the first's, as text."""
@@ -56,7 +60,7 @@ class Comparison:
 def compare(items: Sequence[tuple[str, Any]]) -> Comparison:
     """The comparison of named designs, studies or runs; InputError for one alone, or of two kinds."""
     if len(items) < 2:
-        raise InputError("only one is linked", "items", "link two or more")
+        raise InputError("only one is given", "items", "give two or more")
     kinds = {_kind(value) for _, value in items}
     if len(kinds) > 1:
         raise InputError(
@@ -70,10 +74,27 @@ def compare(items: Sequence[tuple[str, Any]]) -> Comparison:
     return Comparison(names, _side_by_side(inputs), _side_by_side(results), angles)
 
 
+def of_runs(folders: Sequence[Path]) -> Comparison:
+    """The comparison of runs in folders, named by these; InputError where one has no results."""
+    last = [folder.resolve().name for folder in folders]
+    names = last if len(set(last)) == len(last) else [str(folder) for folder in folders]
+    items: list[tuple[str, Any]] = []
+    for name, folder in zip(names, folders, strict=True):
+        case, summary = use_case_of(folder), read_summary(folder / SUMMARY)
+        if not summary:
+            raise InputError("that run has no results", str(folder), f"start it: resume {folder}")
+        study = case.layout == STUDY
+        items.append(
+            (name, Study(case.read(folder), folder, summary) if study else Finished(folder, summary))
+        )
+    statuses = [(name, str(value.summary.get("status"))) for name, value in items]
+    return attrs.evolve(compare(items), unfinished=tuple(s for s in statuses if s[1] != "complete"))
+
+
 def _kind(value: Any) -> str:
     if isinstance(value, Design):
         return "unit"
-    return "study" if isinstance(value, Study) else value.folder.name.split("-")[0]
+    return "study" if isinstance(value, Study) else use_case_of(value.folder).name
 
 
 def _inputs(value: Any) -> Row:
@@ -107,7 +128,18 @@ def _results(value: Any) -> Row:
 
 
 # Of a run's summary what is no result.
-_NO_RESULT = ("status", "versions", "seconds", "experiments", "noise", "remarks", "size_mm", "gates", "next")
+_NO_RESULT = (
+    "status",
+    "versions",
+    "seconds",
+    "experiments",
+    "noise",
+    "remarks",
+    "size_mm",
+    "gates",
+    "next",
+    "options",
+)
 
 
 def _flat(summary: Mapping[str, Any], before: str = "") -> Row:

@@ -84,7 +84,9 @@ def mechanics_of(
             return Mechanics(settings, body=design.body, self_contact=design.self_contact), []
     else:
         first = extend(design.unit, model)
-        effects, left_out = _with_weight(first.effects, design), list(first.left_out)
+        effects, left_out = _with_weight(first.effects, design), [*first.left_out]
+        if first.doubt:
+            left_out.insert(0, first.doubt)
     if effects.in_time:
         left_out.append(
             "effects in time (viscoelasticity, lag, leak, softening): targets apply to the unit at rest "

@@ -40,7 +40,7 @@ def report(found: Optimised, stopped: str = "") -> str:
     return page(
         f"Optimisation of {d.unit.name}",
         f"{len(d.targets)} targets, {len(d.freedoms)} freedoms",
-        note([f"Not in the simulation: {words}." for words in found.left_out], stopped),
+        note([f"Of the extended model: {words}." for words in found.left_out], stopped),
         lead,
         [
             ("front", "Front", _front(found)),

@@ -14,7 +14,7 @@ from ...evidence.extended import ExtendedModel, Fitted, load_model
 from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice_compression import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
-from ..diagnose.words import readable
+from ..diagnose.words import alternatives, listed, readable
 from .named_effects import NAMES, NamedEffects, law_within
 
 Values = Mapping[str, Fitted]
@@ -45,12 +45,14 @@ _OTHER_KIND = "its parameters are of another kind of experiment than a whole uni
 class Extended:
     """A unit with an extended model applied; applied, left_out: parts of the model, as text.
 
-    effects: those of the simulation, not of a unit's parameters. kept: the model with these effects alone.
+    doubt: why its verdict is no reason to apply it, and the rivals of what is applied; "" if it is. effects:
+    those of the simulation, not of a unit's parameters. kept: the model with these effects alone.
     """
 
     unit: Unit
     applied: tuple[str, ...]
     left_out: tuple[str, ...]
+    doubt: str
     effects: NamedEffects
     kept: ExtendedModel
 
@@ -108,16 +110,29 @@ def extend(unit: Unit, model: ExtendedModel, origin: str = "model.toml") -> Exte
     named = {name: {p: fitted.value for p, fitted in values.items()} for name, values in beside.items()}
     effects = NamedEffects(named, where=f"{origin}, [effect]")
     applied += effects.words()
-    if model.verdict == "ambiguous" and applied:
-        left_out.insert(
-            0, "the verdict is ambiguous: other effects fit these data equally well, see its report"
+    kept = {n: v for n, v in beside.items() if n in effects.values}
+    return Extended(
+        unit,
+        tuple(applied),
+        tuple(left_out),
+        _doubt(model) if applied or model.verdict == "unexplained" else "",
+        effects,
+        ExtendedModel(model.verdict, kept, {}, rivals=model.rivals if kept else ()),
+    )
+
+
+def _doubt(model: ExtendedModel) -> str:
+    """Why a model's verdict is no reason to apply it, continuing "the model's ..."; "" if it is."""
+    if model.verdict == "ambiguous":
+        applied = listed([readable(name) for name in model.effects]) if model.effects else "the one applied"
+        rivals = alternatives(model.rivals) if model.rivals else "another cause, see its report"
+        return (
+            f"verdict is ambiguous: the data fit {applied}, and equally {rivals}, which may move the unit "
+            "otherwise"
         )
     if model.verdict == "unexplained":
-        left_out.insert(
-            0, "the verdict is unexplained: the model is wrong, and it contains no effect that corrects it"
-        )
-    kept = ExtendedModel(model.verdict, {n: v for n, v in beside.items() if n in effects.values}, {})
-    return Extended(unit, tuple(applied), tuple(left_out), effects, kept)
+        return "verdict is unexplained: the model is wrong, and it contains no effect that corrects it"
+    return ""
 
 
 def _put(unit: Unit, origin: str, key: str, fitted: Fitted, put: Put) -> tuple[Unit, str]:
@@ -171,7 +186,8 @@ def _as_printed(model: ExtendedModel) -> Put:
             raise InputError(f"its lattice modulus would be {modulus}", "lattice_modulus_kPa", "")
         material = attrs.evolve(unit.material, lattice_modulus_kPa=modulus)
         return attrs.evolve(unit, material=material), (
-            f"the lattice's modulus at {unit.scale:g}x is {modulus:.4g} kPa ({drawn_kPa:.4g} kPa as drawn)"
+            f"a block of the lattice between plates has {modulus:.4g} kPa at {unit.scale:g}x as printed, "
+            f"{drawn_kPa:.4g} kPa as drawn; a printed body takes neither"
         )
 
     return put

@@ -222,8 +222,10 @@ def write_model_a(
     contact_kPa: Sequence[Array] = (),
     fields: dict[str, Array] | None = None,
     surfaces: dict[str, Surface] | None = None,
-) -> None:
+) -> list[dict[str, Array]]:
     """Write mesh.npz and model_a.npz of a finished Model A into `folder`/motion. Raises OutputError.
+
+    Returns of every state the fields (m,) of the elements by name, none where `fields` are given.
 
     history: of materials with memory in a state, by its number; contact_kPa: of every state the pressure (n,)
     at the mesh's nodes where the unit touches itself, or none without self-contact. fields: as
@@ -234,9 +236,10 @@ def write_model_a(
     surfaces = surfaces or surfaces_of(mesh)
     for name, surface in surfaces.items():
         arrays |= {f"{name}_{part}": values for part, values in attrs.asdict(surface).items()}
+    of_elements: list[dict[str, Array]] = []
     if fields is None:
         looked = SurfaceFields(mesh, {name: surface.node for name, surface in surfaces.items()})
-        fields = looked.of_states([state.u for state in trajectory.solved], materials, history)
+        fields = looked.of_states([s.u for s in trajectory.solved], materials, history, of_elements)
     found = dict(fields)
     for name, surface in surfaces.items() if len(contact_kPa) else ():
         found[f"{name}_{CONTACT_PRESSURE}"] = np.array([p[surface.node] for p in contact_kPa], np.float32)
@@ -253,6 +256,7 @@ def write_model_a(
         },
         packed=False,
     )
+    return of_elements
 
 
 class SurfaceFields:
@@ -272,22 +276,34 @@ class SurfaceFields:
         displacements: list[Array],
         materials: Materials,
         history: Callable[[int], Sequence[Array]] = lambda number: (),
+        of_elements: list[dict[str, Array]] | None = None,
     ) -> dict[str, Array]:
-        """Fields `REGION_FIELD` (s, v) of states, each given by its displacement (n, 3) in mm."""
-        from ...fem.lattice_law import stretches
-        from ...fem.stress import cauchy, von_mises
+        """Fields `REGION_FIELD` (s, v) of states, each given by its displacement (n, 3) in mm.
+
+        of_elements: gets the fields (m,) of every state's elements, of the means over their points.
+        """
+        from ...fem.stress import cauchy
 
         found: dict[str, list[Array]] = {f"{r}_{field}": [] for r in self._means for field in FIELDS}
         for number, u in enumerate(displacements):
             sigma, F = cauchy(self._mesh, u, materials, history(number), self._reference)
             for region, mean in self._means.items():
-                stress_kPa = in_kPa(mean(sigma))[self._places[region]]
-                stretch = stretches(mean(F)[self._places[region]])
-                principal = np.linalg.eigvalsh(stress_kPa)[:, 2]
-                values = von_mises(stress_kPa), principal, stretch[:, 2], stretch[:, 0]
-                for field, value in zip(FIELDS, values, strict=True):
+                place = self._places[region]
+                for field, value in _fields_of(mean(sigma)[place], mean(F)[place]).items():
                     found[f"{region}_{field}"].append(value)
+            if of_elements is not None:
+                of_elements.append(_fields_of(sigma.mean(axis=1), F.mean(axis=1)))
         return {name: np.array(values, np.float32) for name, values in found.items()}
+
+
+def _fields_of(sigma: Array, F: Array) -> dict[str, Array]:
+    """`FIELDS` (v,) of Cauchy stresses (v, 3, 3) in MPa and deformation gradients (v, 3, 3)."""
+    from ...fem.lattice_law import stretches
+    from ...fem.stress import von_mises
+
+    stress_kPa, stretch = in_kPa(sigma), stretches(F)
+    values = von_mises(stress_kPa), np.linalg.eigvalsh(stress_kPa)[:, 2], stretch[:, 2], stretch[:, 0]
+    return {n: v.astype(np.float32) for n, v in zip(FIELDS, values, strict=True)}
 
 
 def surfaces_of(mesh: Mesh) -> dict[str, Surface]:

@@ -1,4 +1,4 @@
-"""Tables of a study's motion: angle, stretch and self-contact of every state, and its states for ParaView."""
+"""Tables of a study's motion: every instant; stretch and self-contact of every state."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 
 from ...design.body import covering
 from ...fem.bending_angle import TipSection
+from ...fem.kinematics import cavity_volume_mm3
 from ...fem.state import State
 from ...fem.stress import peak_stretch
 from ...files import write_csv
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
-from ...report.vtk import write_trajectory
 from ...resolved.joint_stretch import joint_stretch
 
 if TYPE_CHECKING:
@@ -46,34 +46,32 @@ def instants(job: Job, states: Sequence[State]) -> list[tuple[float, float, Stat
 
 
 def _has_history(job: Job) -> bool:
-    """Return True if the way back differs, so that tables have an instant a row."""
+    """Return True if the way back differs from the way there."""
     return job.in_time or job.effects.in_time
 
 
+MOTION = "motion.csv"
+MOTION_COLUMNS = ("time_s", "pressure_kPa", "angle_deg", "tip_x_mm", "tip_y_mm", "tip_z_mm", "volume_mm3")
+
+
 def write_motion(folder: Path, job: Job, mesh: Mesh, states: Sequence[State]) -> dict[str, float]:
-    """Write angle.csv and model_a.pvd; return the angle in degrees by pressure. Raises OutputError."""
+    """Write motion.csv; return the angle in degrees by pressure, ascending. Raises OutputError.
+
+    A row an instant that was reached: the tip is the middle of its end plane, the volume that of the whole
+    cavity without the inlet. With effects in time `effective_kPa` is the pressure on the unit without them.
+    """
     tip = TipSection.of(mesh)
     reached = instants(job, states)
-    if _has_history(job):
-        rows: list[Row] = [
-            (f"{t:.9g}", f"{p:.6g}", f"{tip.angle_deg(s.u):.6g}", f"{s.pressure_kPa:.6g}")
-            for t, p, s in reached
-        ]
-        head = ["time_s", "pressure_kPa", "angle_deg"]
-        if job.effects.in_time:
-            # The effective pressure of the unit without the effects in time.
-            head.append("effective_kPa")
-        # Of a pressure met twice, what it was the first time.
-        first = {p: float(a) for _, p, a, _ in reversed(rows)}
-        angles = dict(sorted(first.items(), key=lambda item: float(item[0])))
-    else:
-        head = ["pressure_kPa", "angle_deg"]
-        found = [(f"{p:.6g}", tip.angle_deg(s.u)) for p, s in in_order(job, states)]
-        angles = dict(found)
-        rows = [(p, f"{a:.6g}") for p, a in found]
-    write_csv(folder / "angle.csv", head, [row[: len(head)] for row in rows])
-    write_trajectory(folder / "model_a.pvd", mesh, [(t, s) for t, _, s in reached])
-    return angles
+    measured = {
+        id(s): (tip.angle_deg(s.u) + 0.0, *tip.middle_mm(s.u), cavity_volume_mm3(mesh, s.u))
+        for _, _, s in reached
+    }
+    head = [*MOTION_COLUMNS, *(["effective_kPa"] if job.effects.in_time else [])]
+    rows = [(t, p, *measured[id(s)], s.pressure_kPa)[: len(head)] for t, p, s in reached]
+    write_csv(folder / MOTION, head, [(f"{t:.9g}", *(f"{v:.6g}" for v in row)) for t, *row in rows])
+    # Of a pressure met twice, what it was the first time.
+    first = {p: angle for _, p, angle, *_ in reversed(rows)}
+    return {f"{p:.6g}": first[p] for p in sorted(first)}
 
 
 def write_stretch(

@@ -19,7 +19,16 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-COLUMNS = ["path", "start", "length", "J_hat_mm", "J_cont_mm", "rank"]
+COLUMNS = [
+    "path",
+    "start",
+    "length",
+    "J_hat_mm",
+    "J_cont_mm",
+    "rank",
+    "mesh_uncertainty_mm",
+    "tied_with_chosen",
+]
 
 
 @attrs.define
@@ -60,8 +69,20 @@ class Ranking:
         """Write deviation.csv and delta.npz; return the figures of the summary. Raises OutputError."""
         found = [self.evaluations[c.name].deviation for c in paths]
         ranks = rank(np.array([d.J_hat for d in found]))
+        # One uncertainty for all: the largest change of a path's J_hat on another mesh.
+        mesh = "" if self.uncertainty_mm is None else f"{self.uncertainty_mm:.3g}"
+        ties = {c.name: "yes" if c.name in self.tied else "no" for c in paths} if mesh else {}
         rows = [
-            (c.name, c.start, c.length, f"{d.J_hat:.9g}", f"{d.J_cont:.9g}", int(r))
+            (
+                c.name,
+                c.start,
+                c.length,
+                f"{d.J_hat:.9g}",
+                f"{d.J_cont:.9g}",
+                int(r),
+                mesh,
+                ties.get(c.name, ""),
+            )
             for c, d, r in zip(paths, found, ranks, strict=True)
         ]
         write_csv(folder / "deviation.csv", COLUMNS, rows)

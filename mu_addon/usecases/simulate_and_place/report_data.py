@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -9,7 +10,7 @@ import numpy as np
 
 from ...design.parameters import assumed, stated
 from ...errors import InputError
-from ...files import write_bytes
+from ...files import plain, write_bytes, write_text
 from ...report.results import (
     Gate,
     PaintedStates,
@@ -20,6 +21,7 @@ from ...report.results import (
     ReportData,
     SideView,
 )
+from ...run.cache import key
 from ...run.versions import package_versions
 from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
@@ -37,12 +39,13 @@ FILES = {
     "unit.stl": "printable unit without a sensor, mm",
     "anchors.txt": "lattice nodes and anchors, mm",
     "mesh.vtu": "analysis mesh with regions and moduli",
-    "model_a.pvd": "motion without a sensor, one state per sample (ParaView)",
-    "angle.csv": "bending angle of every converged state",
+    "model_a.pvd": "motion without a sensor: displacement, stress and stretch of each sample (ParaView)",
+    "motion.csv": "pressure, bending angle, tip and volume of the cavity over time",
+    "angle.svg": "bending angle against pressure",
     "stretch.csv": "largest stretch of wall, struts and joints in every state, and how near to break",
     "self_contact.csv": "force, gap and largest pressure of the unit's contact with itself in every state",
     "contact.csv": "contact force, penetration and slip on each obstacle over time",
-    "deviation.csv": "deviation and rank of every path",
+    "deviation.csv": "deviation and rank of every path, its mesh uncertainty and ties",
     "delta.npz": "deviation over time and length of every path, mm",
     "sensitivity.vtu": "sensitivity of the deviation to the stiffness of each element, mm (ParaView)",
     "signals.csv": "light signal of each path, and its deviation",
@@ -56,13 +59,16 @@ FILES = {
 def write_report(study: Study, stopped: str = "") -> None:
     """Write report.html (and unit.png); `stopped`: why an incomplete study stopped.
 
-    Pictures take most of the time: a run that was asked to stop leaves them out. An existing report on more
-    stages, from the same inputs, is kept.
+    Pictures take most of the time: a run that was asked to stop leaves them out. An existing report on the
+    same figures, or on more stages from the same inputs, is kept.
     """
     from .report import write_html
 
-    if study.has_more and (study.folder / "report.html").is_file():
+    summary, figures = study.context.summary, _figures(study)
+    same = summary.get("report_of") == figures and not stopped
+    if (study.has_more or same) and (study.folder / "report.html").is_file():
         return
+    summary.pop("report_of", None)
     with study.progress.stage("report"):
         versions = package_versions()
         view, pictures = _pictures(study)
@@ -73,15 +79,29 @@ def write_report(study: Study, stopped: str = "") -> None:
         data = report_data(study, view, pictures, versions, stopped, _search_picture(study))
         study.progress.update(0.9)
         write_html(study.folder / "report.html", data)
+    if not stopped:
+        summary["report_of"] = figures
+
+
+# Of a summary what no report shows, or differs each time.
+_NOT_SHOWN = ("seconds", "options", "status", "report_of")
+
+
+def _figures(study: Study) -> str:
+    """Hash of the figures that a report shows: those of summary.json, with the versions of the packages."""
+    shown = {name: value for name, value in study.context.summary.items() if name not in _NOT_SHOWN}
+    return key(json.dumps(plain(shown), sort_keys=True), study.job.text())
 
 
 def _panel_pictures(study: Study) -> None:
     """Write pictures of the study's results for panels, into its folder of the motion."""
+    from ...report.plots import angle_against_pressure
     from .charts import write_angle, write_delta
 
     if study.trajectory is None or study.mesh is None or study.context.hurried:
         return
     write_angle(study.folder, *study.motion_in_order())
+    write_text(study.folder / "angle.svg", angle_against_pressure(*study.motion_in_order()))
     found = study.ranking.evaluations.values()
     top = max((float(np.nanmax(e.deviation.delta)) for e in found), default=0.0)
     for e in found:
@@ -91,7 +111,9 @@ def _panel_pictures(study: Study) -> None:
 def _of_model(study: Study) -> list[str]:
     """Changes that an extended model made to the unit, and those that were left out, as text."""
     model = study.context.summary.get("model", {})
+    doubt = model.get("doubt")
     return [
+        *([f"The extended model's {doubt}."] if doubt else []),
         *(f"Applied from the extended model: {words}." for words in model.get("applied", ())),
         *(f"Not applied from the extended model: {words}." for words in model.get("left_out", ())),
     ]

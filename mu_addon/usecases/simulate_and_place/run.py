@@ -75,8 +75,11 @@ def _require_a_waveguide(job: Job) -> None:
 
 
 def console_summary(summary: dict[str, Any]) -> list[str]:
-    """Lines of text on a study: angles, chosen paths and the best of a search, of finished stages."""
+    """Lines of text on a study: solid, angles, chosen path and the best of a search, of finished stages."""
     lines = []
+    if isinstance(solid := summary.get("solid"), dict):
+        size = " x ".join(f"{mm:.1f}" for mm in solid["size_mm"])
+        lines.append(f"solid: {size} mm, {solid['ml']:.1f} ml, {solid['g']:.1f} g of {solid['resin']}")
     angles = summary.get("angle_deg")
     if isinstance(angles, dict):
         ends = sorted((float(p), a) for p, a in angles.items())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from ...design.anchors import Window, anchor_points, windows
+from ...design.settings import USUAL_RESIN
 from ...design.solid import Solid, build_solid
 from ...design.stl_and_nodes import write_nodes, write_stl
 from ...errors import ConvergenceError, InputError, MeshingError
@@ -19,12 +20,13 @@ from ...fem.model import Model
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory
 from ...files import write_csv
+from ...materials.library import load_material
 from ...meshing.mesh import Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
-from ...report.vtk import write_mesh
+from ...report.vtk import write_mesh, write_trajectory
 from ...resolved.lattice import strut_volume_mm3
 from ...run.cache import Cache
 from ...run.context import RunContext
@@ -38,7 +40,7 @@ from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_files import write_model_a
-from .motion_tables import Row, in_order, write_motion, write_self_contact, write_stretch
+from .motion_tables import Row, in_order, instants, write_motion, write_self_contact, write_stretch
 from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
@@ -179,6 +181,13 @@ class Study:
         self.context.summary.setdefault("gates", {})[name] = gates
         if window is None:
             self.solid = solid
+            resin = load_material(USUAL_RESIN)
+            self.context.summary["solid"] = {
+                "size_mm": np.ptp(solid.vertices, axis=0),
+                "ml": solid.volume_mm3 / 1e3,
+                "g": solid.mass_g(resin.density_g_per_ml),
+                "resin": resin.name,
+            }
         return solid
 
     def make_mesh(self) -> Mesh:
@@ -252,6 +261,15 @@ class Study:
             start = [] if self.job.in_time or self.job.effects.has_gravity else [rest(self.mesh)]
             states = [*start, *self.states]
             self.context.summary["angle_deg"] = write_motion(self.folder, self.job, self.mesh, states)
+            self._write_states(states)
+
+    def _write_states(
+        self, states: Sequence[State], cells: Callable[[State], dict[str, Array]] = lambda state: {}
+    ) -> None:
+        """Write model_a.pvd, the states for ParaView. cells: values (m,) of the elements in one, by name."""
+        assert self.mesh is not None
+        reached = [(t, s) for t, _, s in instants(self.job, states)]
+        write_trajectory(self.folder / "model_a.pvd", self.mesh, reached, cells)
 
     def _write_motion(self, model: Model, trajectory: Trajectory) -> None:
         """Write the tables of a finished motion, and check it for doubtful results."""
@@ -270,7 +288,9 @@ class Study:
             summary["self_friction"] = {"coefficient": job.self_friction, "lost_mJ": lost}
         remembered = history_of_wall(job, self.cache, model)
         supplied = attrs.evolve(trajectory, pressure_kPa=job.supplied_kPa)
-        write_model_a(folder, mesh, job.materials(mesh), supplied, remembered, touching_kPa)
+        fields = write_model_a(folder, mesh, job.materials(mesh), supplied, remembered, touching_kPa)
+        of_state = dict(zip(map(id, states), fields, strict=True))
+        self._write_states(states, lambda state: of_state[id(state)])
         self.warn(*doubts_of_motion(job, mesh, states, summary))
 
     def place(self) -> str:
