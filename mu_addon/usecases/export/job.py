@@ -15,7 +15,7 @@ from ...design.anchors import Window, window
 from ...design.parameters import Unit, read_unit, to_toml
 from ...design.settings import USUAL_RESIN
 from ...errors import InputError
-from ...reading import file_text, unreadable
+from ...reading import file_bytes, file_text, unreadable
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, digest, named_path, read_inputs, require_digest, structured
 from ...toml_writer import toml_text
@@ -163,7 +163,7 @@ def deformed_in(run: Path, unit: Unit, kPa: float) -> Deformed:
     if not np.isclose(motion.state_kPa, kPa, rtol=0.0, atol=1e-6).any():
         known = ", ".join(f"{p:g}" for p in motion.state_kPa)
         raise InputError(f"that run has no state at {kPa:g} kPa", str(run), f"choose from {known}")
-    return Deformed(kPa, run, digest((run / FOLDER / f"{MODEL_A}.npz").read_bytes()))
+    return Deformed(kPa, run, digest(file_bytes(run / FOLDER / f"{MODEL_A}.npz", 1 << 30)))
 
 
 def resin_text(resin: Material | None) -> dict[str, str]:
