@@ -231,7 +231,8 @@ COMMANDS = {
     "simulate-resin": Command(f"simulate {QUICK} --resin {{fit-material}}/material.toml"),
     "simulate-model": Command(f"simulate {QUICK} --model {{diagnose}}/model.toml"),
     "place": Command(f"place {SMALL} --stations 11 --workers 1 --no-report"),
-    "homogenize": Command("homogenize --unit unit.toml --no-specimen --refine 0.5 --no-report"),
+    # pytetwild has no seed: each mesh of the cell is another, whose moduli differ by some per cent.
+    "homogenize": Command("homogenize --unit unit.toml --friction none --refine 0.5 --no-report", rtol=0.3),
     "grip-part": Command(
         "grip --gripper gripper.toml --solid-only", {"gripper.toml": GRIPPER, "finger.toml": preset(count=4)}
     ),
