@@ -71,8 +71,6 @@ class MU_OT_evidence_apply(ValidUnitOperator, bpy.types.Operator):
 
         found = evidence.diagnosis(root)
         extended = read_extended(to_unit(root.mu_unit), found.folder / evidence.MODEL)
-        if extended.doubt:
-            self.report({"WARNING"}, f"The model's {extended.doubt}")
         for words in extended.left_out:
             self.report({"WARNING"}, f"Not applied: {words}")
         if not extended.applied:
