@@ -77,7 +77,10 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("N/m2", "N/m\u00b2", "N/m^2", "\u043f\u0430"), 1e-3),
         **dict.fromkeys(("kgf/cm2", "kgf/cm\u00b2", "kg/cm2", "kg/cm\u00b2"), 10.0 * _KILOPOND),
         **dict.fromkeys(("mmHg", "Torr"), 101.325 / 760.0),
-        "\u043a\u043f\u0430": 1.0,
+        **dict.fromkeys(("\u043a\u043f\u0430", "kilopascal", "kilopascals", "kilopascales"), 1.0),
+        **dict.fromkeys(("pascal", "pascals", "pascales"), 1e-3),
+        **dict.fromkeys(("megapascal", "megapascals"), 1e3),
+        "millibar": 0.1,
         "atm": 101.325,
         **dict.fromkeys(("mmH2O", "mmWC", "mmWS"), 0.00980665),
         **dict.fromkeys(("cmH2O", "cmWC", "cmWS"), 0.0980665),
@@ -99,7 +102,7 @@ _SPELT: dict[str, dict[str, float]] = {
         **dict.fromkeys(("mm\u00b3", "mm^3", "\u00b5l", "\u03bcl"), 1.0),
         **dict.fromkeys(("cm\u00b3", "cc", "cm^3"), 1e3),
     },
-    "g": dict.fromkeys(("gram", "grams", "gramm"), 1.0),
+    "g": {**dict.fromkeys(("gram", "grams", "gramm"), 1.0), "oz": 28.349523125},
 }
 _UNITS = {
     unicodedata.normalize("NFC", name).casefold(): (read, factor)
@@ -121,7 +124,9 @@ _BY_CASE = {
 
 
 # A unit of pressure with the zero it counts from, such as psia, bar(g) and kPa abs, and titles that say so.
-_REFERENCE = re.compile(r"(psi|m?bar|[kmh]?pa|torr|mmhg)[ _]?[(\[]?(a|abs\.?|absolute?|g|ga|gauge)[)\]]?")
+_REFERENCE = re.compile(
+    r"(psi|m?bar|[kmh]?pa|torr|atm|(?:mm|in)hg|[mci][mn]h2o)[ _]?[(\[]?(a|abs\.?|absolute?|g|ga|gauge)[)\]]?"
+)
 _ABSOLUTE = re.compile(r"\babsolut\w*|\babs\b|\bgauge (?=press)")
 
 

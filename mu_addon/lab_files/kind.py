@@ -20,7 +20,8 @@ _TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione
 _COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")
 # Titles of a table of amplitudes, by frequency or temperature.
 _OSCILLATION = re.compile(
-    r"oscillat|\bosz|amplitud|(storage|loss|complex) mod|speichermod|verlustmod|module de (conservation|"
+    r"oscillat|\bosz|schwing|amplitud|dynamic (strain|stress|force|displ)|"
+    r"(storage|loss|complex) mod|speichermod|verlustmod|module de (conservation|"
     r"perte)|modulo (elastico|viscoso)|tan ?\W?(delta|d\b|\u03b4)|loss factor|verlustfaktor|"
     r"\b[eg]['\u2032\"\u2033]|\bfrequen|\bfreq\b|\bf ?[/\[(] ?hz|phase angle|phasenwinkel"
 )
@@ -109,8 +110,13 @@ def _is_stepped(columns: Mapping[str, Array]) -> bool:
 
 
 def require_curve(draft: Draft) -> Draft:
-    """Raise NoExperiment for loads that are amplitudes of an oscillation; an answered column is none."""
-    for k, one in enumerate(draft.block.columns) if draft.kind in _LOADED else ():
+    """Raise NoExperiment for amplitudes of an oscillation, and for one strain alone.
+
+    A column whose quantity is answered is taken as it is.
+    """
+    if draft.kind not in _LOADED:
+        return draft
+    for k, one in enumerate(draft.block.columns):
         if _OSCILLATION.search(plain(one.title)) and draft.answer_on("column", one)[1] is None:
             raise NoExperiment(
                 f"{draft.title(k)} shows a test by oscillation: its loads are amplitudes, and no "
@@ -118,6 +124,16 @@ def require_curve(draft: Draft) -> Draft:
                 draft.where,
                 "export a test of one pull or pressing; if each row is a reading of one, answer "
                 f"column.{draft.key(one)}=none, or with its quantity",
+            )
+    for name in ("strain", "displacement_mm"):
+        values = draft.columns.get(name)
+        if "time_s" in draft.columns or values is None or len(set(values[np.isfinite(values)])) != 1:
+            continue
+        if draft.answer_on("column", draft.block.columns[draft.places[name]])[1] is None:
+            raise NoExperiment(
+                f"{name} is {np.nanmax(values):g} in every row, and there is no time: that is no curve",
+                draft.where,
+                f"export a test of one pull or pressing, or the time of a test that holds the {name}",
             )
     return draft
 

@@ -48,7 +48,8 @@ def with_rising_time(draft: Draft) -> Draft:
             raise InputError(
                 "the time runs backward",
                 f"{draft.path}, line {line}",
-                "divide the file where a new record begins",
+                "divide the file where a new record begins; a counter of 16, 31 or 32 bits that begins again "
+                "is counted on where no rows are missing",
             )
         time = time + turn * np.concatenate([[0], np.cumsum(np.diff(time) < 0)])
         draft = draft.with_column("time_s", time - time[0]).concluding(

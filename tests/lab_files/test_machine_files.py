@@ -64,7 +64,7 @@ def changed(k, line):
     return lines(TITLES, *body)
 
 
-PRESSED = {"kind": "unit_pressure"}
+PRESSED, HOLD = {"kind": "unit_pressure"}, {"kind": "pressure_hold"}
 BEAM = {"kind": "beam_deadweight", "section_mm": "3x3", "length_mm": "40"}
 CLOCKED = PRESSED | {"column.2": "pressure", "column.3": "angle", "unit.2": "kPa", "unit.3": "deg"}
 HELD = {"kind": "pressure_hold", "interval_s": "0.5", "column.1": "pressure", "unit.1": "kPa"}
@@ -220,6 +220,10 @@ FILES = {
         many(lambda i: f"1.{i:02d},{i}", "Strain [-],Stress [kPa]"), {"column.1": "strain"}, {"strain": 1.59},
         [">begins at 1, as a stretch does"],
     ),
+    "a gap without a time": (
+        many(lambda i: f"{i},{i},{'' if i == 7 else i}", "No,Weg (mm),Kraft (N)"), {}, {"rows": 59, "force_N": 59},
+        ["column 'No'", "line 9: no number in column 'Kraft (N)'"],
+    ),
     "strain and force": (
         many(lambda i: f"{i / 100},{1000 * i}", "strain [-],force [mN]"), {}, {"force_N": 59}, [],
     ),
@@ -229,6 +233,9 @@ FILES = {
     "arrow": (
         many(lambda i: f"14:02:{i / 10 + 1:06.3f} -> {i},{2 * i}"), CLOCKED,
         {"time_s": 5.9, "angle_deg": 118}, [],
+    ),
+    "clock in brackets": (
+        many(lambda i: f"[2024-03-01 14:02:{i:02d}.5] {i} {2 * i}"), CLOCKED, {"time_s": 59}, [],
     ),
     "arrow and titles": (
         many(lambda i: f"1:02:{i:02d} -> {i}\t{i}", "1:01:59 -> Pressure (kPa)\tAngle (deg)"), PRESSED,
@@ -248,6 +255,10 @@ FILES = {
     "one column of commas": (
         many(lambda i: f"{20 - i // 50},{99 - i % 50}"), HELD, {"pressure_kPa": 19.9}, [],
     ),
+    "one column with units": (
+        many(lambda i: f"{2000 - i} Pa"), HELD | {"unit.1": "Pa"}, {"pressure_kPa": 1.941}, [],
+    ),
+    "one label": (many(lambda i: f"Pressure: {i} kPa"), {"interval_s": "1"} | HOLD, {"pressure_kPa": 59}, []),
     "one titled column": (
         many(lambda i: f"{2000 - i}", "Pressure (Pa)"), {"kind": "pressure_hold", "interval_s": "0.5"},
         {"pressure_kPa": 1.941}, [],
@@ -323,6 +334,7 @@ def test_what_is_asked(tmp_path, name):
 
 
 REFUSED = {
+    "one strain": (many(lambda i: f"0.1,{80 - i}", "Strain (%),Stress (kPa)"), "0.001 in every row"),
     "columns and decimals by commas": (
         many(lambda i: f"{i},5,{2 * i},5,0,{i:02d}", "Time,Load,Extension"),
         "commas separate columns as well.*line 2",
@@ -754,7 +766,9 @@ def test_the_sign_of_a_column_is_that_of_its_course_not_of_one_reading(
     ],
 )
 def test_amplitudes_of_an_oscillation_are_no_curve(tmp_path, titles):
-    text = lines(titles, "Hz,\u00b0C,%,kPa,kPa", *(f"1,{25 + i},0.1,{80 - i},{80 - i}" for i in range(40)))
+    text = lines(
+        titles, "Hz,\u00b0C,%,kPa,kPa", *(f"1,{25 + i},0.{i:02d}1,{80 - i},{80 - i}" for i in range(40))
+    )
     with pytest.raises(InputError, match="oscillation"):
         understood(tmp_path, text)
     said = {f"column.{titles.split(',')[k]}": "none" for k in (0, 4)}

@@ -8,7 +8,9 @@ from collections import Counter
 from ...table_cells.dialect import Row, delimiter_of, is_reading, lines_of, split
 from ..sheet import Content, Sheet
 
-_ARROW = re.compile(r"\s*(\d{1,2}:\d\d:\d\d(?:[.,]\d+)?)\s*->\s?(.*)")
+# The Arduino IDE writes an arrow behind the clock, terminal programs brackets around it.
+_CLOCK = r"((?:\d{4}-\d\d-\d\d[ T])?\d{1,2}:\d\d:\d\d(?:[.,]\d+)?)"
+_ARROW = re.compile(rf"\s*(?:{_CLOCK}\s*->|\[{_CLOCK}\])\s*(.*)")
 _PAIR = re.compile(
     r"\s*([^\W\d][\w .%/()-]*?)\s*[:=]\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s?([^\s\d,;|:=]*)"
     r"(?:\s*[,;|]\s*|\s+|$)"
@@ -22,8 +24,9 @@ def read(content: Content) -> tuple[Sheet, ...] | None:
     lines = lines_of(content.text)
     near = [line for line in lines[:_JUDGED] if line.strip()]
     arrows = 2 * sum(_ARROW.match(line) is not None for line in near) > len(near)
-    texts = [found[2] if arrows and (found := _ARROW.match(line)) else line for line in lines]
-    clocks = [found[1] if arrows and (found := _ARROW.match(line)) else "" for line in lines]
+    apart = [_ARROW.match(line) if arrows else None for line in lines]
+    texts = [found[3] if found else line for found, line in zip(apart, lines, strict=True)]
+    clocks = [found[1] or found[2] if found else "" for found in apart]
     labels = Counter(tuple(label for label, _, _ in _pairs(text)) for text in texts[:_JUDGED])
     most, times = labels.most_common(1)[0] if labels else ((), 0)
     if most and 2 * times > len(near):
