@@ -1,15 +1,18 @@
-"""Every candidate path, drawn on the lattice of a unit at rest."""
+"""Every candidate path, drawn as a chart beside the lattice of a unit at rest."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import bpy
+
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons
 from ..preview.skeletons import Skeleton
-from ..shared import displays
+from ..shared import displays, viewports
 from ..shared.registration import add_handlers, remove_handlers
 from ..unit import drawing, preview_update
+from ..unit import object as unit_object
 from ..unit.object import DRAWN_BESIDE, PREVIEW_DRAWN
 from ..unit.properties import to_unit
 from . import ranking
@@ -25,15 +28,16 @@ def candidate(root: Any, name: str) -> Any | None:
 
 
 def _draw(root: Any) -> None:
-    """Draw every candidate path on the lattice, in the colour of its J if it is known, or none."""
+    """Draw every candidate path beside the lattice, in the colour of its J if it is known, or none."""
     unit, drawn = to_unit(root.mu_unit), dict[str, Skeleton]()
     if root.mu_unit.candidates:
-        lanes = skeletons.candidates(unit, root.mu_unit.cut)
+        lanes = skeletons.candidates(unit)
         drawn = {CANDIDATE + name: path for name, path in lanes.items()}
         found = ranking.free(root)
         if found is not None:
             name, _, points = found
             drawn[FREE] = skeletons.free_path(points, name, unit.dimensions.cell)
+    new = bool(drawn) and not any(drawing.beside(root, name) for name in drawn)
     for name, path in drawn.items():
         chosen = name in (FREE, CANDIDATE + root.mu_unit.path)
         colour = "MU Waveguide" if chosen else "MU Candidate"
@@ -42,10 +46,22 @@ def _draw(root: Any) -> None:
     tubes = {name.removeprefix(CANDIDATE): drawing.beside(root, name) for name in drawn if name != FREE}
     if tubes:
         ranking.colour_and_label(root, tubes)
+    if new and not bpy.app.background:
+        # Not in a handler of an update, where nothing may be evaluated.
+        uuid = root.mu_unit.uuid
+        bpy.app.timers.register(lambda: _keep_in_view(uuid), first_interval=0.0)
     for child in list(root.children):
         name = child.get(displays.PART, "")
         if (name == FREE or name.startswith(CANDIDATE)) and name not in drawn:
             displays.remove(child)
+
+
+def _keep_in_view(uuid: str) -> None:
+    """A view that holds the unit holds its chart, too."""
+    root = unit_object.by_uuid(uuid)
+    if root is not None:
+        tubes = [child for child in root.children if child.get(displays.PART, "").startswith(CANDIDATE)]
+        viewports.keep_in_view(viewports.corners([root]), viewports.corners([root, *tubes]))
 
 
 def _known(root: Any) -> Any:

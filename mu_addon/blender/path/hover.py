@@ -1,7 +1,7 @@
 """The candidate path under the mouse, drawn where it truly runs in the lattice, in its own colour.
 
-The bars of all candidates stand side by side on the lattice, since in their true place they would cover each
-other. A click on one chooses it.
+The bars of all candidates stand side by side beside the lattice, since in their true place they would cover
+each other. A click on one chooses it.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.

@@ -21,6 +21,7 @@ from .candidates import CANDIDATE
 
 BETTER = "Mean deviation [mm], smaller is better"
 """Note on a ranking's numbers, next to the lattice and in the panel."""
+UNDECIDED = "≈: undecided, closer than the mesh's error"
 BESIDE = 190
 """Pixels taken by the legend of a field, to the left of this one."""
 
@@ -29,7 +30,7 @@ def lines(known: ranking.Known) -> list[str]:
     """Lines above the ramp: its quantity and, if the ranking is stale, a note."""
     if known.stale:
         return ["Mean deviation", "stale (grey): ranked with other parameters"]
-    return [BETTER]
+    return [BETTER, *([UNDECIDED] if known.tied else [])]
 
 
 def marks(known: ranking.Known) -> list[tuple[float, str]]:
@@ -45,7 +46,7 @@ def label(root: Any, known: ranking.Known, name: str) -> list[str]:
     """Name and rank of a path, with a question mark where the ranking is stale."""
     found = [path_symbol(name)]
     if name in known.j:
-        found.append(f"#{list(known.j).index(name) + 1}{'?' if known.stale else ''}")
+        found.append(known.rank(name))
     return found
 
 

@@ -9,11 +9,11 @@ from ...design.anchors import windows
 from ..shared.wording import anchors_of, path_symbol
 from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
-from .legend import BETTER
+from .legend import BETTER, UNDECIDED
 from .picking import selected_candidate
 
 ORDERS = (
-    ("name", "By Name", "As they lie along the unit, on the lattice, too"),
+    ("name", "By Name", "As they stand beside the unit"),
     ("deviation", "By Deviation", "The one that disturbs the motion least first"),
 )
 
@@ -51,6 +51,9 @@ def _list(layout, context, root) -> None:
     row.prop(context.window_manager, "mu_path_order", expand=True)
     # Same height in both cases, so that a click on a run without a ranking moves nothing.
     layout.label(text=BETTER if ranked else "Simulate to rank them")
+    known = ranking.known(root)
+    if ranked and known.tied:
+        layout.label(text=UNDECIDED)
     column = layout.column(align=True)
     for window in in_order(root, ranked, context.window_manager.mu_path_order):
         chosen = root.mu_unit.path == window.name
@@ -61,8 +64,7 @@ def _list(layout, context, root) -> None:
         row = row.split(factor=0.45)
         row.label(text=anchors_of(window))
         if window.name in ranked:
-            j, rank = ranked[window.name]
-            row.label(text=f"{j:.3f}  #{rank}")
+            row.label(text=f"{ranked[window.name][0]:.3f}  {known.rank(window.name)}")
 
 
 def in_order(root, ranked, order: str):

@@ -18,11 +18,18 @@ from ..simulate import study_folder as studies
 class Known:
     """Candidate paths of the shown run: J_hat in mm by name, the best first.
 
-    stale: True if it is of a unit with other parameters.
+    stale: True if it is of a unit with other parameters; tied: paths that differ from the best by less than
+    the error of the mesh, and the best with them.
     """
 
     j: dict[str, float]
     stale: bool = False
+    tied: frozenset[str] = frozenset()
+
+    def rank(self, name: str) -> str:
+        """Rank of a path as text: "#2"; "≈#1" if undecided among the best; "#2?" if stale."""
+        doubt = "?" if self.stale else ""
+        return f"≈#1{doubt}" if name in self.tied else f"#{list(self.j).index(name) + 1}{doubt}"
 
     def share(self, name: str) -> float:
         """Position of a path's J between the smallest, 0, and the largest, 1, shown by its colour."""
@@ -37,7 +44,10 @@ class Known:
 def known(root: Any) -> Known:
     """J of every path in the shown run, also if that is stale; empty without a ranking."""
     found = studies.findings(root)
-    return Known({}) if found is None else Known(dict(found.ranking), found.stale)
+    if found is None:
+        return Known({})
+    tied = found.summary.get("tied_with_chosen") or ()
+    return Known(dict(found.ranking), found.stale, frozenset([found.ranking[0][0], *tied] if tied else ()))
 
 
 def ranked(root: Any) -> dict[str, tuple[float, int]]:
@@ -59,14 +69,13 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
     Stale ones are grey, their rank with a question mark.
     """
     found = known(root)
-    for rank, name in enumerate(found.j, 1):
+    for name in found.j:
         if name not in candidates:
             continue
         tube = candidates[name]
         modifier = tube.modifiers[0]
-        doubt = "?" if found.stale else ""
         # Below the name: the tubes are too close for more beside it.
-        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n#{rank}{doubt}")
+        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
         if name != root.mu_unit.path and not found.stale:
             j_colour = field_colours.of_map(found.share(name))
             colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)

@@ -13,7 +13,8 @@ COLOURS = {
     "MU Wells": (0.30, 0.10, 0.0, 1.0),
     "MU Candidate": (0.62, 0.68, 0.78, 1.0),
     "MU Flaws": (1.0, 0.05, 0.05, 1.0),
-    "MU Doubt": (1.0, 0.50, 0.0, 1.0),
+    # Orange is the waveguide's.
+    "MU Doubt": (0.72, 0.20, 0.80, 1.0),
     "MU Solid": (0.62, 0.66, 0.70, 1.0),
     "MU Measured": (1.0, 0.42, 0.05, 1.0),
     "MU Model": (0.12, 0.45, 1.0, 1.0),

@@ -166,29 +166,27 @@ def bar(found: Bar | None) -> Skeleton | None:
     return Skeleton(corners.reshape(-1, 3), faces=(faces,), slots=slots, smooth=False)
 
 
-def candidates(unit: Unit, cut: bool) -> dict[str, Skeleton]:
-    """Every candidate path by name on the lattice's face toward +x or, with `cut`, on its section.
+def candidates(unit: Unit) -> dict[str, Skeleton]:
+    """Every candidate path by name, as a chart beside the lattice, on the side of its anchors.
 
-    All of them run along one column of anchors and would cover each other. Seen from +x each has its true
-    length and height, in a separate lane. A ranking moves none of them.
+    All of them run along one column of anchors and would cover each other there. Seen from +x each has its
+    true length and height, in a separate lane. A ranking moves none of them.
     """
     d = unit.dimensions
     at, side = anchor_points(unit), float(np.sign(d.row)) or 1.0
     low, high = d.bounds[1]
-    edge = high if side > 0 else low
     radius = CANDIDATE_RADIUS * d.cell
     known = {window.name: window for window in windows(len(at))}
     lane = min(WIDEST_LANE * d.cell, (high - low) / len(known))
-    front = (0.0 if cut else d.bounds[0][1]) + 1.5 * radius
     found = {}
     for number, name in enumerate(known):
         points = at[list(known[name].indices)].copy()
-        points[:, 0] = front
-        points[:, 1] = edge - side * lane * (number + 0.5)
+        points[:, 0] = 0.0
+        points[:, 1] = (high if side > 0 else low) + side * (d.cell + lane * (number + 0.5))
         size = 0.5 * lane
         label = {
             "Label": path_symbol(name),
-            "At": (front, float(points[0, 1]) - 0.5 * size, float(points[0, 2]) - 1.4 * size),
+            "At": (0.0, float(points[0, 1]) - 0.5 * size, float(points[0, 2]) - 1.4 * size),
             "Size": size,
             "In Viewport": False,
         }

@@ -43,7 +43,8 @@ def frame_points(area: Any, points: Any) -> None:
     radius = ROOM * float(np.linalg.norm(points - middle, axis=1).max())
     region = next(region for region in area.regions if region.type == "WINDOW")
     # The narrower side; unknown in background.
-    share = min(region.height / region.width, 1.0) if min(region.height, region.width) > 1 else LOWER
+    known = min(region.height, region.width) > 1
+    share = min(region.height / region.width, between_sides(area)) if known else LOWER
     space = area.spaces.active
     view = space.region_3d
     view.view_location = middle
@@ -60,13 +61,23 @@ def keep_in_view(before: Any, after: Any) -> None:
             frame_points(area, after)
 
 
+def between_sides(area: Any) -> float:
+    """Share of a view's width, about its middle, that toolbar and sidebar leave clear."""
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    over = [other.width for other in area.regions if other.type in ("TOOLS", "UI") and other.width > 1]
+    # Beside the view, and not over it, they take nothing of it.
+    over = over if region.width >= area.width > 1 else []
+    return max(1.0 - 2.0 * max(over, default=0.0) / max(region.width, 1), 0.3)
+
+
 def holds(area: Any, points: Any) -> bool:
-    """Return True if all points (n, 3) are within a view, headers and sidebar over it left aside."""
+    """Return True if all points (n, 3) are within a view, between toolbar and sidebar over it."""
     projected = (
         np.column_stack([points, np.ones(len(points))])
         @ np.array(area.spaces.active.region_3d.perspective_matrix).T
     )
-    return bool((np.abs(projected[:, :2]) <= projected[:, 3:]).all())
+    limits = np.array([between_sides(area), 1.0])
+    return bool((np.abs(projected[:, :2]) <= limits * projected[:, 3:]).all())
 
 
 def scale(factor: float) -> None:

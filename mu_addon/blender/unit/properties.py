@@ -161,8 +161,8 @@ class MU_PG_unit(bpy.types.PropertyGroup):
         ),
         "candidates": BoolProperty(
             name="Show Candidates",
-            description="Draw every candidate path on the lattice of the unit at rest, to compare them "
-            "and choose one by a click. Result hides them, because the unit is bent there",
+            description="Draw every candidate path beside the unit at rest, at its true height, to compare "
+            "them and choose one by a click. Result hides them, because the unit is bent there",
             update=_candidates_changed,
         ),
         "show": EnumProperty(

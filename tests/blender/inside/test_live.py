@@ -191,7 +191,10 @@ def test_a_view_that_holds_the_unit_at_rest_holds_it_bent(monkeypatch):
     """A view of 2 by 2: framed for what leaves it, left alone where the unit at rest is out of it already."""
     framed = []
     eye = SimpleNamespace(perspective_matrix=np.eye(4))
-    area = SimpleNamespace(spaces=SimpleNamespace(active=SimpleNamespace(region_3d=eye)))
+    window = SimpleNamespace(type="WINDOW", width=800)
+    area = SimpleNamespace(
+        spaces=SimpleNamespace(active=SimpleNamespace(region_3d=eye)), regions=[window], width=800
+    )
     monkeypatch.setattr(viewports, "areas", lambda: [area])
     monkeypatch.setattr(viewports, "frame_points", lambda area, points: framed.append(points))
     box = np.array([[-0.8, -0.8, 0.0], [0.8, 0.8, 0.0]])
@@ -200,3 +203,7 @@ def test_a_view_that_holds_the_unit_at_rest_holds_it_bent(monkeypatch):
     assert len(framed) == 0
     viewports.keep_in_view(box, 1.3 * box)
     assert len(framed) == 1
+    # What the sidebar covers is not seen.
+    area.regions = [window, SimpleNamespace(type="UI", width=160)]
+    viewports.keep_in_view(0.7 * box, 0.75 * box)
+    assert len(framed) == 2

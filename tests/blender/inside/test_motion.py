@@ -1,5 +1,7 @@
 """Results on the model: objects, attributes, timeline and panels, from a study that was run by the core."""
 
+import json
+
 import bpy
 import numpy as np
 from PIL import Image
@@ -414,15 +416,24 @@ def test_candidates_say_their_rank(study):
     colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
     assert len(colours) == 9
     assert not unit_object.behind(root)
-    # They lie on the lattice in the order of their names, whatever the ranking; each at its own height.
+    # They stand beside the lattice in the order of their names, whatever the ranking; each at its own height.
     order = [name for name, _ in sorted(known.items(), key=lambda item: item[1][1])]
     ends = {name: motion_parts.vertices_of(tube.data) for name, tube in tubes.items()}
     places = [ends[f"alpha{number}"][0, 1] for number in range(1, 11)]
-    assert places == sorted(places, reverse=True)
-    low, high = to_unit(root.mu_unit).dimensions.bounds[1]
-    assert low < places[-1] < places[0] < high
+    assert places == sorted(places)
+    assert places[0] > to_unit(root.mu_unit).dimensions.bounds[1][1], "and cover nothing of it"
     anchors = anchor_points(to_unit(root.mu_unit))
     assert np.allclose(ends["alpha4"][:, 2], anchors[3:, 2], atol=1e-4)
+    # What the mesh cannot decide says so, in the view, in the list and above the colours.
+    summary = study / "summary.json"
+    found = json.loads(summary.read_text())
+    summary.write_text(json.dumps({**found, "tied_with_chosen": [order[1]]}))
+    known_now = ranking.known(root)
+    assert [known_now.rank(name) for name in order[:3]] == ["≈#1", "≈#1", "#3"]
+    assert path_legend.label(root, known_now, order[1])[-1] == "≈#1"
+    assert path_legend.UNDECIDED in path_legend.lines(known_now)
+    assert path_legend.UNDECIDED in drawn([path_panel.MU_PT_path])
+    summary.write_text(json.dumps(found))
     share = ranking.known(root).share
     assert (share(order[0]), share(order[-1])) == (0.0, 1.0)
     marks = dict(path_legend.marks(ranking.known(root)))
