@@ -11,13 +11,15 @@ from .curved_reading import curved_reading
 from .effect import NUMERICS, SLIP, STEP
 from .fit import PRIOR, Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Selection
-from .plausibility import at_a_bound, held_back, value_at_a_bound
+from .plausibility import at_a_bound, held_back, unabsorbed, value_at_a_bound
 from .record import KNOWN
 from .residuals import Dependence
 from .scatter import STATED, excess
 
 Array = np.ndarray[Any, Any]
 
+# An effect of which nuisances leave less than this stands in for them.
+ABSORBED = 0.02
 # Of a nuisance that a bound holds back, in words.
 BOUND = "is at its bound"
 # Name of the test for a jump at one moment.
@@ -61,14 +63,22 @@ def doubts(
     return (
         sudden(table_base, base, chosen, margin)
         or _too_large(chosen)
-        or bounded_by(fitter, chosen)
+        or bounded_by(fitter, base, chosen)
         or curved_reading(fitter, base, chosen)
     )
 
 
-def bounded_by(fitter: Fitter, fit: Fit) -> str:
-    """Nuisance at a bound that makes part of the misfit itself, as text; empty without one."""
+def bounded_by(fitter: Fitter, base: Fit, chosen: Fit) -> str:
+    """Nuisance at a bound that makes part of the misfit itself, as text; empty without one.
+
+    That of the chosen model, or of the base model if a chosen effect stands in for what lies beyond its
+    bound: one that a free nuisance would absorb.
+    """
+    fit = chosen
     p = held_back(fitter, fit)
+    if p is None and any(share < ABSORBED for share in unabsorbed(chosen)):
+        fit = base
+        p = held_back(fitter, fit)
     if p is None:
         return ""
     value = f"{fit.values[p.name]:.3g} {p.unit}".rstrip()

@@ -96,7 +96,7 @@ LIBRARY = {
         "a gauge at the unit, read beside the log; the same protocol at a third of the rate",
     ),
     "leak": (
-        "leaking air flows through the line, so the chamber pressure is below the gauge",
+        "leaking air flows through the line, so the chamber pressure is nearer the air's than the gauge",
         "a closed valve",
     ),
     "clogged_chamber": ("one chamber receives less pressure than the others", "markers along the unit"),

@@ -76,7 +76,7 @@ def mainly(fitter: Fitter, found: Selection) -> Selection | None:
             return None
     if (not step and sudden(found.table_base, base, best)) or curved_reading(fitter, base, best):
         return None
-    if bounded_by(fitter, best):
+    if bounded_by(fitter, base, best):
         return None
     gain, dof = base.chi2 - best.chi2 - by_search(best), len(best.keys) - len(base.keys)
     p = by_count(gain, dof, len(found.singles) + len(found.wider))

@@ -89,6 +89,18 @@ def held_back(fitter: Fitter, fit: Fit) -> Parameter | None:
     return None
 
 
+def unabsorbed(fit: Fit) -> list[float]:
+    """Share of each effect's change of the prediction, by its size, that the nuisances do not take up."""
+    every = np.vstack([fit.jacobian, fit.prior])
+    sizes = [fit.keys.index(e.keys[0]) for e in fit.effects if not e.among]
+    of_effects = {key for e in fit.effects for key in e.keys}
+    others = [i for i, key in enumerate(fit.keys) if key not in of_effects]
+    q = np.linalg.qr(every[:, others])[0]
+    left = every[:, sizes] - q @ (q.T @ every[:, sizes])
+    length = np.linalg.norm(every[:, sizes], axis=0)
+    return (np.linalg.norm(left, axis=0) / np.maximum(length, 1e-300)).tolist()
+
+
 def at_a_bound(fit: Fit) -> bool:
     """Return True if a fitted value of an effect lies at a bound that is not its null."""
     return any(

@@ -51,7 +51,7 @@ def gauge(kind: str) -> tuple[Effect, ...]:
             (Parameter("offset_kPa", "kPa", -10.0, 10.0, 0.0, (-1.0, 1.0), "gauge pressures of benches"),),
             (kind,),
         ),
-        Effect("pressure_gain", (factor("gain", 0.05, "gauge's sheet", (-0.3, 0.3)),), (kind,)),
+        Effect("pressure_gain", (factor("gain", 0.05, "gauge's sheet, units"),), (kind,)),
         Effect(CURVE, (GAUGE_BOW,), (kind,)),
     )
 

@@ -53,13 +53,13 @@ EFFECTS = (
             ),
         ),
         (KIND,),
-        "gas flows out through pores or cracks, by the difference of the squared absolute pressures",
+        "gas flows through pores or cracks, out or in, by the difference of the squared absolute pressures",
     ),
     Effect(
         "leak",
         (Parameter("hole_per_s", "1/s", 0.0, 0.2, 0.0, (3e-4, 0.01), "flow through a hole, as below"),),
         (KIND,),
-        "gas flows out through a hole, choked where the pressure inside is 1.9 times that outside",
+        "gas flows through a hole, out or in, choked where one pressure is 1.9 times the other",
     ),
     Effect(
         "leak",

@@ -36,7 +36,7 @@ from .judged_data import JudgedData, curves
 from .report import write_report
 from .simulators import BASE, DESIGNS, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
 from .unknown import ROUNDS, Shapes, Unknown, leading, shapes
-from .words import advice, readable, sentence, to_do
+from .words import advice, readable, sentence, to_do, warm
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
@@ -123,6 +123,7 @@ def diagnose_data(job: Job, folder: Path, context: RunContext) -> JudgedData | N
         model = stacked(job.known, model)
     notes += _bounds_met(verdict, simulator)
     notes += _noisy_gauges(measured, verdict)
+    notes += warm(measured.experiments)
     notes += verdict.set_aside
     notes += [
         f"{titles} could not be computed, and was not compared: {why}"

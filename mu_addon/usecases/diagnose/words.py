@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ...evidence.record import KNOWN
 from ...evidence.scatter import STATED, noise_limit
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
+from ...measured import Experiment
 from .remedies import in_the_simulation, what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
@@ -48,6 +49,8 @@ SLIPS = {
     "pressure_gain": _PRESSURES,
 }
 SLIP_SHARE = 0.03
+# Elastomers are tested up to so many degrees; a room has 60 to 80 °F.
+WARMEST_C = 60.0
 # Least share of a misfit for an explanation to be reported.
 LEAST_SHARE = 0.1
 # Number of intervals from which a table is used.
@@ -242,6 +245,16 @@ def _left_out(verdict: Verdict) -> str:
     return (
         f"{count} of {every} readings of {len(found)} records stand alone and do not count." if count else ""
     )
+
+
+def warm(experiments: Iterable[Experiment]) -> list[str]:
+    """Temperatures at which such parts are seldom tested, as text, with those if they were in deg F."""
+    return [
+        f"{e.name}: temperature_C is {e.temperature_C:g}; {e.temperature_C:g} °F would be "
+        f"{(e.temperature_C - 32.0) / 1.8:.3g} °C: check the unit"
+        for e in experiments
+        if e.temperature_C > WARMEST_C
+    ]
 
 
 def _unit_slip(verdict: Verdict) -> str:
