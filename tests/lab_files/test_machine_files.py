@@ -221,8 +221,8 @@ FILES = {
         [">begins at 1, as a stretch does"],
     ),
     "a gap without a time": (
-        many(lambda i: f"{i},{i},{'' if i == 7 else i}", "No,Weg (mm),Kraft (N)"), {}, {"rows": 59, "force_N": 59},
-        ["column 'No'", "line 9: no number in column 'Kraft (N)'"],
+        many(lambda i: f"{i},{i},{'' if i == 7 else i}", "No,Weg (mm),Kraft (N)"),
+        {}, {"rows": 59, "force_N": 59}, ["column 'No'", "line 9: no number in column 'Kraft (N)'"],
     ),
     "strain and force": (
         many(lambda i: f"{i / 100},{1000 * i}", "strain [-],force [mN]"), {}, {"force_N": 59}, [],
