@@ -10,8 +10,8 @@ from ..table_cells.notation import number
 from .columns import unit_of
 
 LENGTH = re.compile(
-    r"gau?ge length|grip separation|messlange|einspannlange|anfangslange|initial length|specimen length|"
-    r"\bheight\b|\bhohe\b|probenhohe|longueur|lunghezza|longitud|\bl0\b"
+    r"gau?ge length|dimension\W+length|grip separation|messlange|einspannlange|anfangslange|initial length|"
+    r"specimen length|\bheight\b|\bhohe\b|probenhohe|longueur|lunghezza|longitud|\bl0\b"
 )
 WIDTH = re.compile(r"width|breite|largeur|larghezza|anchura|szerokosc|\bb0\b")
 THICKNESS = re.compile(r"thickness|dicke|epaisseur|spessore|espesor|grubosc|\ba0\b")

@@ -293,6 +293,11 @@ def test_what_comes_out_of_a_file(tmp_path, name):
 
 
 ASKED = {
+    "a curve of x and y": (many(lambda i: f"{i},{i * i}", "x,y"), {}, [("column.x", ""), ("column.y", "")]),
+    "three axes of no place": (
+        many(lambda i: f"{i},{i % 7},{i % 5},{i % 3}", "Time (s),Gyro X,Gyro Y,Gyro Z"),
+        {}, [(f"column.Gyro {axis}", "") for axis in "XYZ"],
+    ),
     "unknown title": (
         table(lambda row, i: row, "Tid,Qwx,Kraft", "s,mm,N"), COUPON, [("column.Qwx", "displacement")],
     ),
@@ -348,6 +353,10 @@ REFUSED = {
     "tracked markers": (
         many(lambda i: f"{i},{100 + i},50,{200 + i},50", "Time (ms),a X,a Y,b X,b Y"),
         "tracked markers: a, b.*`track a.csv",
+    ),
+    "motion capture": (
+        many(lambda i: f"{i},0,{100 + i},{200 + i},{i}", "Trajectories", "Frame,Sub,X,Y,Z", ",,mm,mm,mm"),
+        "tracked markers: column 'X' is in mm.*bending plane",
     ),
     "Kinovea's text": (
         many(lambda i: f"0.{i:02d} {100 + i} {i}", "#Kinovea Trajectory data export", "#T X Y"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -15,11 +16,14 @@ from ...lab_files.sheet import Sheet
 from ...lab_files.source import read_sheets
 from ...measured.kinds import ACCURACIES
 from ...table_cells.notation import DECIMALS
-from ..track_video.tracked_table import NO_MARKERS, read_pixels
+from ..track_video.tracked_table import read_pixels
 
 # One answer for all of a file: its decimal sign.
 DECIMAL = "decimal"
 _INTERVAL = "interval_s"
+# Words of files whose pairs of x and y are positions, and of those where they are something else.
+_TRACKERS = re.compile(r"kinovea|bodyparts|\bmarker|track|trajector")
+_NO_PLACES = re.compile(r"accel|\bacc\b|gyro|magnet|\bimu\b")
 # Keys that answer a question or change a conclusion; others are mistakes.
 KEYS = (
     "kind",
@@ -124,17 +128,25 @@ def understand(
 
 
 def _require_untracked(path: Path) -> None:
-    """Raise InputError for a file of tracked markers, which another command reads."""
+    """Raise InputError for a file of tracked markers, which another command reads.
+
+    One pair of x and y may be any curve, and an accelerometer has three axes as well.
+    """
+    names: tuple[str, ...] = ()
+    refused = remedy = ""
     try:
         names = read_pixels(path).names
     except InputError as error:
-        if error.what == NO_MARKERS or error.what.startswith("cannot read"):
-            return
-        names = ()
+        refused, remedy = error.what, f"; {error.remedy}"
+    shown = " ".join(" ".join(row.filled) for sheet in read_sheets(path) for row in sheet.rows[:8]).casefold()
+    by_name = (names or "not in pixels" in refused) and _TRACKERS.search(shown)
+    if _NO_PLACES.search(shown) or not (len(names) > 1 or "three axes" in refused or by_name):
+        return
+    listed = ", ".join(names[:4]) or refused
     raise InputError(
-        "the file holds positions of tracked markers" + (f": {', '.join(names[:4])}" if names else ""),
+        f"the file holds positions of tracked markers: {listed}",
         str(path),
-        f"`track {path.name} --markers bench.toml --pressure ladder.csv` makes an experiment of them",
+        f"`track {path.name} --markers bench.toml --pressure ladder.csv` makes an experiment of them{remedy}",
     )
 
 
