@@ -107,11 +107,12 @@ def free_columns(draft: Draft) -> Draft:
 def _rank(held: tuple[int, Column]) -> tuple[bool, bool, bool, int]:
     """Order in which columns of one quantity are preferred.
 
-    A clock beside a numeric time adds nothing; nor does a machine's position beside an extension.
+    A clock beside a numeric time adds nothing; nor does a machine's position beside an extension, or a weight
+    in grams beside a force.
     """
     k, one = held
     return (
-        one.unit == "clock",
+        one.unit == "clock" or (one.quantity == "force" and (unit_of(one.unit) or "")[:1] == ("g",)),
         one.quantity == "position",
         _EXTREME.search(plain(one.title).replace("_", " ")) is not None,
         k,

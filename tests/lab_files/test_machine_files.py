@@ -196,6 +196,10 @@ FILES = {
     ),
     "force in kg": (many(lambda i: f"{i},{i}", "Kraft [kg],Weg [mm]"), {}, {"force_N": 59e3 * g_N}, []),
     "weight in g": (many(lambda i: f"{i},{i}", "Weight (g),Extension (mm)"), {}, {"force_N": 59 * g_N}, []),
+    "g beside N": (
+        many(lambda i: f"{9 * i},{i},{i}", "Load (g),Force (N),Weg (mm)"),
+        {}, {"force_N": 59}, ["another force", ">weight"],
+    ),
     "answered g": (
         many(lambda i: f"{i},{i}", "W,Weg (mm)"), {"column.W": "force", "unit.W": "g"}, {"force_N": 59 * g_N},
         [],
