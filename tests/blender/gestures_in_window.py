@@ -305,6 +305,7 @@ def in_trees():
     assert called(bpy.ops.mu.tree_new, template="three-walls") == {"FINISHED"}
     (tree,) = trees.trees()
     yield 0.7
+    assert len(roots()) == 4, "its three walls are in the scene, beside the unit that was there"
     found = trees.refresh(tree)
     motions = [n for n in tree.nodes if n.bl_label == "Simulate"]
     assert {found[n.name].state for n in motions} == {"waiting"}
@@ -357,6 +358,11 @@ def in_trees():
             break
         yield 0.5
     assert child.state == "cancelled", (child.state, child.error)
+    for node in next(trees.trees()).nodes:
+        if getattr(node, "follower", None) is not None:
+            select(node.follower)
+            called(bpy.ops.mu.delete)
+    yield 0.7
 
 
 def while_running():

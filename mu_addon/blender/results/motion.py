@@ -498,9 +498,15 @@ def _loaded(*_):
             _write(root, bpy.context.scene)
 
 
+def _forget_trouble(root: Any) -> None:
+    # What is empty is left: each write is an update of the scene.
+    if root.mu_motion.trouble:
+        root.mu_motion.trouble = ""
+
+
 def _job_ended(_key: str) -> None:
     for root in unit_object.roots():
-        root.mu_motion.trouble = ""
+        _forget_trouble(root)
         follow(root)
 
 
@@ -508,7 +514,7 @@ def _chosen(root: Any) -> None:
     """Show a result: if none is in the unit's place yet, that of Model A."""
     if updates.are_paused():
         return
-    root.mu_motion.trouble = ""
+    _forget_trouble(root)
     if root.mu_unit.show != unit_object.RESULT:
         return
     # They lie on the unit at rest, which is shown with them.

@@ -105,7 +105,7 @@ def _look_buttons(layout, root, ranked: bool) -> None:
         cell.operator("mu.field_show", text=text, depress=on).field = name
     row = layout.row()
     row.use_property_split = False
-    text = "Ranking on the Lattice" if ranked else "Candidates on the Lattice"
+    text = "Ranking beside the Unit" if ranked else "Candidates beside the Unit"
     row.prop(root.mu_unit, "candidates", text=text, toggle=True, icon="CURVE_PATH")
 
 

@@ -17,7 +17,8 @@ from . import object as unit_object
 from .base_classes import UnitOperator
 
 OF_WALL = ("membrane_modulus_kPa", "membrane_poisson", "elongation_at_break")
-OWN = "Resin of Your Own"
+NONE = "Choose a Resin"
+"""In place of a name while a unit has the default constants or, with others, none by name."""
 
 
 def parameters(resin: Any) -> dict[str, dict[str, Any]]:
@@ -38,15 +39,15 @@ def take(root: Any, name: str, given: dict[str, dict[str, Any]]) -> None:
 
 
 def name_of(root: Any) -> str:
-    """Name of the unit's resin, or that its constants are no longer those of one."""
+    """Name of the unit's resin, with a note if its constants were changed; without one, what to do."""
     kept = json.loads(root.mu_unit.resin or "{}")
     for section, values in kept.get("values", {}).items():
         group = getattr(root.mu_unit, section)
         for key, value in values.items():
             now = getattr(group, key)
             if now != value and not (isinstance(value, float) and np.isclose(now, value, rtol=1e-6)):
-                return OWN
-    return str(kept.get("name", OWN))
+                return f"{kept['name']}, changed"
+    return str(kept.get("name", NONE))
 
 
 class MU_OT_resin(UnitOperator, bpy.types.Operator):

@@ -234,9 +234,9 @@ def test_a_surface_is_lit_and_the_nearer_triangle_hides_the_other():
     assert np.array_equal(turned, pixels)
 
 
-def test_a_resin_is_chosen_by_its_name_and_one_of_your_own_is_said_to_be():
+def test_a_resin_is_chosen_by_its_name_and_a_changed_one_is_said_to_be():
     root = add()
-    assert resins.name_of(root) == "Resin of Your Own"
+    assert resins.name_of(root) == "Choose a Resin"
     assert bpy.ops.mu.resin(name="flexible-80a") == {"FINISHED"}
     got, want = to_unit(root.mu_unit), load_material("flexible-80a").in_unit(to_unit(root.mu_unit))
     assert got.wall == want.wall
@@ -244,7 +244,7 @@ def test_a_resin_is_chosen_by_its_name_and_one_of_your_own_is_said_to_be():
     assert got.material.elongation_at_break == 1.2
     assert resins.name_of(root) == "Flexible 80A"
     root.mu_unit.material.membrane_modulus_kPa *= 1.1
-    assert resins.name_of(root) == "Resin of Your Own"
+    assert resins.name_of(root) == "Flexible 80A, changed"
     assert bpy.ops.mu.resin(name="elastic-50a-v1") == {"FINISHED"}
     assert resins.name_of(root) == "Elastic 50A V1"
 
