@@ -48,7 +48,7 @@ def test_the_only_fast_test_in_another_unit_is_no_self_heating():
     assert found.kind == "ambiguous"
     assert "force_scale of experiment test 4" in titles(found)
     assert found.names != ("self_heating",)
-    assert "lbf under a heading in N" in sentence(found)[1]
+    assert "the factor of lbf and N" in sentence(found)[1]
 
 
 def test_a_rigid_coupon_has_no_error(monkeypatch):
@@ -91,7 +91,7 @@ def test_a_supply_gives_no_more_and_no_faster():
     p = np.array([0.0, 10.0, 30.0, 30.0, -30.0])
     limited = supplied(t, p, {"supply_limit.short_kPa": 6.0}, 30.0)
     np.testing.assert_allclose(limited, [0.0, 10.0, 24.0, 24.0, -24.0])
-    slow = supplied(t, p, {"supply_rate_limit.s_per_kPa": 0.1}, 30.0)
+    slow = supplied(t, p, {"supply_rate_limit.slowness_s_kPa": 0.1}, 30.0)
     np.testing.assert_allclose(slow, [0.0, 10.0, 20.0, 30.0, 20.0])
     np.testing.assert_array_equal(supplied(t, p, {}, 30.0), p)
 

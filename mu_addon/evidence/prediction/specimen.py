@@ -42,7 +42,7 @@ FRAME = Parameter("mm_per_N", "mm/N", 0.0, 0.1, 0.0, (0.005,), "steel 1e-5, prin
 # A compliance that falls with the load: grips that settle, wedges that bite. Source of its form: a hyperbolic
 # tangent, as the toe of such records has one scale of load.
 SETTLING = (
-    Parameter("settling_mm_per_N", "mm/N", 0.0, 5.0, 0.0, (0.01, 0.3), "at no load; printed plates 0.1"),
+    Parameter("settling_mm_N", "mm/N", 0.0, 5.0, 0.0, (0.01, 0.3), "at no load; printed plates 0.1"),
     Parameter(
         "settled_at", "", 0.005, 1.0, 0.1, (0.05, 0.3), "of the largest load, where grips have settled"
     ),
@@ -248,7 +248,7 @@ def _borne(
     factor = _factor(experiment, values, past)
     seated = _seated(experiment, (lambda e: factor * law(e)) if factor != 1 else law, values)
     compliance = values.get("frame_compliance.mm_per_N", 0.0)
-    settling = values.get("frame_compliance.settling_mm_per_N", 0.0)
+    settling = values.get("frame_compliance.settling_mm_N", 0.0)
     stress = _remembering(experiment, seated, strain, values, past)
     if not (compliance or settling) or experiment.section_mm is None or experiment.length_mm is None:
         return stress

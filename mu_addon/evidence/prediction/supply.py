@@ -12,7 +12,7 @@ from ..effect import SUPPLY_LIMIT, SUPPLY_RATE, Effect, Parameter
 
 Array = np.ndarray[Any, Any]
 
-SHORT, SLOW = f"{SUPPLY_LIMIT}.short_kPa", f"{SUPPLY_RATE}.s_per_kPa"
+SHORT, SLOW = f"{SUPPLY_LIMIT}.short_kPa", f"{SUPPLY_RATE}.slowness_s_kPa"
 # Of the largest pressure: what a supply may fall short by, and where fits begin.
 MOST_SHORT, STARTS = 0.8, (0.05, 0.2)
 # Share of a record's changes that are slower than its fastest; of those the time a kPa, times the starts.
@@ -38,7 +38,13 @@ def supply(kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
         "of the largest read",
     )
     slow = Parameter(
-        "s_per_kPa", "s/kPa", 0.0, LONGEST / fastest, 0.0, tuple(s / fastest for s in LONGER), "of its valve"
+        "slowness_s_kPa",
+        "s/kPa",
+        0.0,
+        LONGEST / fastest,
+        0.0,
+        tuple(s / fastest for s in LONGER),
+        "of its valve",
     )
     return Effect(SUPPLY_LIMIT, (short,), (kind,)), Effect(SUPPLY_RATE, (slow,), (kind,))
 
