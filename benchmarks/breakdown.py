@@ -1,6 +1,6 @@
 """Where each second of a printed unit's Model A goes with self-contact: processor seconds by part.
 
-    python -m benchmarks.contact_breakdown [--chambers 6] [--refine 0.5] [--pressures -10 -20]
+    python -m benchmarks.breakdown [--chambers 6] [--refine 0.5] [--pressures -10 -20]
 
 Each part without the parts that it calls; one process and thread.
 """

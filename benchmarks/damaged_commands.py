@@ -46,7 +46,7 @@ from tests.run.test_reading import MODEL
 from tests.usecases.fault_injection import PLACEMENT, ran, results
 
 ASSETS, DATA = ROOT / "assets", ROOT / "tests" / "data"
-COARSE = ["--refine", "0.3", "--times", "3", "--no-report"]
+COARSE = ["--refine", "0.35", "--times", "3", "--no-report"]
 SECONDS = [2.0]
 """Of the processor that a command may take: refusals take less."""
 HUNG_S = 120.0

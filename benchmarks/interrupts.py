@@ -91,7 +91,6 @@ pressure_step_kPa = 30.0
 
 [mesh]
 refine = 0.25
-fidelity = "homogenised"
 
 [[unit]]
 preset = "mu-1.0x"

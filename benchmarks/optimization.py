@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.table import options_of
 from mu_addon.errors import InputError
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.optimization.design_file import parse_design
 from mu_addon.optimization.evaluation import evaluate
 from mu_addon.optimization.search import Observed, SearchSettings, search_units
@@ -62,7 +62,7 @@ class Counted:
 
     def __init__(self, refine: float, with_gradient: bool) -> None:
         self.design = parse_design(ASKED, "benchmark")
-        self.mechanics = Mechanics(MeshSettings(refine=refine, fidelity=RESOLVED))
+        self.mechanics = Mechanics(MeshSettings(refine=refine))
         self.with_gradient = with_gradient
         self.cost = 0.0
         self.count = 0

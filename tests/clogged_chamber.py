@@ -37,7 +37,11 @@ def judge(folder, gauge_kPa=0.0):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(unit_fem, "unit_responses", responses)
         with run_to_end(Progress([messages.append])) as context:
-            job = Job(read_folder(data), load_preset("mu-1.0x"), settings=unit_fem.UnitSettings())
+            job = Job(
+                read_folder(data),
+                load_preset("mu-1.0x"),
+                settings=unit_fem.UnitSettings(changes=None, whole=None),
+            )
             USE_CASE.start(job, folder / "study" / "evidence", context)
     assert context.status == 0, messages[-1]
     (folder / "said.json").write_text(json.dumps(messages, default=str))

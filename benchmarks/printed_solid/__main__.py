@@ -23,12 +23,11 @@ from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import cavity_polygon, cavity_radius, outer_polygon
 from mu_addon.design.solid import QUALITY, Facets, lattice_solid
-from mu_addon.meshing.lattice_region import load_gmsh
+from mu_addon.meshing.gmsh_model import load_gmsh
 from mu_addon.meshing.mesh import (
     LATTICE,
     TRIANGLE_EDGES,
     Mesh,
-    bisected,
     boundary_faces,
     edge_keys,
     edges_of,
@@ -44,6 +43,21 @@ from .remesh import Reference, remesh
 COARSE = Facets(around_axis=64, along_arc=4, around_strut=8, along_strut=8)
 # Of two faces of one element: less is a round surface, more a real edge.
 ROUND_DEG = 75.0
+
+
+def bisected(nodes, tets, edges):
+    """Linear tets with some edges halved, together with all elements around them: new nodes and tets.
+
+    nodes (n, 3) in mm, tets (m, 4); edges (k, 2), no two of them in one element.
+    """
+    for a, b in edges:
+        around = (tets == a).any(axis=1) & (tets == b).any(axis=1)
+        first, second = tets[around].copy(), tets[around].copy()
+        first[first == b] = len(nodes)
+        second[second == a] = len(nodes)
+        nodes = np.vstack([nodes, nodes[[a, b]].mean(axis=0)])
+        tets = np.vstack([tets[~around], first, second])
+    return nodes, tets
 
 
 def solid(d: Dimensions, facets: Facets) -> Manifold:

@@ -1,1 +1,1 @@
-"""The resolved unit beside another code, the printed solid, its homogenised twin and measured lattices."""
+"""The printed body beside another code, the printed solid and measured lattices."""

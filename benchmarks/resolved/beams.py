@@ -20,7 +20,7 @@ from mu_addon.fem.bending_angle import TipSection
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.printed_mesh import mesh_printed
 
 PRESSURES_KPA = -10.0, -5.0, 5.0, 10.0, 20.0, 40.0
@@ -58,10 +58,10 @@ def bodies():
     }
 
 
-def motion(unit, settings):
+def motion(unit, refine, solid):
     """Angles in degrees and tips' ways in mm by pressure in kPa, unknowns, and seconds."""
     began = time.process_time()
-    mesh = mesh_printed(unit, settings)
+    mesh = mesh_printed(unit, MeshSettings(refine=refine), solid=solid)
     model = Model(mesh, threads=1)
     solver = Equilibrium(model, materials_of(unit, mesh))
     tip, found = TipSection.of(mesh), {}
@@ -89,8 +89,8 @@ def main() -> None:
     print_head("body", "struts", "unknowns", "s", *(f"{p:g} kPa" for p in PRESSURES_KPA))
     for name in options.body:
         unit, reference = bodies()[name], {}
-        for fidelity, refine in ((SOLID, options.solid_refine), (RESOLVED, options.refine)):
-            found, unknowns, seconds = motion(unit, MeshSettings(fidelity=fidelity, refine=refine))
+        for solid, refine in ((True, options.solid_refine), (False, options.refine)):
+            found, unknowns, seconds = motion(unit, refine, solid)
             reference = reference or found
             cells = []
             for kPa in PRESSURES_KPA:
@@ -103,8 +103,13 @@ def main() -> None:
                     off = [100 * (a / b - 1) for a, b in zip((angle, way), reference[kPa], strict=True)]
                     words += f" {off[0]:+.1f} / {off[1]:+.1f} %"
                 cells.append(words)
-            label = f"{fidelity}, refine {refine:g}"
-            print_row(name, label, unknowns, f"{seconds:.0f}", *cells)
+            print_row(
+                name,
+                f"{'solid' if solid else 'beams'}, refine {refine:g}",
+                unknowns,
+                f"{seconds:.0f}",
+                *cells,
+            )
 
 
 if __name__ == "__main__":

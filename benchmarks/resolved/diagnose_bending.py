@@ -20,7 +20,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.settings import PRESET
 from mu_addon.evidence.unit_fem import KNOWN, UnitSettings
 from mu_addon.measured import read_folder
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.diagnose.job import Job
@@ -41,8 +41,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     settings = UnitSettings(
-        mesh=MeshSettings(fidelity=RESOLVED, refine=options.refine),
-        finer=MeshSettings(fidelity=RESOLVED, refine=options.finer),
+        mesh=MeshSettings(refine=options.refine),
+        finer=MeshSettings(refine=options.finer),
         pressures=options.pressures,
         # The ends are printed, not read off a gauge: no pressure beyond them.
         margin=0.0,

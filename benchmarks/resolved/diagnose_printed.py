@@ -1,10 +1,10 @@
 """Verdicts with the printed body as base, on data made by the printed body on another mesh.
 
     python -m benchmarks.resolved.diagnose_printed FOLDER [--only clean,gravity] [--refine 1.2] [--seed 1]
-        [--low 0] [--homogenised]
+        [--low 0]
 
 A unit of three chambers is bent through suction and pressure; each set hides one static effect or a gauge's
-zero, and is diagnosed as `diagnose` does, or by the homogenised lattice. All sets have one protocol: the
+zero, and is diagnosed as `diagnose` does. All sets have one protocol: the
 simulations of the first serve them all. Prints a row a set, with seconds by the clock and of the processor.
 """
 
@@ -25,10 +25,11 @@ from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.evidence.unit_effects import FLAT_OBSTACLE, Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.files import write_text
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 
 LOW_kPa, HIGH_kPa = -10.0, 12.0
 PRESSURES_kPa = tuple(np.arange(-12.0, 13.0).tolist())
+UNIT = load_preset("mu-1.0x").evolve(name="mu-three-chambers", count=3)
 # Standard deviation of the angle's noise.
 NOISE_deg = 0.03
 OFFSET = "pressure_offset"
@@ -61,7 +62,7 @@ def angles(name: str, refine: float, folder: Path) -> np.ndarray:
         effect, size = "", 0.0
     kept = folder / f"angles-{effect or 'clean'}-{size:g}-{refine:g}.npy"
     if not kept.exists():
-        body = Body(small_unit(), MeshSettings(fidelity=RESOLVED, refine=refine), self_contact=True)
+        body = Body(UNIT, MeshSettings(refine=refine), self_contact=True)
         found = run(Run(body, PRESSURES_kPa, (), effect, size))
         if not np.isfinite(found.values[0][np.abs(PRESSURES_kPa) <= -LOW_kPa]).all():
             raise SystemExit(f"{name}: {found.why}")
@@ -100,11 +101,10 @@ def main() -> None:
     parser.add_argument("--refine", type=float, default=1.2, help="of the mesh that the data are of")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--low", type=float, default=LOW_kPa, help="least pressure, kPa")
-    parser.add_argument("--homogenised", action="store_true", help="base with a homogenised lattice")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     unit = given.folder / "unit.toml"
-    write_text(unit, to_toml(small_unit()))
+    write_text(unit, to_toml(UNIT))
     print(circumstances())
     print(
         "| set | verdict | causes, rivals | by the clock, s | of the processor, s |\n" + "| --- " * 5 + "|",
@@ -117,9 +117,8 @@ def main() -> None:
             rng = np.random.default_rng([given.seed, list(SETS).index(name)])
             write(data, trials(name, rng, bent, given.low))
         began, used = time.time(), _processor_s()
-        base = "homogenised" if given.homogenised else "printed"
-        found = verdict_on(data, unit, given.folder / f"diagnosis-{base}", given.homogenised)
-        write_text(given.folder / f"{data.name}-{base}.json", json.dumps(found, indent=1))
+        found = verdict_on(data, unit, given.folder / "diagnosis")
+        write_text(given.folder / f"{data.name}.json", json.dumps(found, indent=1))
         causes = "; ".join(", ".join([c["effect"], *c["rivals"]]) for c in found["causes"])
         row = (name, found["verdict"], causes, f"{time.time() - began:.0f}", f"{_processor_s() - used:.0f}")
         print_row(*row)

@@ -1,6 +1,6 @@
-"""How the cost of both models grows with the lattice's cells, from the mesh to a load step.
+"""How the cost of beams and of solid struts grows with the lattice's cells, from the mesh to a load step.
 
-    python -m benchmarks.resolved.growth [--cells 3x4x3 3x4x6 3x4x20 5x4x20] [--refine 1] [--models ...]
+    python -m benchmarks.resolved.growth [--cells 3x4x3 3x4x6 3x4x20 5x4x20] [--refine 1]
 
 Cells across x, across y and along the unit, which has one chamber a cell. A half of `mu-1.0x` with so many,
 without contact. Seconds are of processor time of one thread; a load step is from rest to -1 kPa, memory the
@@ -21,8 +21,8 @@ from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
-from mu_addon.meshing.settings import FIDELITIES, MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_of
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 STEP_KPA = -1.0
@@ -48,24 +48,23 @@ def main() -> None:
     parser = options_of(__doc__)
     parser.add_argument("--cells", nargs="*", default=["3x4x3", "3x4x6", "3x4x20", "5x4x20"])
     parser.add_argument("--refine", type=float, default=1.0)
-    parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=FIDELITIES)
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
     columns = ["mesh", "order and analysis", "tangent", "factorisation", "solution", "load step"]
-    print_head("model", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB")
-    for name in options.models:
+    print_head("struts", "cells", "unknowns", *(f"{name} s" for name in columns), "factorisations", "GB")
+    for name in ("beams", "solid"):
         for cells in options.cells:
             try:
-                print_row(name, cells, *costs(unit_of(cells), name, options.refine))
+                print_row(name, cells, *costs(unit_of(cells), name == "solid", options.refine))
             except MuError as why:
                 print_row(name, cells, why)
 
 
-def costs(unit: Unit, fidelity: str, refine: float) -> list[str]:
+def costs(unit: Unit, solid: bool, refine: float) -> list[str]:
     """Cells of a row of the table: unknowns, seconds, factorisations of the load step, gigabytes."""
-    settings = MeshSettings(fidelity=fidelity, refine=refine)
+    settings = MeshSettings(refine=refine)
     job = Job(unit, grasp(), settings, stages=("design", "simulate"), mesh_check=False)
-    meshed, mesh = seconds(lambda: mesh_of(unit, settings))
+    meshed, mesh = seconds(lambda: mesh_printed(unit, settings, solid=solid))
     model = job.model(mesh, threads=1)
     equilibrium = Equilibrium(model, job.materials(mesh), job.newton)
     assembled, values = seconds(lambda: equilibrium.rest_tangent)

@@ -20,7 +20,7 @@ from mu_addon.fem.bending_angle import bending_angle_deg
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.printed_mesh import mesh_printed
 from tests.design.kinds import CORNERS, FACES, cross, custom, octet
 
@@ -32,10 +32,10 @@ KINDS = (
 )
 
 
-def angle(kind: LatticeKind, chambers: int, fidelity: str, kPa: float, folder: Path) -> tuple[float, int]:
+def angle(kind: LatticeKind, chambers: int, solid: bool, kPa: float, folder: Path) -> tuple[float, int]:
     """Bending angle in degrees at a pressure, and the number of unknowns."""
     unit = load_preset("mu-1.0x").evolve(**custom(kind), count=chambers, seats=False)
-    mesh = mesh_printed(unit, MeshSettings(fidelity=fidelity, refine=0.5), cache=folder)
+    mesh = mesh_printed(unit, MeshSettings(refine=0.5), cache=folder, solid=solid)
     solver = Equilibrium(Model(mesh), materials_of(unit, mesh))
     state = solver.reach(kPa / 1000.0, [solver.at_zero_pressure()])
     return bending_angle_deg(mesh, state.u), len(solver.model.free)
@@ -54,8 +54,8 @@ def main() -> None:
         for kind in KINDS:
             if kind.name in options.kinds:
                 row = [
-                    angle(kind, options.chambers, fidelity, options.pressure, Path(name))
-                    for fidelity in (RESOLVED, SOLID)
+                    angle(kind, options.chambers, solid, options.pressure, Path(name))
+                    for solid in (False, True)
                 ]
                 (by_beams, few), (by_solids, many) = row
                 print(f"| {kind.name} | {by_beams:.3f} | {by_solids:.3f} | {few} | {many} |", flush=True)

@@ -1,12 +1,11 @@
 """The paper's bending ranges by the printed body, for shapes that the paper does not print.
 
     python -m benchmarks.resolved.paper_bending FOLDER [--shapes "neck 20 mm" ...] [--presets mu-1.0x]
-        [--refine 0.5] [--models resolved homogenised] [--pressures -10 20 50]
+        [--refine 0.5] [--pressures -10 20 50]
 
 Each shape changes the preset in what the paper leaves open, within the design's rules; lengths at scale 1.
-The printed body has walls and struts that touch (`self_contact`), the homogenised unit the lattice's modulus
-that the paper measured at that scale. Suction and pressure are runs of their own, each in a folder below
-FOLDER: a run that was stopped goes on there. Angles are those of the tip's plane in degrees, seconds of
+Walls and struts may touch (`self_contact`). Suction and pressure are runs of their own, each in a folder
+below FOLDER: a run that was stopped goes on there. Angles are those of the tip's plane in degrees, seconds of
 processor time.
 
 The paper's ranges over -20 to 50 kPa: -50 to 45, -65 to 50 and -65 to 55 degrees at 0.75x, 1.0x and 1.5x.
@@ -21,7 +20,7 @@ from typing import Any
 from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
-from mu_addon.meshing.settings import FIDELITIES, RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job
 
 from .running import angles_deg, outward, run_study
@@ -56,36 +55,34 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--presets", nargs="*", default=["mu-1.0x"])
     parser.add_argument("--shapes", nargs="*", choices=SHAPES, default=list(SHAPES))
-    parser.add_argument("--models", nargs="*", choices=FIDELITIES, default=[RESOLVED])
     parser.add_argument("--pressures", type=float, nargs="*", default=[-10.0, 20.0, 50.0])
     parser.add_argument("--refine", type=float, default=0.5)
     options = parser.parse_args()
     sides = [[p for p in options.pressures if p * sign > 0] for sign in (1, -1)]
-    print_head("preset", "shape", "model", "kPa", "deg", "s")
+    print_head("preset", "shape", "kPa", "deg", "s")
     for name in options.presets:
         for shape in options.shapes:
-            for model in options.models:
-                for side in filter(None, sides):
-                    row = [name, shape, model]
-                    protocol = outward(side)
-                    folder = f"{name}-{shape}-{model}-{options.refine:g}-{side[0]:g}".replace(" ", "-")
-                    began = time.process_time()
-                    try:
-                        job = Job(
-                            load_preset(name).evolve(**SHAPES[shape]),
-                            protocol,
-                            MeshSettings(fidelity=model, refine=options.refine),
-                            times=len(protocol.pressure_kPa),
-                            stages=("design", "simulate"),
-                            self_contact=model == RESOLVED,
-                            mesh_check=False,
-                        )
-                        angle = angles_deg(run_study(job, options.folder / folder)[1])
-                    except MuError as why:
-                        print_row(*row, why.what, "", f"{time.process_time() - began:.0f}")
-                        continue
-                    shown = [f"{p:g}" for p in side], [f"{angle[p]:.2f}" for p in side]
-                    print_row(*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}")
+            for side in filter(None, sides):
+                row = [name, shape]
+                protocol = outward(side)
+                folder = f"{name}-{shape}-{options.refine:g}-{side[0]:g}".replace(" ", "-")
+                began = time.process_time()
+                try:
+                    job = Job(
+                        load_preset(name).evolve(**SHAPES[shape]),
+                        protocol,
+                        MeshSettings(refine=options.refine),
+                        times=len(protocol.pressure_kPa),
+                        stages=("design", "simulate"),
+                        self_contact=True,
+                        mesh_check=False,
+                    )
+                    angle = angles_deg(run_study(job, options.folder / folder)[1])
+                except MuError as why:
+                    print_row(*row, why.what, "", f"{time.process_time() - began:.0f}")
+                    continue
+                shown = [f"{p:g}" for p in side], [f"{angle[p]:.2f}" for p in side]
+                print_row(*row, *map(", ".join, shown), f"{time.process_time() - began:.0f}")
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import attrs
 from benchmarks.table import options_of, print_head, print_row
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.usecases.simulate_and_place.job import Job
 
 from .running import angles_deg, outward, run_study
@@ -42,7 +42,7 @@ def main() -> None:
         unit = attrs.evolve(preset, chambers=attrs.evolve(preset.chambers, count=options.chambers))
         for refine in options.refine:
             began = time.process_time()
-            mesh = MeshSettings(fidelity=RESOLVED, refine=refine)
+            mesh = MeshSettings(refine=refine)
             touch = not options.without_contact
             job = Job(
                 unit, protocol, mesh, times=len(pressures), mesh_check=False, workers=1, self_contact=touch

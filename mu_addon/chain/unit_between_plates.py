@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ..design.strut_cell import relative_density, strut_cell
 from ..errors import ConvergenceError
 from ..fem import kinematics
 from ..fem.elements import shape_functions, solid_volumes, tet_quadrature
 from ..fem.equilibrium import Equilibrium
 from ..fem.factor import IndefiniteError
 from ..fem.model import Model
-from ..fem.newton_settings import RESOLVED_NEWTON, NewtonSettings
+from ..fem.newton_settings import RESOLVED_NEWTON
 from ..fem.rotations import rotation, skew
 from ..fem.unit_materials import materials_of
-from ..meshing.mesh import LATTICE, Mesh
+from ..meshing.mesh import Mesh
 from .rigid_motion import exponential, inverse, logarithm, motion, rotation_vector, slope
 
 if TYPE_CHECKING:
@@ -69,13 +68,9 @@ MIRROR = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 
 
 def nodal_mass_g(unit: Unit, mesh: Mesh, density_g_per_ml: float) -> Array:
-    """Mass (n,) in g of each node of a unit's mesh; a homogenised lattice weighs as much as its struts."""
+    """Mass (n,) in g of each node of a unit's mesh."""
     points, _ = tet_quadrature(mesh.order)
-    hollow = (mesh.region == LATTICE) & (not mesh.resolved)
-    solid = np.where(hollow, relative_density(strut_cell(unit)), 1.0)
-    mass = (
-        density_g_per_ml * 1e-3 * solid[:, None] * (solid_volumes(mesh) @ shape_functions(points, mesh.order))
-    )
+    mass = density_g_per_ml * 1e-3 * (solid_volumes(mesh) @ shape_functions(points, mesh.order))
     of_node = np.bincount(mesh.tets.ravel(), mass.ravel(), len(mesh.nodes))
     return np.asarray(mesh.folded(of_node))
 
@@ -108,7 +103,7 @@ class PlateBody:
         supports = np.zeros((len(mesh.nodes), 3), bool)
         supports[self.tip] = True
         materials = materials_of(unit, mesh)
-        settings = attrs.evolve(RESOLVED_NEWTON, follow_snaps=False) if mesh.resolved else NewtonSettings()
+        settings = attrs.evolve(RESOLVED_NEWTON, follow_snaps=False)
         self.equilibrium = Equilibrium(Model(mesh, supports, threads=threads), materials, settings)
         self._open = Model(mesh, threads=threads)
         self.parameters = self.equilibrium.parameters

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from .options import (
     add_report,
     add_results,
+    add_self_contact,
     add_setting,
     add_solid,
-    add_struts,
     help_of,
     presets,
     require_out,
@@ -57,7 +57,7 @@ def add(commands: Commands[Any]) -> None:
     )
     default = f"{REFINE.default:g}; {COARSE_REFINE:g} with --coarse"
     command.add_argument("--refine", type=float, metavar="F", help=help_of(REFINE, default))
-    add_struts(command)
+    add_self_contact(command)
     add_setting(command, COARSE)
     command.add_argument(
         "--solid-only", action="store_true", help="Write only the printable part; simulate nothing."
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     require_out(options)
     gripper = load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
-    detail = detailed(options.coarse, options.refine, options.solid_struts)
+    detail = detailed(options.coarse, options.refine)
     density = options.density_g_per_ml
     job = Job(
         gripper=gripper,

@@ -199,14 +199,6 @@ class _Friction(argparse.Action):
         namespace.obstacles = [*before, (path, value)]
 
 
-def add_struts(command: Group) -> None:
-    """--solid-struts and --self-contact of a printed body."""
-    from ..meshing.settings import SOLID_STRUTS
-
-    add_setting(command, SOLID_STRUTS)
-    add_self_contact(command)
-
-
 def add_self_contact(command: Group) -> None:
     """--self-contact and --no-self-contact."""
     from ..meshing.settings import SELF_CONTACT

@@ -14,9 +14,9 @@ from .options import (
     add_orientation,
     add_report,
     add_resin,
+    add_self_contact,
     add_setting,
     add_solid,
-    add_struts,
     add_unit,
     modelled,
     unit_of,
@@ -76,7 +76,7 @@ def _add_motion(command: argparse.ArgumentParser) -> Group:
     add_obstacles(around)
     solver = command.add_argument_group("mesh and solver")
     add_setting(solver, TIMES, "K")
-    add_struts(solver)
+    add_self_contact(solver)
     add_setting(solver, SELF_FRICTION, "MU")
     add_solid(solver)
     add_device(solver)
@@ -128,7 +128,7 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     """Study job from the options; raises InputError."""
     from ..fem.device import require_device
-    from ..meshing.settings import MeshSettings, fidelity_of
+    from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
     from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
 
@@ -140,7 +140,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         unit, effects = modelled(options, context)
         extra = {
             "effects": effects,
-            "mesh": MeshSettings(refine=options.refine, fidelity=fidelity_of(options.solid_struts)),
+            "mesh": MeshSettings(refine=options.refine),
             "self_contact": options.self_contact,
             "self_friction": options.self_friction,
             "times": options.times,

@@ -12,7 +12,6 @@ import attrs
 import numpy as np
 
 from ..design.parameters import Unit
-from ..design.strut_cell import relative_density, strut_cell
 from ..errors import InputError
 from ..fem.newton_settings import (
     CONTACT_NEWTON,
@@ -21,7 +20,6 @@ from ..fem.newton_settings import (
     NewtonSettings,
 )
 from ..measured.pose import Direction, X, down
-from ..meshing.mesh import LATTICE, MEMBRANE
 from ..meshing.settings import CELL_MM, MeshSettings
 from .effect import Effect, Parameter
 from .prediction import beam_deadweight, coupon, lattice_compression
@@ -29,8 +27,7 @@ from .prediction.flat_obstacle import NAME as CONTACT
 
 if TYPE_CHECKING:
     # To name, size or draw an effect, nothing of the solver is loaded.
-    from ..fem.lattice_law import LatticeLaw
-    from ..fem.materials import Layer, Materials
+    from ..fem.materials import Materials
     from ..fem.model import Model
     from ..meshing.mesh import Mesh
 
@@ -41,12 +38,9 @@ SKIN_MM = 0.1
 # Share of a one-sided foam on its other side: laws require more than none.
 NEXT_TO_NOTHING = 1e-3
 # A size whose path ends before the last pressure is useless: it need not be followed to its end.
-SMOOTH = NewtonSettings(min_step_MPa=1e-3)
 SMOOTH_CONTACT: NewtonSettings = attrs.evolve(
     RESOLVED_CONTACT_NEWTON, min_step_MPa=1e-3, max_factorisations=20, follow_snaps=False
 )
-# Where the tangent jumps at rest, even the smallest step ends away from where it was predicted.
-KINKED = NewtonSettings(predictor_tolerance=3.0)
 TONNE_PER_MM3 = 1e-12  # in kg/m3
 # A wall's contact pressure is some kPa; there the gap is off by this much at 1.0x.
 OBSTACLE_MPa, OBSTACLE_mm = 0.005, 0.02
@@ -56,10 +50,10 @@ OBSTACLE_HALVINGS = 2
 
 @lru_cache(maxsize=2)
 def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
-    """A unit's mesh, cached: a process makes many runs of one unit, and most others move this mesh."""
-    from ..resolved.printed_mesh import mesh_of
+    """A unit's mesh, cached: a process makes many runs of one unit."""
+    from ..resolved.printed_mesh import mesh_printed
 
-    return mesh_of(unit, settings, cache=cache)
+    return mesh_printed(unit, settings, cache=cache)
 
 
 @attrs.frozen
@@ -67,17 +61,15 @@ class Body:
     """Inputs of a run of the unit, before it has a mesh.
 
     finer: the mesh that mesh_error compares with. distal: number of chambers, from the tip, that a clog cuts
-    off. lattice: a law for the lattice in place of the unit's moduli. orientation_deg, orientation_axis: see
-    `unit_pose.down`. gap_mm: from the tip at rest to the load cell that holds it, None for a free tip. drawn:
-    the unit whose mesh is moved to this one's dimensions, since meshing noise is as large as a small effect.
-    self_contact: of walls and struts of a resolved unit. device: Warp's, of a model.
+    off. orientation_deg, orientation_axis: see `unit_pose.down`. gap_mm: from the tip at rest to the load
+    cell that holds it, None for a free tip. drawn: the unit that an effect has changed into this one.
+    self_contact: of walls and struts. device: Warp's, of a model.
     """
 
     unit: Unit
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     finer: MeshSettings = attrs.field(factory=MeshSettings)
     distal: int = 1
-    lattice: LatticeLaw | None = None
     orientation_deg: float = 0.0
     orientation_axis: Direction = X
     gap_mm: float | None = None
@@ -86,15 +78,12 @@ class Body:
     device: str = "cpu"
 
     def meshed(self, cache: Path | None = None) -> Mesh:
-        """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_of`."""
-        from ..meshing.morph import morphed
-        from ..resolved.printed_mesh import mesh_of
+        """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_printed`."""
+        from ..resolved.printed_mesh import mesh_printed
 
-        if self.mesh.resolved and self.drawn:
-            # Made anew: no mesher moves its nodes, and struts cannot be moved through the wall.
-            return mesh_of(self.unit, self.mesh, cache=cache)
-        mesh = _mesh_kept(self.drawn or self.unit, self.mesh, cache)
-        return morphed(mesh, self.drawn, self.unit, self.mesh) if self.drawn else mesh
+        # One of a changed unit is used once.
+        make = mesh_printed if self.drawn else _mesh_kept
+        return make(self.unit, self.mesh, cache=cache)
 
     @property
     def down(self) -> Array:
@@ -112,10 +101,9 @@ class Body:
 
     def newton(self, effect: UnitEffect | None = None) -> NewtonSettings:
         """Settings of Newton's method for a run of this body, with an effect or without."""
-        own = effect.newton if effect else SMOOTH
         if self.self_contact:
             return RESOLVED_CONTACT_NEWTON if effect is None and self.drawn is None else SMOOTH_CONTACT
-        return RESOLVED_NEWTON if self.mesh.resolved and own != CONTACT_NEWTON else own
+        return effect.newton if effect else RESOLVED_NEWTON
 
     def materials(self, mesh: Mesh) -> Materials:
         """The base model's materials on a mesh; raises InputError if the unit's wall has a law of its own."""
@@ -127,7 +115,7 @@ class Body:
                 "[wall]",
                 "leave [wall] out of the unit",
             )
-        return materials_of(self.unit, mesh, self.lattice)
+        return materials_of(self.unit, mesh)
 
     def model(self, mesh: Mesh) -> Model:
         """The base model of a mesh, loaded by pressure alone."""
@@ -157,7 +145,7 @@ class UnitEffect:
     model: Callable[[Body, Mesh, float], Model] | None = None
     load: Callable[[Body, Mesh, float], Array] | None = None
     has_gravity: bool = False
-    newton: NewtonSettings = SMOOTH
+    newton: NewtonSettings = RESOLVED_NEWTON
     length: int = 0
     larger: tuple[float, ...] = ()
     first: tuple[float, ...] = ()
@@ -182,9 +170,7 @@ class UnitEffect:
 def _weight(body: Body, mesh: Mesh, density_kg_m3: float) -> Array:
     from ..fem.dead_loads import gravity
 
-    hollow = (mesh.region == LATTICE) & (not mesh.resolved)
-    solid = np.where(hollow, relative_density(strut_cell(body.unit)), 1.0)
-    return gravity(mesh, density_kg_m3 * TONNE_PER_MM3 * solid, body.down)
+    return gravity(mesh, np.full(len(mesh.tets), density_kg_m3 * TONNE_PER_MM3), body.down)
 
 
 def _clogged(body: Body, mesh: Mesh, share_lost: float) -> Model:
@@ -241,88 +227,52 @@ def _refined(body: Body, share: float) -> Body:
     return attrs.evolve(body, mesh=body.finer) if share else body
 
 
-def _in_region(mesh: Mesh, region: int) -> Array:
-    """Elements (m,) that an effect of the wall's resin, or of the lattice, acts on.
-
-    Struts of a resolved mesh are of the wall's resin, and effects of the lattice's law act on the resin
-    there.
-    """
-    return np.ones(len(mesh.tets), bool) if mesh.resolved else mesh.region == region
-
-
-def parted(materials: Materials, inside: Array) -> tuple[tuple[Layer, ...], tuple[Layer, ...]]:
-    """The material layers of some elements, inside (m,), and those of all others."""
-    found: tuple[list[Layer], list[Layer]] = ([], [])
-    for layer in materials.layers:
-        here = inside[layer.elements]
-        for side, rows in zip(found, (np.flatnonzero(here), np.flatnonzero(~here)), strict=True):
-            if len(rows):
-                side.append(layer.kept(rows, layer.weight[rows]))
-    return tuple(found[0]), tuple(found[1])
-
-
-def _shares(layers: Sequence[Layer], share: float) -> tuple[Layer, ...]:
-    return tuple(attrs.evolve(layer, weight=share * layer.weight) for layer in layers)
-
-
-def _elastic(materials: Materials, inside: Array) -> tuple[Array, Array, Array]:
-    """Numbers (k,) of the elements inside (m,), their Young's moduli in MPa and Poisson's ratios (k,)."""
-    elements = np.flatnonzero(inside)
-    modulus, poisson = materials.small_strain(len(inside))
-    return elements, modulus[elements], poisson[elements]
-
-
 def _stiffening(materials: Materials, mesh: Mesh, c2_over_c1: float) -> Materials:
     from ..fem.laws import NeoHooke, Yeoh
     from ..fem.materials import Layer, Materials
 
-    wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     stiffer = []
-    for layer in wall:
+    for layer in materials.layers:
         if layer.law is not NeoHooke:
             # The law that makes its layers differ stays proportional to stretch.
             stiffer.append(layer)
             continue
-        # The unit's membrane is neo-Hookean, which is Yeoh's law with c1 = mu/2 alone.
+        # The unit's resin is neo-Hookean, which is Yeoh's law with c1 = mu/2 alone.
         mu, kappa = layer.parameters.T
         c1 = mu / 2
         rows = np.stack([c1, c2_over_c1 * c1, np.zeros_like(c1), kappa], axis=1)
         stiffer.append(Layer(Yeoh, layer.elements, rows, layer.weight))
-    return Materials((*stiffer, *rest))
+    return Materials(tuple(stiffer))
 
 
 def _asymmetric(materials: Materials, mesh: Mesh, excess: float) -> Materials:
-    """Lattice stiffer by `excess` in compression; below 0 less stiff, as if its struts buckled.
+    """Resin stiffer by `excess` in compression; below 0 less stiff, as if it buckled.
 
-    A foam in parallel with the lattice's law that resists only one sign of strain. For less stiff struts it
-    resists tension and replaces an equal part of the law. Two such foams are the lattice at small strain.
+    A foam in parallel with the resin's law that resists only one sign of strain. For a less stiff one it
+    resists tension and replaces an equal part of the law. Two such foams are the resin at small strain.
     """
     from ..fem.laws import Foam
     from ..fem.materials import Layer, Materials
 
-    inside = _in_region(mesh, LATTICE)
-    lattice_, rest = parted(materials, inside)
-    elements, E, nu = _elastic(materials, inside)
-    both = Foam.parameters(E, nu, 2.0, 2.0)
+    modulus, poisson = materials.small_strain(len(mesh.tets))
+    both = Foam.parameters(modulus, poisson, 2.0, 2.0)
     both[:, 2 if excess < 0 else 0] *= NEXT_TO_NOTHING
     both[:, 4] /= 2
-    foam = Layer(Foam, elements, both, abs(excess))
-    return Materials((*rest, *_shares(lattice_, min(1.0, 1.0 + excess)), foam))
+    foam = Layer(Foam, np.arange(len(mesh.tets)), both, abs(excess))
+    share = min(1.0, 1.0 + excess)
+    return Materials(
+        (*(attrs.evolve(layer, weight=share * layer.weight) for layer in materials.layers), foam)
+    )
 
 
 def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
-    """The wall stiffer along the print's layers, which lie across the axis; the lattice unchanged.
-
-    All struts of a body-centred cell make one angle with the layers: to a homogenised lattice it is another
-    modulus. Struts of a resolved mesh are printed in layers, too.
-    """
+    """The resin stiffer along the print's layers, which lie across the axis."""
     from ..fem.laws import Layered
     from ..fem.materials import Layer, Materials
     from ..fem.wall_law import LAYER_NORMAL, layer_stiffness
 
-    wall, rest = parted(materials, _in_region(mesh, MEMBRANE))
     layered: list[Layer] = []
-    for layer in wall:
+    for layer in materials.layers:
         # The unit's resin is neo-Hookean, alike everywhere but for its skin, which is only stiffer.
         shear, bulk = layer.parameters[0]
         added, share = layer_stiffness(1 + in_plane, float(shear), float(bulk))
@@ -332,7 +282,7 @@ def _layered(materials: Materials, mesh: Mesh, in_plane: float) -> Materials:
         weight = share * layer.weight * (layer.parameters[:, 0] / shear)
         for law, row in ((layer.law, base), (Layered, more)):
             layered.append(Layer(law, layer.elements, np.tile(row, (len(layer.elements), 1)), weight))
-    return Materials((*layered, *rest))
+    return Materials(tuple(layered))
 
 
 def _shared(effects: Sequence[Effect], name: str) -> Parameter:
@@ -400,7 +350,6 @@ EFFECTS = {
             attrs.evolve(_shared(coupon.EFFECTS, "tension_compression_asymmetry"), starts=(-0.3, 0.3)),
             (-0.8, -0.4, 0.0, 0.5, 1.5, 4.0),
             materials=_asymmetric,
-            newton=KINKED,
             first=(-0.4, 1.5),
         ),
         UnitEffect(

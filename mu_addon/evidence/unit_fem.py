@@ -14,12 +14,11 @@ import numpy as np
 
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError
-from ..fem.lattice_law import LatticeLaw
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
-from ..meshing.settings import RESOLVED, MeshSettings, require_self_contact_resolvable
-from ..resolved.printed_mesh import mesh_of
+from ..meshing.settings import SELF_CONTACT, MeshSettings
+from ..resolved.printed_mesh import mesh_printed
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores
@@ -44,12 +43,9 @@ FREE = (KIND, pressure_step.KIND, unit_pose.KIND)
 ROUND = 0.06
 # Fewer pressures make no cubic spline.
 FEWEST = 4
-# Along the meridian as fine as the default: there a coarser mesh is least accurate.
-COARSE = MeshSettings(refine=0.6, meridian_mm=0.9)
-# Finer in all its sizes: what a mesh misses along the meridian is another curve than the rest of it.
-FINE = MeshSettings(meridian_mm=1.0)
-# The printed body, and the mesh of what effects change it by: of an angle the same share within 2 %.
-STRUTS, STRUTS_COARSE = (MeshSettings(fidelity=RESOLVED, refine=refine) for refine in (1.0, 0.5))
+DEFAULT, FINER = MeshSettings(), MeshSettings(refine=1.5)
+# The mesh of what effects change the unit by: of an angle the same share within 2 %.
+OF_CHANGES = MeshSettings(refine=0.5)
 # Of the largest change of a value: below it, two meshes are not compared by their ratio.
 LEAST_CHANGE = 0.05
 # Share of the progress for walls.
@@ -76,37 +72,30 @@ class UnitResponseWarning(UserWarning):
 class UnitSettings:
     """Settings of the unit's simulation for the evidence.
 
-    mesh: the model's; finer: the one that mesh_error compares with; changes: a coarser one for effects and
-    walls, whose changes of the response are transferred in proportion, or None for the model's. The
-    difference of these two is then fitted with every hypothesis (`FARTHER`), in place of mesh_error.
-    pressures: their approximate number; margin: beyond the measured ones, as a share of their range. effects:
-    names of those to run; whole: those run at every size, None for all; the others are run and trusted at
-    `UnitEffect.first` alone. distal: chambers behind a clog. lattice: a law for the lattice in place of the
-    unit's moduli. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of the response, as in
-    `UnitResponse`. self_contact: of walls and struts of a resolved unit. designs: units that differ in what
+    mesh: the model's; changes: a coarser one for effects and walls, whose changes of the response are
+    transferred in proportion. The difference of these two is then fitted with every hypothesis (`FARTHER`).
+    None for the model's mesh, and mesh_error, which compares it with `finer`, in its place. pressures: their
+    approximate number; margin: beyond the measured ones, as a share of their range. effects: names of those
+    to run; whole: those run at every size, None for all; the others are run and trusted at `UnitEffect.first`
+    alone. distal: chambers behind a clog. farthest_mm: of a marker from the unit, at scale 1. discrepancy: of
+    the response, as in `UnitResponse`. self_contact: of walls and struts. designs: units that differ in what
     nobody measured, which is then fitted beside every hypothesis, None without any. workers: processes, one a
     core.
     """
 
-    mesh: MeshSettings = COARSE
-    finer: MeshSettings = FINE
-    changes: MeshSettings | None = None
+    mesh: MeshSettings = DEFAULT
+    finer: MeshSettings = FINER
+    changes: MeshSettings | None = OF_CHANGES
     pressures: int = 12
     margin: float = 0.05
     effects: tuple[str, ...] = KNOWN
-    whole: frozenset[str] | None = None
+    whole: frozenset[str] | None = frozenset()
     distal: int = 1
-    lattice: LatticeLaw | None = None
     farthest_mm: float = 4.0
     discrepancy: float = DISCREPANCY
-    self_contact: bool = False
+    self_contact: bool = SELF_CONTACT.field()
     designs: Designs | None = None
     workers: int = attrs.field(factory=cores)
-
-    @classmethod
-    def printed(cls, self_contact: bool = True) -> UnitSettings:
-        """Settings for the printed body; without any the unit is homogenised."""
-        return cls(STRUTS, changes=STRUTS_COARSE, whole=frozenset(), self_contact=self_contact)
 
     def further(self, names: Collection[str]) -> UnitSettings | None:
         """With some effects also at the remaining sizes; None where all are."""
@@ -116,7 +105,6 @@ class UnitSettings:
         return attrs.evolve(self, whole=self.whole | more)
 
     def __attrs_post_init__(self) -> None:
-        require_self_contact_resolvable(self.mesh, self.self_contact)
         for name in self.effects:
             if name not in KNOWN:
                 raise InputError(
@@ -324,7 +312,7 @@ class _Plan:
         here = [e for e in chosen if (e.scale, _gap(e)) == (scale, gap_mm)]
         scaled = attrs.evolve(unit, scale=scale)
         readings = np.concatenate([e["pressure_kPa"] for e in here])
-        mesh = mesh_of(scaled, settings.mesh, cache=cache)
+        mesh = mesh_printed(scaled, settings.mesh, cache=cache)
         reduced = similar(scaled)
         enlarged = scale / reduced.scale
         gap = None if gap_mm is None else gap_mm / enlarged
@@ -333,7 +321,6 @@ class _Plan:
             settings.mesh,
             settings.finer,
             settings.distal,
-            settings.lattice,
             gap_mm=gap,
             self_contact=settings.self_contact,
         )

@@ -88,7 +88,7 @@ class Run:
             # No such body: its failure is kept, too.
             body, effect = self.body, effect_of(self.effect)
         parts = [REVISION, body.unit.hash(), attrs.astuple(body.mesh), self.pressures_kPa, self.points]
-        parts += [body.newton(effect), body.lattice.hash() if body.lattice else ""]
+        parts += [body.newton(effect)]
         if body.drawn:
             parts += [body.drawn.hash()]
         if effect:

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .batched_newton import BatchedNewton as BatchedNewton
-    from .batched_newton import Variant as Variant
     from .bending_angle import TipSection as TipSection
     from .bending_angle import bending_angle_deg as bending_angle_deg
     from .dead_loads import gravity as gravity

@@ -133,8 +133,8 @@ def fibres_of(
         if one.law.history:
             raise InputError(
                 f"{one.law.name}: struts that are beams have no memory",
-                "a mesh of fidelity resolved",
-                "choose fidelity solid",
+                "a mesh with beams",
+                "mesh the struts as solids",
             )
     along = frames[:, 2]
     # Opposite directions are one.

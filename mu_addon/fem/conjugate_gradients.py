@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import attrs
@@ -44,45 +43,6 @@ class Rows:
         width = next((w for w in WIDTHS if k <= w), WIDTHS[-1])
         inputs = [self.offsets, self.columns, self.values, x, y]
         wp.launch(kernels.product_kernel(width), (-(-k // width), n), inputs, device=x.device)
-
-
-@attrs.frozen(eq=False)
-class Change:
-    """Change of the tangent by a variant: `matrix` (c, c) in N/mm on the free unknowns `unknowns` (c,)."""
-
-    unknowns: Array
-    matrix: sparse.csr_matrix
-
-
-class Changes:
-    """The changes of several systems on a device, with the scaling that fits a preconditioner to them.
-
-    diagonal: the shared matrix's, (n,); changes leave it positive.
-    """
-
-    def __init__(self, changes: Sequence[Change], diagonal: Array, device: Any) -> None:
-        rows = [c.unknowns for c in changes]
-        system = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        entries = sparse.block_diag([c.matrix for c in changes], format="csr")
-        row = np.concatenate(rows)
-        shared = diagonal[row]
-        changed = shared + entries.diagonal()
-        self._count = len(row)
-        self._where = [wp.array(a.astype(np.int32), dtype=int, device=device) for a in (system, row)]
-        self._entries = [
-            wp.array(entries.indptr.astype(np.int32), dtype=int, device=device),
-            wp.array(row[entries.indices].astype(np.int32), dtype=int, device=device),
-            wp.array(entries.data, dtype=wp.float64, device=device),
-        ]
-        self._scale = wp.array(np.sqrt(shared / changed), dtype=wp.float64, device=device)
-
-    def add(self, x: wp.array, y: wp.array) -> None:
-        """y += change x for k vectors on the device, (k, n), each with its own system's change."""
-        wp.launch(kernels.add_changes, self._count, [*self._where, *self._entries, x, y], device=x.device)
-
-    def scale(self, x: wp.array) -> None:
-        """Multiply x (k, n), in place, by the root of the shared diagonal over the changed one."""
-        wp.launch(kernels.scale_rows, self._count, [*self._where, self._scale, x], device=x.device)
 
 
 @attrs.frozen(eq=False)
@@ -172,8 +132,6 @@ class ConjugateGradients:
             self._put(full.indices, int),
             wp.zeros(count, dtype=wp.float64, device=device),
         )
-        # A column of the lower triangle begins with its diagonal entry.
-        self._diagonal_at = indptr[:-1]
         self._inverse: Any = None
 
     def _put(self, a: Array, dtype: Any) -> wp.array:
@@ -187,7 +145,6 @@ class ConjugateGradients:
         """
         inputs = [self._number, self._put(values, wp.float64), self._rows.values]
         wp.launch(kernels.pick, len(self._number), inputs, device=self.device)
-        self.diagonal = values[self._diagonal_at]
         self._approximate()
         self._prove_definite()
         return self
@@ -221,7 +178,7 @@ class ConjugateGradients:
         random unit b has a component below e along a given unit v with probability e sqrt(2 n / pi).
         """
         b = np.random.default_rng(0).standard_normal((1, self.size))
-        tried = self._run(self._put(b, wp.float64), None, self.proof)
+        tried = self._run(self._put(b, wp.float64), self.proof)
         if not tried.definite.all():
             raise IndefiniteError("the curvature along a direction is not positive")
         if not tried.solved.all():
@@ -234,48 +191,22 @@ class ConjugateGradients:
 
         Raises ConvergenceError where one is not solved within the tolerance.
         """
-        x, solved = self.solve_changed(b.T.reshape(-1, self.size), None)
-        if not solved.all():
+        found = self._run(self._put(b.T.reshape(-1, self.size)[:, self._order], wp.float64), self.tolerance)
+        self.iterations = found.iterations
+        if not found.solved.all():
             raise ConvergenceError(f"conjugate gradients stopped after {self.iterations} iterations")
+        x = np.empty(b.T.reshape(-1, self.size).shape)
+        x[:, self._order] = found.x.numpy()
         return x.reshape(b.T.shape).T
 
-    def changes(self, changes: Sequence[Change]) -> Changes:
-        """Copy several systems' changes of the matrix to the device, for `solve_changed`; after `factor`."""
-        place = np.empty(self.size, dtype=np.int64)
-        place[self._order] = np.arange(self.size)
-        turned = [attrs.evolve(c, unknowns=place[c.unknowns]) for c in changes]
-        return Changes(turned, self.diagonal[self._order], self.device)
-
-    def solve_changed(self, b: Array, changes: Changes | None) -> tuple[Array, Array]:
-        """Solutions (k, n) of k systems with right-hand sides b (k, n), and which are solved, (k,) bool.
-
-        Each system is the matrix plus its change, or the matrix alone if changes is None. `iterations` then
-        holds how many were needed.
-        """
-        found = self._run(self._put(b[:, self._order], wp.float64), changes, self.tolerance)
-        self.iterations = found.iterations
-        solution = np.empty(b.shape)
-        solution[:, self._order] = found.x.numpy()
-        return solution, found.solved
-
-    def _run(self, b: wp.array, changes: Changes | None, tolerance: float) -> Solution:
+    def _run(self, b: wp.array, tolerance: float) -> Solution:
         factors = [Rows(a.offsets, a.columns, a.values) for a in (self._inverse.G, self._inverse.GT)]
         work = wp.empty_like(b)
 
-        def multiply(x: wp.array, y: wp.array) -> None:
-            self._rows.multiply(x, y)
-            if changes is not None:
-                changes.add(x, y)
-
         def precondition(r: wp.array, z: wp.array) -> None:
-            wp.copy(z, r)
-            if changes is not None:
-                changes.scale(z)
-            factors[0].multiply(z, work)
+            factors[0].multiply(r, work)
             factors[1].multiply(work, z)
-            if changes is not None:
-                changes.scale(z)
 
         # Warp's inner products run on whatever device is current.
         with wp.ScopedDevice(self.device):
-            return conjugate_gradients(multiply, precondition, b, tolerance)
+            return conjugate_gradients(self._rows.multiply, precondition, b, tolerance)

@@ -40,37 +40,6 @@ def product_kernel(width: int) -> Any:
 
 
 @wp.kernel
-def add_changes(
-    system: wp.array(dtype=int),
-    row: wp.array(dtype=int),
-    start: wp.array(dtype=int),
-    column: wp.array(dtype=int),
-    value: wp.array(dtype=f64),
-    x: wp.array2d(dtype=f64),
-    y: wp.array2d(dtype=f64),
-):
-    """Add to y the products with single systems' additions to the shared matrix: entries by rows (c,)."""
-    c = wp.tid()
-    s = system[c]
-    total = f64(0.0)
-    for at in range(start[c], start[c + 1]):
-        total += value[at] * x[s, column[at]]
-    y[s, row[c]] = y[s, row[c]] + total
-
-
-@wp.kernel
-def scale_rows(
-    system: wp.array(dtype=int),
-    row: wp.array(dtype=int),
-    factor: wp.array(dtype=f64),
-    x: wp.array2d(dtype=f64),
-):
-    """Multiply some unknowns (c,) of some systems by a factor."""
-    c = wp.tid()
-    x[system[c], row[c]] = x[system[c], row[c]] * factor[c]
-
-
-@wp.kernel
 def pick(index: wp.array(dtype=int), values: wp.array(dtype=f64), out: wp.array(dtype=f64)):
     """Entries of an array by index."""
     i = wp.tid()

@@ -1,4 +1,4 @@
-"""Laws in parallel, uniform in space, of the homogenised lattice in the analysis mesh."""
+"""Laws in parallel, uniform in space, of a homogenised lattice."""
 
 from __future__ import annotations
 

@@ -36,10 +36,6 @@ class NewtonSettings:
     follow_snaps: bool = False
     # A state may lie this much of the predicted move away from its prediction.
     predictor_tolerance: float = 0.5
-    # Many bodies on one factorisation: their tolerance, which leaves less than 1e-6 mm on the unit, and the
-    # steps after which a body goes on with its own.
-    shared_tolerance: float = 2e-8
-    max_shared_steps: int = 40
 
     def largest_step_MPa(self, *pressure_MPa: float) -> float:
         """The largest step between these pressures in MPa, in MPa."""

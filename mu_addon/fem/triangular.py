@@ -1,6 +1,5 @@
-"""Many right-hand sides with one Cholesky factor: blocked substitution, and a block of unknowns kept last."""
+"""Many right-hand sides with one Cholesky factor, by blocked substitution."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -30,17 +29,13 @@ class Lower:
     values: Array
 
 
-def column_blocks(lower: Lower, last: int) -> Array:
-    """First columns (b,) of blocks of up to four columns of a factor with the same rows below them.
-
-    last: number of a column that starts a block in any case.
-    """
+def column_blocks(lower: Lower) -> Array:
+    """First columns (b,) of blocks of up to four columns of a factor with the same rows below them."""
     count = np.diff(lower.indptr)
     inner = np.minimum(lower.indptr[:-1] + 1, len(lower.indices) - 1)
     n = len(count)
     follows = np.zeros(n, dtype=bool)
     follows[1:] = (count[1:] == count[:-1] - 1) & (lower.indices[inner[:-1]] == np.arange(1, n))
-    follows[last:] = False
     starts, size = [], int(COLUMNS)
     for j, joined in enumerate(follows):
         if joined and size < COLUMNS:
@@ -56,35 +51,20 @@ class Triangular:
 
     That halves the memory traffic. It suffices for steps corrected by exact residuals: on the unit it changes
     a step by 1e-5 of its energy norm.
-
-    The last `trailing` unknowns of the factor's order are left to the caller: `schur` is the matrix (t, t)
-    that remains for them when all others are eliminated.
     """
 
-    def __init__(self, lower: Lower, trailing: int = 0, threads: int = 2) -> None:
+    def __init__(self, lower: Lower, threads: int = 2) -> None:
         self.order, self.threads = lower.order, threads
-        n = len(lower.order)
-        self.inner = n - trailing
-        starts = column_blocks(lower, self.inner)
-        blocks = np.append(starts[starts < self.inner], self.inner).astype(np.int32)
-        end = lower.indptr[self.inner]
+        blocks = np.append(column_blocks(lower), len(lower.order)).astype(np.int32)
         self._inputs = [
             wp.array(blocks, dtype=int, device="cpu"),
             wp.array(lower.indptr, dtype=wp.int64, device="cpu"),
-            wp.array(lower.indices[:end], dtype=int, device="cpu"),
-            wp.array(lower.values[:end].astype(np.float32), dtype=wp.float32, device="cpu"),
+            wp.array(lower.indices, dtype=int, device="cpu"),
+            wp.array(lower.values.astype(np.float32), dtype=wp.float32, device="cpu"),
         ]
-        corner = np.zeros((trailing, trailing))
-        column = np.repeat(np.arange(self.inner, n), np.diff(lower.indptr[self.inner :]))
-        corner[lower.indices[end:] - self.inner, column - self.inner] = lower.values[end:]
-        self.schur = corner @ corner.T
 
-    def solve(self, b: Array, solve_trailing: Callable[[Array], Array] | None = None) -> Array:
-        """Solutions (k, n) for right-hand sides (k, n).
-
-        solve_trailing: solves the remaining system for (k, t) of right-hand sides; needed when there are
-        trailing unknowns.
-        """
+    def solve(self, b: Array) -> Array:
+        """Solutions (k, n) for right-hand sides (k, n)."""
         width = next((w for w in WIDTHS if len(b) <= w * self.threads), WIDTHS[-1])
         groups = []
         for first in range(0, len(b), width):
@@ -96,13 +76,6 @@ class Triangular:
         vector = wp.types.vector(length=width, dtype=wp.float32)
         arrays = [wp.array(x, dtype=vector, device="cpu", copy=False) for x in groups]
         self._run(forward, arrays)
-        if self.inner < len(self.order):
-            assert solve_trailing is not None
-            rest = np.concatenate([x[self.inner :].T for x in groups])[: len(b)]
-            solved = solve_trailing(rest.astype(float))
-            for x, first in zip(groups, range(0, len(b), width), strict=True):
-                part = solved[first : first + width]
-                x[self.inner :, : len(part)] = part.T
         self._run(backward, arrays)
         solution = np.empty(b.shape)
         for x, first in zip(groups, range(0, len(b), width), strict=True):

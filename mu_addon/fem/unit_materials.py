@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import attrs
 import numpy as np
 
 from ..design.printed import skin_stiffening
@@ -13,8 +12,6 @@ from ..design.quantity import in_MPa
 from ..design.strut_cell import StrutCell, depth_below_surface
 from ..meshing.mesh import LATTICE
 from .elements import even_points, shape_functions
-from .graded_lattice import element_factors, law_weight, relative_moduli
-from .laws import NeoHooke
 from .materials import Layer, Materials
 from .wall_law import wall_layers
 
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
     from ..design.dimensions import Dimensions
     from ..design.parameters import Unit
     from ..meshing.mesh import Mesh
-    from .lattice_law import LatticeLaw
     from .self_contact import SelfContact
 
 Array = np.ndarray[Any, Any]
@@ -36,36 +32,12 @@ _FACTOR = 0.02
 _GAP_SHARE, _BARRIER_SHARE = 1 / 9, 0.04
 
 
-def materials_of(unit: Unit, mesh: Mesh, lattice: LatticeLaw | None = None) -> Materials:
-    """Materials of a unit's mesh: neo-Hookean membrane and lattice, or the law that the unit's [wall] names.
+def materials_of(unit: Unit, mesh: Mesh) -> Materials:
+    """Materials of a unit's mesh: neo-Hookean resin, or the law that the unit's [wall] names.
 
-    lattice: a homogenised lattice law in place of the neo-Hookean one. Graded struts make either stiffer or
-    softer from place to place (`graded_lattice`). A resolved mesh consists of the wall's resin; the lattice's
-    modulus or law is not used. A skin of other cure is spread evenly over the wall's thickness
-    (`skin_stiffening`): exact where the wall stretches, too soft where it bends.
+    Of the wall and of struts alike, stiffened by each element's share of the skin: in the wall the skin is
+    spread evenly over the thickness (`skin_stiffening`), exact where it stretches, too soft where it bends.
     """
-    if mesh.resolved:
-        return _of_resin(unit, mesh)
-    m, p = unit.material, unit.print
-    stiffer = float(skin_stiffening(unit.printed.wall, p.skin_depth_mm, p.skin_factor))
-    membrane_MPa = in_MPa(stiffer * m.membrane_modulus_kPa)
-    inside = mesh.region == LATTICE
-    relative = np.ones(len(mesh.region))
-    if unit.printed.wall_factors:
-        # A thinner wall is skin for a larger share.
-        relative = skin_stiffening(_walls(unit, mesh), p.skin_depth_mm, p.skin_factor) / stiffer
-    if unit.wall.names or lattice is not None or unit.grading.names:
-        wall = wall_layers(unit.wall, np.flatnonzero(~inside), membrane_MPa, m.membrane_poisson)
-        wall = tuple(attrs.evolve(f, weight=f.weight * relative[f.elements]) for f in wall)
-        return Materials((*wall, *_lattice_layers(unit, mesh, np.flatnonzero(inside), lattice)))
-    return Materials.neo_hooke(
-        np.where(inside, m.lattice_modulus_MPa, membrane_MPa * relative),
-        np.where(inside, m.lattice_poisson, m.membrane_poisson),
-    )
-
-
-def _of_resin(unit: Unit, mesh: Mesh) -> Materials:
-    """The wall's law in wall and struts, stiffened by each element's share of the skin."""
     m = unit.material
     count = len(mesh.tets)
     stiffer = _skin_stiffening(unit, mesh)
@@ -114,21 +86,6 @@ def _depths(d: Dimensions, points: Array, corner: Array) -> Array:
         own = steps == step
         found[own] = depth_below_surface(StrutCell(d.kind, d.cell, *radii), points[own] + corner)
     return found
-
-
-def _lattice_layers(unit: Unit, mesh: Mesh, elements: Array, law: LatticeLaw | None) -> tuple[Layer, ...]:
-    """Layers of the lattice in some elements (k,): a law's, or of the unit's modulus, graded as the unit."""
-    m = unit.material
-    if law is not None:
-        layers = law.fill(elements)
-    else:
-        row = NeoHooke.parameters(m.lattice_modulus_MPa, m.lattice_poisson)
-        layers = (Layer(NeoHooke, elements, np.tile(row, (len(elements), 1))),)
-    if not unit.grading.names:
-        return layers
-    d = unit.printed
-    moduli = relative_moduli(d, element_factors(d, mesh)[elements])
-    return tuple(attrs.evolve(f, weight=f.weight * law_weight(f.law, moduli)) for f in layers)
 
 
 def self_contact_of(unit: Unit, mesh: Mesh, friction: float = 0.0) -> SelfContact:

@@ -158,14 +158,11 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
     Nodes on the plane are shared, every other node gains an exact image: n nodes become up to 2 n. Raises
     MeshingError where the plane is not a mirror plane of the mesh.
     """
-    column = AXES.index(axis)
-    on_plane = _on_plane(mesh, axis)
-    side = np.sign(mesh.nodes[~on_plane, column])
-    if len(np.unique(side)) > 1:
+    column, image = AXES.index(axis), images(mesh, axis)
+    off = image >= len(mesh.nodes)
+    if len(np.unique(np.sign(mesh.nodes[off, column]))) > 1:
         raise MeshingError("a mesh must lie on one side of its mirror plane", f"plane {axis} = 0")
-    image = np.arange(len(mesh.nodes))
-    image[~on_plane] = len(mesh.nodes) + np.arange(np.count_nonzero(~on_plane))
-    reflected = mesh.nodes[~on_plane].copy()
+    reflected = mesh.nodes[off].copy()
     reflected[:, column] *= -1
     tets = image[mesh.tets][:, FLIPPED_TET[: mesh.tets.shape[1]]]
     cavity = image[mesh.cavity][:, FLIPPED_TRIANGLE[: mesh.cavity.shape[1]]]
@@ -182,6 +179,17 @@ def mirror(mesh: Mesh, axis: str) -> Mesh:
         **_mirrored_ties(mesh, image),
         **_mirrored_beams(mesh, image),
     )
+
+
+def images(mesh: Mesh, axis: str) -> Array:
+    """Number (n,) in `mirror(mesh, axis)` of the mirror image of each node.
+
+    Raises MeshingError where the axis has no mirror plane in the mesh.
+    """
+    off = ~_on_plane(mesh, axis)
+    found = np.arange(len(mesh.nodes))
+    found[off] = len(mesh.nodes) + np.arange(np.count_nonzero(off))
+    return found
 
 
 def _on_plane(mesh: Mesh, axis: str) -> Array:
@@ -281,18 +289,3 @@ def second_order(nodes: Array, tets: Array, triangles: Array, middles: Array) ->
         np.hstack([tets, len(nodes) + of_tet]),
         np.hstack([triangles, len(nodes) + of_triangle.reshape(-1, 3)]),
     )
-
-
-def bisected(nodes: Array, tets: Array, edges: Array) -> tuple[Array, Array]:
-    """Linear tets with some edges halved, together with all elements around them: new nodes and tets.
-
-    nodes (n, 3) in mm, tets (m, 4); edges (k, 2), no two of them in one element.
-    """
-    for a, b in edges:
-        around = (tets == a).any(axis=1) & (tets == b).any(axis=1)
-        first, second = tets[around].copy(), tets[around].copy()
-        first[first == b] = len(nodes)
-        second[second == a] = len(nodes)
-        nodes = np.vstack([nodes, nodes[[a, b]].mean(axis=0)])
-        tets = np.vstack([tets[~around], first, second])
-    return nodes, tets

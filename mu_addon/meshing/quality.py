@@ -5,10 +5,8 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from ..design.body import Body
 from ..design.parameters import Unit
-from ..design.profile import cavity_volume, membrane_volume, outer_volume
-from ..design.surface import volume
+from ..design.profile import cavity_volume, membrane_volume
 from ..errors import MeshingError
 from .mesh import LATTICE, MEMBRANE, TET_EDGES, TRIANGLE_EDGES, Array, Mesh
 
@@ -53,37 +51,24 @@ class Quality:
     cavity_volume_error: float
 
 
-def mesh_quality(
-    mesh: Mesh, unit: Unit, body: Body | None = None, struts_mm3: float | None = None
-) -> Quality:
-    """Counts, angles, Jacobians and volumes of a unit's mesh, with the exact volumes of the design.
+def mesh_quality(mesh: Mesh, unit: Unit, struts_mm3: float) -> Quality:
+    """Counts, angles, Jacobians and volumes of a printed unit's mesh, with the exact volumes of the design.
 
-    Half meshes count as the whole body. body: the closed surface in place of the envelope's box, if any.
-    struts_mm3: volume of the struts outside the actuator, for comparison with the lattice of a resolved mesh.
-    See `Quality` for units.
+    Half meshes count as the whole body. struts_mm3: volume of the struts outside the actuator. See `Quality`
+    for units.
     """
     d = unit.printed
-    (x0, x1), (y0, y1), (z0, z1) = d.bounds
-    box = (x1 - x0) * (y1 - y0) * (z1 - z0)
-    envelope = box if body is None else volume(body.vertices, body.triangles)
-    exact = {
-        "membrane": membrane_volume(d),
-        "lattice": envelope - outer_volume(d) if struts_mm3 is None else struts_mm3,
-        "cavity": cavity_volume(d),
-    }
+    exact = {"membrane": membrane_volume(d), "lattice": struts_mm3, "cavity": cavity_volume(d)}
     copies = 2 ** len(mesh.symmetry)
-    volumes = element_volumes(mesh)
-    if mesh.resolved:
-        at_points = _determinants(mesh, GAUSS)
-        volumes = volumes * (at_points * mesh.filled).sum(axis=1) / at_points.sum(axis=1)
+    at_points = _determinants(mesh, GAUSS)
+    volumes = element_volumes(mesh) * (at_points * mesh.filled).sum(axis=1) / at_points.sum(axis=1)
     measured = {
         "membrane": copies * float(volumes[mesh.region == MEMBRANE].sum()),
         "lattice": copies * float(volumes[mesh.region == LATTICE].sum()),
         "cavity": copies * cavity_enclosed(mesh),
     }
     angles = dihedral_angles(mesh).min(axis=1)
-    determinants = _determinants(mesh, GAUSS)
-    low, high = determinants.min(axis=1), determinants.max(axis=1)
+    low, high = at_points.min(axis=1), at_points.max(axis=1)
     return Quality(
         nodes=len(mesh.nodes),
         tets=len(mesh.tets),

@@ -22,7 +22,7 @@ from ..design.profile import cavity_arcs, cavity_volume, outer_arcs, outer_volum
 from ..design.waveguide import Bar
 from ..errors import InputError, MeshingError
 from ..files import replacing
-from .lattice_region import gmsh_model, load_gmsh
+from .gmsh_model import gmsh_model, load_gmsh
 
 Array = np.ndarray[Any, Any]
 

@@ -16,7 +16,6 @@ from ..design.dimensions import Dimensions
 from ..design.profile import foot, outer_radius, outer_slope, under_profile
 from ..errors import InputError, MeshingError
 from .mesh import Array, boundary_faces, edges_of, oriented
-from .settings import CELL_MM, MeshSettings
 
 # A cube split in five, in the two mirror images that alternate so that diagonals of neighbours meet;
 # a corner is numbered 4 i + 2 j + k.
@@ -190,13 +189,6 @@ class WallGrid:
         # Alternating diagonals mirror each other about y = 0 only if both quarters have as many sectors.
         self._counts = 2 * division(d.R * math.pi / 2, hoop_mm), layers, division(d.r, hoop_mm)
         self.membrane = membrane_mesh(self.meridian, self._heights, *self._counts)
-
-    @classmethod
-    def under(cls, settings: MeshSettings, d: Dimensions) -> WallGrid:
-        """The grid of a homogenised unit's wall under the settings; d: as printed."""
-        size = d.cell / CELL_MM / settings.refine
-        layers = max(1, int(settings.through_wall * settings.refine + 0.5))
-        return cls(d, settings.meridian_mm * size, settings.hoop_mm * size, layers)
 
     def of(self, b: Dimensions) -> Membrane:
         """Membrane of other dimensions of the same cell and envelope; raises MeshingError."""

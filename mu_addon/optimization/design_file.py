@@ -18,7 +18,7 @@ from ..design.quantity import Description
 from ..design.settings import ORIENTATION, USUAL_RESIN
 from ..errors import InputError, did_you_mean
 from ..materials.library import Material, load_material, material_text, read_material
-from ..meshing.settings import RESOLVED, MeshSettings
+from ..meshing.settings import MeshSettings
 from ..reading import parse_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
@@ -206,12 +206,6 @@ def located_keys(text: str) -> Iterator[None]:
 def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body | None) -> Design:
     document = parse_toml(text, origin)
     for key in document:
-        if key == "fidelity":
-            raise InputError(
-                "the key fidelity is gone: every search simulates the printed body",
-                f"{origin}, {_line(text, key)}, {key}",
-                "leave it out",
-            )
         if key not in _KEYS:
             raise InputError(
                 f"unknown key {key!r}{did_you_mean(key, _KEYS)}",
@@ -264,7 +258,7 @@ def _design(text: str, origin: str, unit: Unit | None, folder: Path, body: Body 
                 raise InputError(
                     f"{path!r} is not a path of the unit", f"{place}, values", f"of: {', '.join(paths)}"
                 )
-    settings = MeshSettings(refine=number(settings_of.REFINE), fidelity=RESOLVED)
+    settings = MeshSettings(refine=number(settings_of.REFINE))
     search = SearchSettings(
         evaluations=int(number(settings_of.EVALUATIONS)),
         batch=int(number(settings_of.BATCH)),

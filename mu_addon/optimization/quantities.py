@@ -270,12 +270,11 @@ class Stretch:
         solid = _solid(mesh, own, volumes)
         less = (mean - least) / solid.sum()
         np.add.at(nodes, mesh.tets[own], -less * np.einsum("eq,eqni->eni", solid, reference.gradients[own]))
-        if mesh.resolved:
-            slope = _solid_slope(mesh, own, volumes)
-            filled[own] = -less * slope
-            relative = np.zeros_like(filled)
-            relative[own] = np.divide(slope, solid, out=np.zeros_like(slope), where=solid > 0.0)
-            np.add.at(filled, (element, point), excess * relative[element, point])
+        slope = _solid_slope(mesh, own, volumes)
+        filled[own] = -less * slope
+        relative = np.zeros_like(filled)
+        relative[own] = np.divide(slope, solid, out=np.zeros_like(slope), where=solid > 0.0)
+        np.add.at(filled, (element, point), excess * relative[element, point])
         factor = 1.0 if self.elongation is None else -self.elongation / max(mean - 1.0, 1e-9) ** 2
         by_u = self.slope(structure, states)[self.conditions[0]]
         ties = np.einsum("ti,tki->tk", by_u[mesh.tied], u[mesh.tied_to])
@@ -316,8 +315,6 @@ def _solid(mesh: Mesh, elements: Array, volumes: Array) -> Array:
 
     The weight of points filled by less than half falls to 0 at a quarter, as they are hardly supported.
     """
-    if not mesh.resolved:
-        return volumes
     filled = mesh.filled[elements]
     share = np.clip(2.0 * filled - 0.5, 0.0, 1.0)
     return volumes * filled * share**2 * (3.0 - 2.0 * share)

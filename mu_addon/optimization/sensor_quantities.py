@@ -114,7 +114,7 @@ class SensorSlope:
         except InputError as error:
             # Another design may have room for it.
             raise MeshingError(error.what, error.where, error.remedy) from error
-        joints = Joints.of(mesh, anchors, unit.dimensions.cell)
+        joints = Joints.of(mesh, anchors)
         tip = TipSection.of(mesh)
         displacements = [np.zeros_like(mesh.nodes), *(states[c] for c in self.conditions)]
         moved = [tuple(part[numbers] for part in joints.moved(u)) for u in displacements]

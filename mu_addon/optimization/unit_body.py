@@ -21,7 +21,7 @@ from ..fem.moved_nodes import relocated
 from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, NewtonSettings
 from ..fem.unit_materials import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
-from ..meshing.settings import RESOLVED, MeshSettings
+from ..meshing.settings import MeshSettings
 from ..resolved.candidates import states_along
 from ..resolved.morph import PrintedMorph
 from ..resolved.printed_mesh import mesh_printed
@@ -58,7 +58,7 @@ class Mechanics:
     the lattice's box; self_contact: of walls and struts.
     """
 
-    settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5, fidelity=RESOLVED))
+    settings: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=0.5))
     as_printed: Callable[[Unit], Unit] = _same
     materials: Callable[[Unit, Mesh], Materials] = _materials
     model: Callable[[Unit, Mesh], Model] = _model

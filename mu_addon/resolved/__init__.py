@@ -1,7 +1,7 @@
 """The resolved unit: the printed body itself as a finite-element mesh, strut by strut.
 
-`mesh_printed` meshes struts and wall separately and ties them where they meet; `mesh_of` gives that mesh, or
-the homogenised one, by the fidelity that the settings ask for. See docs/engineering/method.md.
+`mesh_printed` meshes struts and wall separately and ties them where they meet. See
+docs/engineering/method.md.
 
     >>> from mu_addon.resolved import strut_mesh
     >>> from mu_addon.design import load_preset
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
-    from .printed_mesh import mesh_of as mesh_of
+    from .candidates import PrintedWaveguides as PrintedWaveguides
     from .printed_mesh import mesh_printed as mesh_printed
     from .strut import strut_mesh as strut_mesh
 else:

@@ -12,12 +12,10 @@ from ..design.body import Body, covering
 from ..design.dimensions import Dimensions
 from ..design.lattice import lattice_of
 from ..design.parameters import Unit
-from ..errors import InputError
 from ..fem.embedding import embed
-from ..meshing.homogenised_unit import mesh_unit
 from ..meshing.mesh import MEMBRANE, Array, Mesh, mirror, second_order
 from ..meshing.quality import check_positive
-from ..meshing.settings import CELL_MM, SOLID, MeshSettings
+from ..meshing.settings import CELL_MM, MeshSettings
 from ..meshing.wall_grid import Membrane, WallGrid
 from .beams import REACH, with_beams
 from .frame import frame_zones
@@ -66,23 +64,6 @@ def beam_layers(sizes: Sizes) -> int:
     return max(sizes.layers, Sizes().layers)
 
 
-def mesh_of(
-    unit: Unit,
-    settings: MeshSettings,
-    progress: Progress | None = None,
-    mesher: str = "auto",
-    cache: Path | None = None,
-    body: Body | None = None,
-) -> Mesh:
-    """Analysis mesh of a unit by the fidelity of the settings: `mesh_printed` or `mesh_unit`.
-
-    Raises InputError and MeshingError.
-    """
-    if settings.resolved:
-        return mesh_printed(unit, settings, progress, cache, body)
-    return mesh_unit(unit, settings, progress, mesher, cache, body)
-
-
 def mesh_printed(
     unit: Unit,
     settings: MeshSettings | None = None,
@@ -90,31 +71,25 @@ def mesh_printed(
     cache: Path | None = None,
     body: Body | None = None,
     sizes: Sizes | None = None,
+    solid: bool = False,
 ) -> Mesh:
     """The printed unit as quadratic tetrahedra: wall and caps, and struts whose nodes in the wall follow it.
 
     Elements of struts count as far as they lie outside the actuator (`filled`); nodes inside it are tied to
     the wall. Struts are beams where they are whole (`with_beams`; of other kinds than half diagonals
-    `with_graph_beams`), unless the settings ask for the fidelity "solid" or the wall's law has memory. The
-    base is clamped, the inlet is left out.
+    `with_graph_beams`), solids where the wall's law has memory. The base is clamped, the inlet is left out.
 
-    settings: fidelity, fraction ("half" or "full") and `refine` are used. cache: folder for the octants of
-    lattices other than body-centred. body: a closed surface that cuts the lattice in place of its box.
-    progress: called with a stage and the share done. sizes: of elements before `refine` divides them. Raises
-    InputError and MeshingError.
+    cache: folder for the octants of lattices other than body-centred. body: a closed surface that cuts the
+    lattice in place of its box. progress: called with a stage and the share done. sizes: of elements before
+    `refine` divides them. solid: mesh every strut as a solid, to check the beams. Raises InputError and
+    MeshingError.
     """
     s = settings or MeshSettings()
     report = progress or (lambda stage, share: None)
-    if s.order != 2:
-        raise InputError(
-            "the printed body is meshed by quadratic elements",
-            "order",
-            "choose order 2",
-        )
     d = unit.printed
     own = covering(d, body)
     # The wall's law is that of struts, too, and beams have no memory.
-    beams = s.fidelity != SOLID and not unit.wall.has_memory
+    beams = not (solid or unit.wall.has_memory)
     sizes = (sizes or Sizes()).refined(s.refine)
     if beams:
         sizes = attrs.evolve(sizes, layers=beam_layers(sizes))

@@ -64,7 +64,7 @@ def bar_response(
     scaled = modes * np.sqrt(np.abs(energy))[:, None, :]
     states = loaded(trajectory, representative_pressures(trajectory))
     count, q = len(graph.nodes), 6 * len(graph.steps)
-    flexibility, drive = np.zeros((len(states), 1, q, q)), np.zeros((len(states), q))
+    flexibility, drive = np.zeros((len(states), q, q)), np.zeros((len(states), q))
     reach = np.zeros((len(states), len(monitor.nodes), 3, q))
     data, free = model.parameters(materials), model.free
     probes = probe_loads(mesh, monitor, (0, 1, 2))
@@ -87,12 +87,11 @@ def bar_response(
             solved = solve(applied[:, columns].toarray().T).T
             compliance[:, columns] = applied.T @ solved
             moved[:, :, columns] = np.einsum("fpc,fk->pck", monitored, solved)
-        flexibility[s, 0] = patterns.T @ compliance @ patterns
+        flexibility[s] = patterns.T @ compliance @ patterns
         reach[s] = moved @ patterns
     pressure = np.array([state.pressure_MPa for state in states])
-    every = np.arange(len(graph.steps))
     sign = np.where(energy < 0.0, -1.0, 1.0).ravel()
-    return Response(graph, pressure, flexibility, drive, reach, sign, 6, every, np.ones(len(every)), (False,))
+    return Response(graph, pressure, flexibility, drive, reach, sign, 6)
 
 
 def _around(mesh: Mesh, node: Array, d: Dimensions) -> Array:

@@ -16,7 +16,6 @@ import numpy as np
 
 from ..design.dimensions import Dimensions
 from ..design.waveguide import Bar
-from ..fem.embedding import embed
 from ..fem.kinematics import MIRROR, mean_gradients, numbers_of
 from ..meshing.mesh import Mesh
 from .guide import Centreline
@@ -164,30 +163,19 @@ def _along(points: Array, corners: Array, centre: Array) -> float:
 class Joints:
     """Lattice nodes (n, 3) in mm in a mesh: each moves and rotates as the body around it does.
 
-    Of a printed body that is the joint itself, the elements around its node; of a homogenised lattice the
-    continuum within a quarter of a cell, to even out elements.
+    The elements around a joint's node are taken.
     """
 
     nodes: Array
     _gradients: Callable[[Array], tuple[Array, Array]]
 
     @classmethod
-    def of(cls, mesh: Mesh, nodes: Array, cell: float) -> Joints:
-        """Joints at nodes (n, 3) in mm of an undeformed mesh, half or whole; cell: the unit cell in mm.
+    def of(cls, mesh: Mesh, nodes: Array) -> Joints:
+        """Joints at nodes (n, 3) in mm of an undeformed mesh, half or whole.
 
-        Raises InputError where a printed body has no joint.
+        Raises InputError where the mesh has no joint.
         """
-        if mesh.resolved:
-            return cls(nodes, _of_joints(mesh, nodes))
-        reach = cell / 4
-        offsets = np.concatenate([np.zeros((1, 3)), reach * np.eye(3), -reach * np.eye(3)])
-        around = embed(mesh, (nodes[:, None] + offsets).reshape(-1, 3))
-
-        def gradients(u: Array) -> tuple[Array, Array]:
-            at = around.displacement(u).reshape(len(nodes), 7, 3)
-            return at[:, 0], np.eye(3) + np.swapaxes(at[:, 1:4] - at[:, 4:7], 1, 2) / (2 * reach)
-
-        return cls(nodes, gradients)
+        return cls(nodes, _of_joints(mesh, nodes))
 
     def moved(self, u: Array) -> tuple[Array, Array]:
         """Positions (n, 3) in mm and rotations (n, 3, 3) after displacements (nodes of the mesh, 3) in mm.

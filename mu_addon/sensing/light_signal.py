@@ -61,7 +61,7 @@ def signal_of_states(
     """
     optics = Optics() if optics is None else optics
     nodes = anchor_points(unit)[list(path.indices)] if isinstance(path, Window) else np.asarray(path, float)
-    joints = Joints.of(mesh, nodes, unit.dimensions.cell)
+    joints = Joints.of(mesh, nodes)
     guide = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
     moved = [joints.moved(u) for u in displacements]
     if rays is not None:

@@ -11,7 +11,6 @@ import numpy as np
 from mu_addon.chain.chain import GRAVITY_N_PER_G, Loads
 from mu_addon.chain.rigid_motion import motion
 from mu_addon.chain.unit_between_plates import frame, tip_nodes
-from mu_addon.design.strut_cell import relative_density, strut_cell
 from mu_addon.errors import InputError
 from mu_addon.fem.dead_loads import gravity
 from mu_addon.fem.embedding import embed
@@ -131,15 +130,14 @@ def full_model(
     for unit, mesh, turn in zip(units, meshes, turns_deg, strict=True):
         if len(mesh.tied) or mesh.symmetry:
             raise InputError(
-                "a full model is made of whole homogenised meshes", "mesh", 'give fraction "full"'
+                "a full model is made of whole meshes without ties", "mesh", 'give fraction "full"'
             )
         turned = frame(turn)[:3, :3]
         x = mesh.nodes @ turned.T + [0.0, 0.0, height]
         start = first
         for layer in materials_of(unit, mesh).layers:
             layers.append(attrs.evolve(layer, elements=layer.elements + element))
-        hollow = np.where(mesh.region == LATTICE, relative_density(strut_cell(unit)), 1.0)
-        density.append(density_g_per_ml * 1e-9 * hollow)
+        density.append(np.full(len(mesh.tets), density_g_per_ml * 1e-9))
         cavities.append(mesh.cavity + start)
         counts.append(len(mesh.cavity))
         add(x, mesh.tets, mesh.region)

@@ -20,7 +20,8 @@ from mu_addon.design.profile import (
 )
 from mu_addon.design.wall_factors import canonical_text, factor_at, parsed, text_of
 from mu_addon.errors import InputError
-from mu_addon.meshing import mesh_quality, mesh_unit
+from mu_addon.meshing.quality import cavity_enclosed, element_volumes
+from mu_addon.resolved.printed_mesh import Sizes, wall_mesh
 
 PLAIN = load_preset("mu-1.0x")
 
@@ -99,12 +100,10 @@ def test_print_adds_to_every_wall_alike():
 
 
 def test_a_mesh_has_the_wall_that_is_drawn():
-    """As near as that of even walls is held to in `tests/meshing/test_homogenised_unit`."""
-    report = mesh_quality(mesh_unit(UNEVEN), UNEVEN)
-    assert report.inverted == 0
-    assert abs(report.membrane_volume_error) < 2e-4
-    assert abs(report.cavity_volume_error) < 1e-4
-    assert report.membrane_volume_mm3 == pytest.approx(membrane_volume(UNEVEN.dimensions), rel=2e-4)
+    """As near as that of even walls is held to in `tests/resolved/test_wall`."""
+    mesh = wall_mesh(UNEVEN.printed, Sizes())
+    assert 2 * element_volumes(mesh).sum() == pytest.approx(membrane_volume(UNEVEN.dimensions), rel=2e-4)
+    assert 2 * cavity_enclosed(mesh) == pytest.approx(cavity_volume(UNEVEN.dimensions), rel=1e-4)
 
 
 def test_the_thickest_and_the_thinnest_chamber_obey_the_rules():

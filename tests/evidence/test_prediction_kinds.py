@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence.effect import Parameter
 from mu_addon.evidence.prediction.blocked_force import BlockedForce, pressing
@@ -22,9 +21,15 @@ from mu_addon.fem.held_tip import HeldTip
 from mu_addon.measured.pose import down
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic, bench
+from tests.evidence.hollow_finger import UNIT, in_place_of_units
 
-UNIT = load_preset("mu-1.0x")
-ROUGH = MeshSettings(refine=0.4, order=1)
+ROUGH = MeshSettings(refine=0.35)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fingers():
+    with in_place_of_units():
+        yield
 
 
 def step(dt=0.01, name="step"):

@@ -19,7 +19,7 @@ from tests.evidence import analytic
 
 UNIT = load_preset("mu-1.0x")
 SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))
-ROUGH = MeshSettings(refine=0.5, fidelity="resolved")
+ROUGH = MeshSettings(refine=0.5)
 LOW, HIGH = -3.0, 8.0
 
 
@@ -53,7 +53,7 @@ def test_laws_of_the_resin_act_on_struts_too(mesh, name, laws):
 def crossing_and_touching():
     """Three chambers with thin walls, which touch from -10 kPa on."""
     thin = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, wall_mm=0.6))
-    rough = MeshSettings(refine=0.4, fidelity="resolved")
+    rough = MeshSettings(refine=0.4)
     return [Run(Body(thin, rough, self_contact=apart), (-14.0, 0.0)) for apart in (False, True)]
 
 
@@ -88,7 +88,9 @@ def test_a_thinner_wall_is_named_though_every_size_has_a_mesh_of_its_own(tmp_pat
         tests.append(analytic.experiment(name, t, p, {"angle_deg": noisy}))
     effects = ("wall_thickness", "gravity")
     # Data and model are of one code and one way of meshing: there is no discrepancy between them.
-    settings = UnitSettings(ROUGH, ROUGH, pressures=5, effects=effects, discrepancy=0.0)
+    settings = UnitSettings(
+        ROUGH, ROUGH, None, 5, effects=effects, whole=None, self_contact=False, discrepancy=0.0
+    )
     found = diagnose(
         tests,
         Composite({"unit_pressure": UnitPressure(unit_responses(SMALL, tests, settings, tmp_path), tests)}),

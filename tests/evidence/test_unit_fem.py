@@ -9,15 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from mu_addon.design.parameters import load_preset
 from mu_addon.errors import ConvergenceError, InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.evidence.markers import attached, material_points, nearest
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.unit_effects import EFFECTS, Body, down
 from mu_addon.evidence.unit_fem import (
-    COARSE,
-    FINE,
     Result,
     Run,
     UnitResponseWarning,
@@ -33,16 +30,23 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.measured.pose import X, at_rest
-from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from tests.evidence import analytic
+from tests.evidence.hollow_finger import UNIT, finger, in_place_of_units
 
-UNIT = load_preset("mu-1.0x")
-ROUGH = MeshSettings(refine=0.4, order=1)
-FINER = MeshSettings(refine=0.5, order=1)
-QUICK = UnitSettings(ROUGH, FINER, pressures=6, effects=("gravity", "mesh_error"), workers=1)
+ROUGH, FINER = MeshSettings(refine=0.35), MeshSettings(refine=0.5)
+QUICK = UnitSettings(
+    ROUGH,
+    FINER,
+    None,
+    pressures=6,
+    effects=("gravity", "mesh_error"),
+    whole=None,
+    self_contact=False,
+    workers=1,
+)
 # On the side, off its middle plane; and on the tip.
-MARKERS = {1: (18.75, 10.0, 40.0), 2: (0.0, 5.0, 75.0)}
+MARKERS = {1: (12.5, 5.0, 40.0), 2: (0.0, 10.0, 75.0)}
 TIME, PRESSURE = analytic.triangle(0.5, 10.0, 1, -10.0, 20.0)
 
 
@@ -57,9 +61,15 @@ def bench(name="one", markers=MARKERS, pressure=PRESSURE, angle=True, axes="xyz"
     return analytic.experiment(name, np.arange(n) * 0.5, pressure, columns, **more)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def fingers():
+    with in_place_of_units():
+        yield
+
+
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_unit(UNIT, ROUGH)
+    return finger(UNIT, ROUGH)
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +146,6 @@ def test_moduli_scaled_alike_are_the_pressure_scaled():
         UNIT,
         material=attrs.evolve(
             m,
-            lattice_modulus_kPa=1.2 * m.lattice_modulus_kPa,
             membrane_modulus_kPa=1.2 * m.membrane_modulus_kPa,
         ),
     )
@@ -253,7 +262,7 @@ def test_what_cannot_be_computed_is_left_out_and_said(monkeypatch):
 
 
 def test_pressures_out_of_reach_are_named():
-    soft = attrs.evolve(UNIT, material=attrs.evolve(UNIT.material, membrane_modulus_kPa=25.0))
+    soft = attrs.evolve(UNIT, material=attrs.evolve(UNIT.material, membrane_modulus_kPa=10.0))
     with pytest.raises(ConvergenceError, match="too few of the measured pressures"):
         unit_responses(soft, [bench(markers={}, pressure=100 * PRESSURE)], attrs.evolve(QUICK, effects=()))
 
@@ -295,13 +304,12 @@ def test_bad_orders_are_refused():
 
 
 def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
-    # Half-widths of the envelope: 1.5 cells in x; -1.5 to 2.5 cells in y.
-    places = {1: (18.75 + 1.0, 10.0, 40.0), 2: (-10.0, 31.25 + 0.5, 30.0), 3: (2.0, 20.0, 50.0)}
+    places = {1: (12.5 + 1.0, 5.0, 40.0), 2: (-10.0, 12.5 + 0.5, 30.0), 3: (2.0, 11.0, 50.0)}
     found = {m.number: m for m in attached(mesh, [bench(markers=places)], 4.0)}
-    np.testing.assert_allclose(found[1].point, [18.75, 10.0, 40.0], atol=1e-9)
+    np.testing.assert_allclose(found[1].point, [12.5, 5.0, 40.0], atol=1e-9)
     assert found[1].distance_mm == pytest.approx(1.0)
-    np.testing.assert_allclose(found[2].point, [-10.0, 31.25, 30.0], atol=1e-9)
-    # Inside the lattice it is where it is.
+    np.testing.assert_allclose(found[2].point, [-10.0, 12.5, 30.0], atol=1e-9)
+    # Inside the body it is where it is.
     np.testing.assert_array_equal(found[3].point, places[3])
     assert found[3].distance_mm == 0.0
     # Within the air of a chamber it is on its wall, the nearest one.
@@ -312,16 +320,16 @@ def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
 
 def test_a_marker_across_the_mirror_moves_like_its_image(mesh):
     u = np.random.default_rng(0).standard_normal(mesh.nodes.shape)
-    one, other = material_points(mesh, np.array([[5.0, 20.0, 40.0], [-5.0, 20.0, 40.0]])).at(u)
+    one, other = material_points(mesh, np.array([[5.0, 11.0, 40.0], [-5.0, 11.0, 40.0]])).at(u)
     np.testing.assert_allclose(other, one * [-1, 1, 1])
 
 
 def test_without_x_a_marker_lies_in_the_mirror_plane(mesh):
-    (m,) = attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="yz")], 4.0)
-    np.testing.assert_array_equal(m.point, [0.0, 20.0, 40.0])
+    (m,) = attached(mesh, [bench(markers={4: (9.0, 11.0, 40.0)}, axes="yz")], 4.0)
+    np.testing.assert_array_equal(m.point, [0.0, 11.0, 40.0])
     assert m.axes == "yz"
     with pytest.raises(InputError, match="marker 4 lacks its y or z"):
-        attached(mesh, [bench(markers={4: (9.0, 20.0, 40.0)}, axes="xy")], 4.0)
+        attached(mesh, [bench(markers={4: (9.0, 11.0, 40.0)}, axes="xy")], 4.0)
 
 
 def markers_of(experiment):
@@ -331,13 +339,13 @@ def markers_of(experiment):
 
 def test_a_marker_off_the_unit_is_named():
     with pytest.raises(InputError, match=r"marker 3 lies 11\.2 mm from the unit") as error:
-        markers_of(bench("bad camera", {1: MARKERS[1], 3: (30.0, 10.0, 40.0)}))
+        markers_of(bench("bad camera", {1: MARKERS[1], 3: (23.7, 5.0, 40.0)}))
     assert error.value.where == "bad camera"
     assert [m.number for m in markers_of(bench())] == [1, 2]
 
 
 def test_a_marker_on_two_places_is_named(mesh):
-    moved = bench("second", {1: (18.75, 10.0, 50.0)})
+    moved = bench("second", {1: (12.5, 5.0, 50.0)})
     with pytest.raises(InputError, match=r"marker 1 sits 10\.0 mm from where one has it"):
         attached(mesh, [bench(), moved], 4.0)
 
@@ -361,9 +369,8 @@ def test_rest_is_looked_for_where_there_is_no_pressure():
 # The clog
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_clogged_body_has_the_potential_of_its_residual(order):
-    m = mesh_unit(UNIT, MeshSettings(refine=0.3, order=order))
+def test_a_clogged_body_has_the_potential_of_its_residual(mesh):
+    m = mesh
     model = CloggedModel(m, 50.0, 0.7, threads=1)
     plain = Model(m, threads=1)
     data = model.parameters(materials_of(UNIT, m))
@@ -403,8 +410,8 @@ def test_nothing_lost_is_no_clog_and_all_lost_leaves_the_rest(mesh):
     assert 0.2 * base < three < one < base
 
 
-def test_a_clogged_tangent_is_near_that_of_its_residual():
-    m = mesh_unit(UNIT, MeshSettings(refine=0.3, order=1))
+def test_a_clogged_tangent_is_near_that_of_its_residual(mesh):
+    m = mesh
     model = CloggedModel(m, 50.0, 0.7, threads=1)
     data = model.parameters(materials_of(UNIT, m))
     state = Equilibrium(model, materials_of(UNIT, m)).newton(np.zeros_like(m.nodes), 0.005)
@@ -419,32 +426,10 @@ def test_a_clogged_tangent_is_near_that_of_its_residual():
     assert np.linalg.norm(away) < 1e-2 * np.linalg.norm(expected)
 
 
-@pytest.mark.nightly(
-    "tests/blind/test_blind.py::test_the_simulated_bench_differs_from_the_judge_s_model_by_the_mesh_alone"
-)
-def test_the_default_mesh_is_near_a_finer_one_and_pressures_are_dense_enough(tmp_path):
-    """Order 2 in two processes: 4 % of the angle in vacuum and 1 % under pressure are the mesh's."""
-    settings_ = UnitSettings(COARSE, FINE, effects=("mesh_error", "clogged_chamber"))
-    p = np.concatenate([PRESSURE * 2, [-20.0, 0.0]])
-    (r,) = unit_responses(UNIT, [bench(markers={}, pressure=p)], settings_, tmp_path)
-    coarse, fine = r.variants["mesh_error"].values[:, 0]
-    at = r.pressures_kPa
-    apart = np.abs(fine - coarse)
-    assert (apart[at > 0] < 0.015 * np.abs(fine[at > 0]) + 0.05).all()
-    assert (apart[at < 0] < 0.06 * np.abs(fine[at < 0])).all()
-    assert len(r.variants["clogged_chamber"].at) > 1
-    between = tuple(np.concatenate([(at[1:] + at[:-1]) / 2, [0.0]]).tolist())
-    exact = run(Run(Body(UNIT, COARSE, FINE), tuple(sorted(between)))).values[0]
-    met = r.at(np.array(sorted(between)), {})[0]
-    assert np.abs(met - exact).max() < 0.05
-
-
 @pytest.mark.nightly("test_a_run_starts_from_the_states_of_the_body_without_its_effect")
 def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     effects = ("wall_thickness",)
-    # Orders differ, so that the meshes' errors do by a factor.
-    fine = MeshSettings(refine=0.4, meridian_mm=1.2)
-    alone = UnitSettings(fine, FINER, pressures=4, effects=effects, workers=1)
+    alone = attrs.evolve(QUICK, mesh=MeshSettings(refine=1.0), pressures=4, effects=effects)
     both = attrs.evolve(alone, changes=ROUGH)
     tests = [bench(markers={})]
     wanted, found, coarse = (
@@ -452,7 +437,7 @@ def test_changes_on_a_coarser_mesh_are_taken_over_in_proportion(cache):
     )
     at, met = found.pressures_kPa, np.isin(found.pressures_kPa, wanted.pressures_kPa)
     np.testing.assert_allclose(found.values[:, met], wanted.values, rtol=1e-12)
-    assert np.abs(coarse.values - wanted.values).max() > 0.2 * np.abs(wanted.values).max()
+    assert np.abs(coarse.values - wanted.values).max() > 0.01 * np.abs(wanted.values).max()
     thick = [r.variants["wall_thickness"] for r in (wanted, found, coarse)]
     np.testing.assert_array_equal(thick[0].at, thick[1].at)
     changes = [v.values[-1] - r.values for v, r in zip(thick, (wanted, found, coarse), strict=True)]
@@ -501,7 +486,7 @@ def test_what_acts_both_ways_is_sought_from_both_sides(name):
 
 
 def test_a_first_look_runs_few_sizes_and_a_name_asks_for_the_others():
-    settings = UnitSettings(whole=frozenset())
+    settings = UnitSettings(changes=None)
     plan = _Plan(
         Body(UNIT), None, settings.whole, 1.0, 1.0, ((0.0, X),), (-6.0, 0.0, 8.0, 12.0), (-6.0, 12.0), (), ()
     )
@@ -527,7 +512,7 @@ def test_an_effect_is_believed_no_further_than_a_first_look_at_it():
         Body(UNIT), None, frozenset(), 1.0, 1.0, ((0.0, X),), (-6.0, 0.0, 8.0, 12.0), (-6.0, 12.0), (), ()
     )
     rest = Result(np.array([[-2.0, 0.0, 3.0, 5.0]]))
-    found = {r.key(): rest for r in plan.runs(UnitSettings(whole=frozenset()))}
+    found = {r.key(): rest for r in plan.runs(UnitSettings(changes=None))}
     kept = np.ix_([0], range(4))
     bounds = {}
     for name in ("strain_stiffening", "wall_thickness"):

@@ -11,7 +11,7 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import CONTACT_NEWTON
-from mu_addon.meshing.mesh import MEMBRANE, Mesh, boundary_faces, edges_of, second_order
+from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Mesh, boundary_faces, edges_of, second_order
 
 
 def _grid(counts, size):
@@ -74,6 +74,19 @@ def hollow_box(order=2, n=4, size=4.0, clamp=True):
     middle = nodes[faces].mean(axis=1)
     cavity = faces[((middle > 0.5 * low) & (middle < size - 0.5 * low)).all(axis=1)]
     return make(nodes, tets, order, cavity, (lambda p: p[2] == 0,) if clamp else ())
+
+
+def half_hollow_cube(size=4.0):
+    """The half at x >= 0 of a clamped hollow cube about its middle plane; its +y side is the lattice's."""
+    whole = hollow_box(order=1, size=size)
+    nodes = whole.nodes - [size / 2, 0.0, 0.0]
+    tets = whole.tets[nodes[whole.tets][..., 0].min(axis=1) >= 0.0]
+    cavity = whole.cavity[nodes[whole.cavity][..., 0].min(axis=1) >= 0.0]
+    used, number = np.unique(tets), np.full(len(nodes), -1)
+    number[used] = np.arange(len(used))
+    region = np.where(nodes[tets].mean(axis=1)[:, 1] > 0.75 * size, LATTICE, MEMBRANE)
+    base = number[np.intersect1d(whole.base, used)]
+    return Mesh(nodes[used], number[tets], region, number[cavity], base, np.empty(0), ("x",))
 
 
 def sphere_octant(inner=10.0, outer=12.0, around=4, through=1, order=2):

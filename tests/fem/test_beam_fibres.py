@@ -1,17 +1,21 @@
 """Beams of other laws than neo-Hooke's: closed forms, derivatives, and solid struts of the same law."""
 
+from functools import partial
+
 import attrs
 import numpy as np
 import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.evidence import unit_effects
 from mu_addon.evidence.unit_effects import Body
 from mu_addon.evidence.unit_run import Run, run
 from mu_addon.fem.beam_fibres import Mixture, fibres_of
 from mu_addon.fem.beams import Beams, frames_along, sections_of
 from mu_addon.fem.laws import Foam, Layered, NeoHooke, Prony, Yeoh
-from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 from .derivatives import assert_beams_consistent
 
@@ -120,16 +124,17 @@ def test_a_law_with_memory_is_refused():
     ("effect", "size"),
     [("strain_stiffening", 1.0), ("anisotropy", 1.3), ("tension_compression_asymmetry", 1.5)],
 )
-def test_a_unit_of_beams_changes_by_a_law_as_one_of_solid_struts_does(effect, size):
+def test_a_unit_of_beams_changes_by_a_law_as_one_of_solid_struts_does(effect, size, monkeypatch):
     unit = load_preset("mu-1.0x")
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
-    changes = {}
-    for fidelity in (RESOLVED, SOLID):
-        body = Body(unit, MeshSettings(refine=0.6, fidelity=fidelity))
+    changes = []
+    for solid in (False, True):
+        monkeypatch.setattr(unit_effects, "_mesh_kept", partial(mesh_printed, solid=solid))
+        body = Body(unit, MeshSettings(refine=0.6))
         plain, changed = (
             run(Run(body, (0.0, 10.0, 20.0, 30.0), effect=name, size=value)).values[0]
             for name, value in (("", 0.0), (effect, size))
         )
-        changes[fidelity] = (changed - plain)[1:] / plain[1:]
+        changes.append((changed - plain)[1:] / plain[1:])
     # What a law changes of the angle, as a share of it.
-    np.testing.assert_allclose(changes[RESOLVED], changes[SOLID], atol=0.015)
+    np.testing.assert_allclose(*changes, atol=0.015)

@@ -4,20 +4,18 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.fem import Model
-from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.mesh import Mesh
-from mu_addon.meshing.settings import MeshSettings
 
 from . import bodies
+from .bodies import hollow_box
 from .cavities import CavitiesModel
 
 
 @pytest.fixture(scope="module")
-def unit_mesh():
-    return mesh_unit(load_preset("mu-1.0x"), MeshSettings(order=1, refine=0.3, fraction="full"))
+def hollow():
+    return hollow_box(order=1)
 
 
 def beside(mesh: Mesh) -> Mesh:
@@ -34,14 +32,14 @@ def beside(mesh: Mesh) -> Mesh:
     )
 
 
-def test_each_of_two_bodies_feels_its_own_share_alone(unit_mesh):
+def test_each_of_two_bodies_feels_its_own_share_alone(hollow):
     one, two = (
-        Model(unit_mesh, threads=1),
-        CavitiesModel(beside(unit_mesh), [len(unit_mesh.cavity)] * 2, threads=1),
+        Model(hollow, threads=1),
+        CavitiesModel(beside(hollow), [len(hollow.cavity)] * 2, threads=1),
     )
     two.shares = np.array([0.3, -0.5])
     single, both = (m.parameters(bodies.uniform(m.mesh, 0.1, 0.3)) for m in (one, two))
-    u = 0.05 * np.random.default_rng(1).normal(size=unit_mesh.nodes.shape)
+    u = 0.05 * np.random.default_rng(1).normal(size=hollow.nodes.shape)
     whole = np.vstack([u, u])
     n = len(u)
     found = two.residual(whole, 0.02, both)
@@ -57,6 +55,6 @@ def test_each_of_two_bodies_feels_its_own_share_alone(unit_mesh):
         np.testing.assert_allclose(tangent[np.ix_(rows, rows)], own, atol=1e-12)
 
 
-def test_cavities_that_do_not_cover_the_faces_are_refused(unit_mesh):
+def test_cavities_that_do_not_cover_the_faces_are_refused(hollow):
     with pytest.raises(InputError, match="in a mesh with"):
-        CavitiesModel(unit_mesh, [3, 4])
+        CavitiesModel(hollow, [3, 4])

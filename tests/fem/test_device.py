@@ -10,20 +10,17 @@ import sys
 import numpy as np
 import pytest
 import warp as wp
-from scipy import sparse
 from scipy.sparse.linalg import eigsh
 
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem import conjugate_gradients, kernels, krylov_kernels
-from mu_addon.fem.batched_newton import BatchedNewton, Variant
-from mu_addon.fem.conjugate_gradients import Change, ConjugateGradients
+from mu_addon.fem.conjugate_gradients import ConjugateGradients
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.state import rest
-from mu_addon.fem.tangent_variants import IterativeVariants
 
 from .bodies import hollow_box
 
@@ -134,41 +131,6 @@ def test_a_solution_that_is_not_reached_is_not_returned(cpu, tangent, gradients,
         gradients.factor(tangent)
 
 
-def test_every_system_has_its_own_change(cpu, tangent, gradients):
-    n = len(cpu.free)
-    random = np.random.default_rng(4)
-    changes = []
-    for size in (1, 0, 30, 90):
-        unknowns = random.choice(n, size, replace=False)
-        root = random.standard_normal((size, size)) * (random.random((size, size)) < 0.2) + np.eye(size)
-        changes.append(Change(unknowns, sparse.csr_matrix(root @ root.T)))
-    b = random.standard_normal((4, n))
-    gradients.factor(tangent)
-    x, solved = gradients.solve_changed(b, gradients.changes(changes))
-    assert solved.all()
-    for change, load, found in zip(changes, b, x, strict=True):
-        count = len(change.unknowns)
-        at = sparse.csr_matrix((np.ones(count), (change.unknowns, range(count))), shape=(n, count))
-        left = (cpu.matrix(tangent) + at @ change.matrix @ at.T) @ found - load
-        assert np.linalg.norm(left) < 2 * gradients.tolerance * np.linalg.norm(load)
-
-
-def test_only_the_system_that_is_not_definite_is_given_up(cpu, tangent, gradients):
-    n = len(cpu.free)
-    shared = IterativeVariants(gradients)
-    shared.factor(tangent)
-    diagonal = cpu.matrix(tangent).diagonal()
-    # Half an unknown's own stiffness is more than the body around it can do without.
-    soft = shared.take(Change(np.array([0, 1, 2]), sparse.diags(-0.9 * diagonal[:3]).tocsr()))
-    same = shared.take(Change(np.array([5]), sparse.csr_matrix((1, 1))))
-    b = np.random.default_rng(5).standard_normal((2, n))
-    lost, found = shared.solve(b, [soft, same])
-    assert lost is None
-    assert found == pytest.approx(gradients.solve(b[1]), rel=1e-6, abs=1e-6 * np.abs(found).max())
-    with pytest.raises(IndefiniteError):
-        shared.take(Change(np.array([0]), sparse.csr_matrix([[-2 * diagonal[0]]])))
-
-
 @pytest.fixture(scope="module")
 def path(cpu):
     return Equilibrium(cpu, two_halves(MESH)).path([2e-3, 4e-3], rest(MESH))
@@ -182,27 +144,6 @@ def test_equilibria_are_the_same(path, device):
     ):
         assert np.abs(one.u).max() > 0.02
         assert np.abs(one.u - other.u).max() < 1e-8
-
-
-def variants(mesh):
-    """Stiff sensors of one size in three places, and one that is softer than what it replaces."""
-    centre = mesh.nodes[mesh.corners].mean(axis=1)
-    for y, modulus in ((0.5, 2.0), (1.5, 2.0), (2.5, 2.0), (2.5, 0.05)):
-        share = np.where(np.linalg.norm(centre[:, 1:] - [y, 2.5], axis=1) < 0.6, 0.7, 0.0)
-        yield Variant(share, NeoHooke, NeoHooke.parameters(np.array([modulus]), np.array([0.45])))
-
-
-@pytest.mark.parametrize("device", DEVICES)
-def test_variants_in_lockstep_are_the_same(cpu, path, device, monkeypatch):
-    materials, every = two_halves(MESH), list(variants(MESH))
-    expected = BatchedNewton(cpu, materials, every).at(path[-1])
-    model = by_gradients(device)
-    together = BatchedNewton(model, materials, every)
-    # None may be left to a solver of its own.
-    monkeypatch.setattr(together, "_alone", None)
-    for one, other in zip(expected, together.at(path[-1]), strict=True):
-        assert np.abs(one.u - path[-1].u).max() > 1e-4
-        assert np.abs(one.u - other.u).max() < 1e-6
 
 
 @pytest.mark.parametrize("device", CUDA)

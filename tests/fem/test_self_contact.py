@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from mu_addon.errors import InputError
-from mu_addon.fem.batched_newton import BatchedNewton
 from mu_addon.fem.dead_loads import traction
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
@@ -292,12 +291,6 @@ def test_a_vacuum_closes_a_pouch_but_never_crosses_it():
     # Flat against its image: the middle has gone half the gap, but for what the barrier keeps open.
     middle = np.linalg.norm(mesh.nodes - [0.0, 0.0, GAP / 2], axis=1).argmin()
     assert -GAP / 2 < states[-1].u[middle, 2] < -GAP / 2 + 0.02
-
-
-def test_bodies_that_share_a_factor_have_no_self_contact():
-    eq = body(fork())
-    with pytest.raises(InputError, match="self-contact"):
-        BatchedNewton(eq.model, uniform(eq.model.mesh, E, NU), [])
 
 
 def test_a_gap_that_reaches_across_a_wall_is_refused():

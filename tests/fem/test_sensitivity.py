@@ -17,10 +17,10 @@ from tests.fem.bodies import box
 PRESSURE = 0.01
 
 
-def printed(fidelity):
+def printed(solid):
     unit = load_preset("mu-1.0x")
     small = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
-    return mesh_printed(small, MeshSettings(refine=0.2, fidelity=fidelity))
+    return mesh_printed(small, MeshSettings(refine=0.2), solid=solid)
 
 
 def followed(model, u, v):
@@ -60,10 +60,10 @@ def work_of_beams(mesh, u, v, made):
     "make",
     [
         pytest.param(
-            lambda: printed("solid"),
+            lambda: printed(True),
             marks=pytest.mark.nightly("test_it_is_the_derivative_by_places_shares_ties_and_stiffness"),
         ),
-        lambda: printed("resolved"),
+        lambda: printed(False),
         lambda: box((2, 2, 3), (4.0, 5.0, 6.0), clamp=True),
     ],
     ids=["solid struts", "beams", "box"],

@@ -9,52 +9,29 @@ import subprocess
 import sys
 from pathlib import Path
 
-import attrs
-import pytest
+import numpy as np
 
 from mu_addon.cli.main import main
 from mu_addon.design.parameters import load_preset
-from mu_addon.meshing import settings
-from mu_addon.meshing.settings import FIDELITY, HOMOGENISED, SELF_CONTACT, MeshSettings
-from mu_addon.usecases.graph import orders
-from mu_addon.usecases.grip import job as grip_job
-from mu_addon.usecases.parameter_study import plan
-from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
+from mu_addon.fem.protocol import Protocol
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.usecases.simulate_and_place.job import Job, write_study
 
 ROOT = Path(__file__).resolve().parents[2]
 # No measure of speed: what hangs must end some time.
 PATIENCE_S = 3600.0
 RUN = ROOT / "headless" / "run.py"
-# Four chambers, three paths: as many stages as six and ten have.
-UNIT = load_preset("mu-1.0x")
-UNIT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4))
+# Three chambers, one path, small pressures: all stages of a study in seconds.
+UNIT = load_preset("mu-1.0x").evolve(count=3)
+MILD = Protocol(np.arange(4.0), np.array([0.0, -1.0, 0.0, 2.0]))
 
 
 def coarse(folder, unit=UNIT, **changes):
-    """Write the main job, small, into a folder, and return the command that runs it.
-
-    A homogenised lattice, coarse elements and seven instants: the stages of a printed body in seconds.
-    """
+    """Write the main job, small, into a folder, and return the command that runs it."""
     folder.mkdir(parents=True, exist_ok=True)
-    small = {"mesh": MeshSettings(refine=0.5), "times": 7, "stations": 11}
-    write_study(Job(unit, grasp(), **(small | changes)), folder)
+    small = {"mesh": MeshSettings(refine=0.35), "times": 4, "stations": 11}
+    write_study(Job(unit, MILD, **(small | changes)), folder)
     return "resume", folder
-
-
-@contextlib.contextmanager
-def homogenised(**more):
-    """Let commands of this process simulate a homogenised lattice, which has no struts that touch.
-
-    more: other settings of its mesh.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (settings, orders, grip_job):
-            patch.setattr(module, "fidelity_of", lambda solid_struts: HOMOGENISED)
-        patch.setattr(plan, "FIDELITY", FIDELITY._replace(default=HOMOGENISED))
-        patch.setattr(plan, "SELF_CONTACT", SELF_CONTACT._replace(default=False))
-        if more:
-            patch.setattr(settings, "MeshSettings", lambda **given: MeshSettings(**(given | more)))
-        yield
 
 
 def command(*arguments):

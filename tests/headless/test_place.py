@@ -15,32 +15,31 @@ import pytest
 
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.parameters import read_unit
-from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
 from mu_addon.usecases.simulate_and_place.settings import STAGES
 
 from ..report.browser import EXECUTABLE, Browser, complaints, requests
 from .processes import PATIENCE_S, ROOT, RUN, UNIT, coarse, command, here, run, worker_of
 
-PATHS = ["alpha1", "alpha2", "alpha3"]
+PATHS = ["alpha1"]
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, with_light):
     folder = with_light(tmp_path_factory.mktemp("place") / "out")
-    done = here(*coarse(folder, mesh=MeshSettings(refine=0.3)), "--workers", "1")
+    done = here(*coarse(folder), "--workers", "1")
     assert done.returncode == 0, done.stderr
     return folder, done
 
 
 def quick_in(folder, **changes):
-    """Of linear elements: it shows as well that a run comes to the same digits by another way."""
-    return coarse(folder, **({"mesh": MeshSettings(refine=0.35, order=1), "mesh_check": False} | changes))
+    """Without a second mesh: it shows as well that a run comes to the same digits by another way."""
+    return coarse(folder, **({"mesh_check": False} | changes))
 
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory, with_light):
-    """The same run of linear elements, for what is compared with itself."""
+    """The same run without a second mesh, for what is compared with itself."""
     folder = with_light(tmp_path_factory.mktemp("quick") / "out")
     done = run(*quick_in(folder), "--no-report")
     assert done.returncode == 0, done.stderr
@@ -106,8 +105,8 @@ def test_delta_agrees_with_the_table(finished):
     folder, _ = finished
     with np.load(folder / "delta.npz", allow_pickle=False) as stored:
         delta, pressure = stored["delta_mm"], stored["pressure_kPa"]
-        assert delta.shape == (3, 7, 11)
-        np.testing.assert_allclose(pressure, [0, -20, 0, 20, 40, 20, 0])
+        assert delta.shape == (1, 4, 11)
+        np.testing.assert_allclose(pressure, [0, -1, 0, 2])
     J = [float(row["J_hat_mm"]) for row in rows(folder)]
     np.testing.assert_allclose(delta.mean(axis=(1, 2)), J, rtol=1e-8)
 
@@ -134,7 +133,7 @@ def test_summary_tells_what_a_reader_needs(finished):
     assert summary["status"] == "complete"
     angle = {float(p): a for p, a in summary["angle_deg"].items()}
     assert list(angle) == sorted(angle)
-    assert angle[-20.0] < 0 == angle[0.0] < angle[20.0] < angle[40.0]
+    assert angle[-1.0] < 0 == angle[0.0] < angle[2.0]
     for name in ("parameters", "mesh", "solver", "J_hat_mm", "J_cont_mm", "seconds", "versions", "gates"):
         assert summary[name], name
     assert summary["mesh_uncertainty_mm"] > 0
@@ -147,9 +146,9 @@ def test_mesh_and_motion_open_in_meshio(finished):
     mesh = meshio.read(folder / "mesh.vtu")
     assert {block.type for block in mesh.cells} == {"tetra10"}
     steps = ET.parse(folder / "model_a.pvd").getroot().findall("Collection/DataSet")
-    assert len(steps) == 7
-    last = meshio.read(folder / steps[4].get("file"))
-    assert np.abs(last.point_data["displacement_mm"]).max() > 1
+    assert len(steps) == 4
+    last = meshio.read(folder / steps[3].get("file"))
+    assert np.abs(last.point_data["displacement_mm"]).max() > 0.1
 
 
 def test_the_folder_says_how_to_repeat_it(finished):
@@ -164,7 +163,7 @@ def test_the_report_of_a_real_run_opens_whole_in_a_browser(finished):
         browser.screen(390, 844, True)
         browser.open(folder / "report.html")
         images = browser.evaluate("[...document.images].map(i => i.complete && i.naturalWidth > 0)")
-        assert len(images) > 15
+        assert len(images) > 10
         assert all(images)
         assert complaints(browser) == []
         assert requests(browser) == []
@@ -174,13 +173,13 @@ def test_the_report_of_a_real_run_opens_whole_in_a_browser(finished):
 def searched(tmp_path_factory, with_light):
     """A search of the whole lattice, with limits that leave few paths, after the same study's windows."""
     folder = with_light(tmp_path_factory.mktemp("search") / "out")
-    done = run(*quick_in(folder, paths="graph", limits=Limits(2.5, 3.0, 20.0)), "--no-report")
+    done = run(*quick_in(folder, paths="graph", limits=Limits(2.0, 2.0, 20.0)), "--no-report")
     assert done.returncode == 0, done.stderr
     return folder, done
 
 
 @pytest.mark.nightly(
-    "tests/placement/test_search.py::test_the_search_finds_the_best_of_all_and_checks_only_some"
+    "tests/placement/test_search.py::test_paths_that_cannot_be_made_are_left_out_and_the_best_of_the_rest_is_found"
 )
 def test_the_whole_lattice_is_searched_for_the_best_path(searched):
     folder, done = searched
@@ -193,11 +192,11 @@ def test_the_whole_lattice_is_searched_for_the_best_path(searched):
     assert paths[0]["path"] == found["best"]["name"]
     assert solved[0] == pytest.approx(found["best"]["J_hat_mm"]) == min(solved)
     assert found["best"]["name"] in done.stdout
-    low, high = 2.5 * 12.5, 3 * 12.5
+    low, high = 2 * 12.5, 2 * 12.5
     assert all(low - 1e-6 <= float(p["length_mm"]) <= high + 1e-6 for p in paths)
 
 
-@pytest.mark.nightly("tests/placement/test_search.py::test_the_half_mesh_predicts_what_the_whole_one_does")
+@pytest.mark.nightly("tests/usecases/test_motion.py::test_a_path_off_the_mirror_plane_moves_both_sides_apart")
 def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     """The same path by two ways: the half mesh for windows, the whole one for the lattice's."""
     folder, _ = searched
@@ -208,7 +207,7 @@ def test_a_window_of_anchors_is_one_of_the_lattices_paths(searched):
     every = {row["path"]: float(row["J_hat_mm"]) for row in rows(folder)}
     points = anchor_points(UNIT)
     text = "; ".join(" ".join(f"{c:.6g}" for c in point) for point in points)
-    assert float(solved[text]) == pytest.approx(every["alpha3"], rel=2e-3)
+    assert float(solved[text]) == pytest.approx(every["alpha1"], rel=2e-3)
 
 
 def started(out):

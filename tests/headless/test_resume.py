@@ -6,22 +6,19 @@ import signal
 import subprocess
 import time
 
-import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.folder import keep_inputs
-from mu_addon.usecases.simulate_and_place.job import Job, grasp
+from mu_addon.usecases.simulate_and_place.job import Job
 
-from .processes import ROOT, assert_clear_failure, command, here, is_running, run, worker_of
+from .processes import MILD, ROOT, UNIT, assert_clear_failure, command, here, is_running, run, worker_of
 
-UNIT = load_preset("mu-1.0x")
 JOB = Job(
-    attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=4)),
-    grasp(),
-    mesh=MeshSettings(refine=0.4, order=1),
+    UNIT,
+    MILD,
+    mesh=MeshSettings(refine=0.35),
     times=4,
     stations=11,
     mesh_check=False,

@@ -19,12 +19,10 @@ def job(*words):
 
 
 @pytest.mark.parametrize("command", ["simulate", "place"])
-def test_the_printed_body_whose_walls_may_touch_is_the_default(command):
+def test_walls_that_may_touch_are_the_default(command):
     found = job(command)
-    assert found.mesh.fidelity == "resolved"
     assert found.self_contact
     assert not job(command, "--no-self-contact").self_contact
-    assert job(command, "--solid-struts").mesh.fidelity == "solid"
 
 
 def test_options_that_exclude_each_other_are_refused():

@@ -42,7 +42,6 @@ OTHERWISE = {
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
     "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
     "evidence/unit_fem.py": {"self_contact"},
-    "homogenize/cell_mesh.py": {"order"},  # of a cell's mesh
     "measured/experiment.py": {"orientation_deg"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
@@ -160,7 +159,6 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", study.TIMES),
         ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
-        ("sweep", mesh.SOLID_STRUTS),
         ("sweep", sweep.POINTS),
         ("grip", grip.DENSITY),
         ("export", export.QUALITY),

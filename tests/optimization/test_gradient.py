@@ -20,8 +20,8 @@ from mu_addon.optimization.targets import Target
 from mu_addon.optimization.unit_body import Mechanics, UnitBody
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
-SETTINGS = MeshSettings(refine=0.3, fidelity="resolved")
-COARSE = MeshSettings(refine=0.2, fidelity="resolved")
+SETTINGS = MeshSettings(refine=0.3)
+COARSE = MeshSettings(refine=0.2)
 FREE = [
     Freedom("chambers.wall_mm", 0.6, 1.4),
     Freedom("chambers.neck_diameter_mm", 9.0, 15.0),

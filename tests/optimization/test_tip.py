@@ -19,7 +19,7 @@ from mu_addon.optimization.unit_body import Mechanics, UnitBody
 from mu_addon.usecases.simulate_and_place.named_effects import NamedEffects
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)
-COARSE = MeshSettings(refine=0.2, fidelity="resolved")
+COARSE = MeshSettings(refine=0.2)
 FREE = [
     Freedom("chambers.wall_mm", 0.6, 1.4),
     Freedom("material.membrane_modulus_kPa", 1000.0, 4000.0),

@@ -1,27 +1,18 @@
-"""The lattice's graph of steps, its chains, and bent inclusions."""
+"""The lattice's graph of steps, and its chains."""
 
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.profile import outer_radius
 from mu_addon.errors import InputError
 from mu_addon.placement.graph import Limits, lattice_graph
-from mu_addon.placement.inclusion import cylinder_overlap
-from mu_addon.placement.polyline import legs, polyline_inclusion, polyline_overlap
-
-from ..fem.bodies import box
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.dimensions
 GRAPH = lattice_graph(D)
-
-BOX = box((8, 8, 8), (16.0, 16.0, 16.0), order=1)
-CORNERS = BOX.nodes[BOX.corners]
 
 
 def test_steps_rise_along_half_diagonals_or_the_axis():
@@ -117,55 +108,3 @@ def test_limits_that_admit_nothing_are_refused(wrong):
 def test_a_wider_lattice_has_more_chains():
     wide = attrs.evolve(UNIT, lattice=attrs.evolve(UNIT.lattice, cells_x=5))
     assert lattice_graph(wide.dimensions).count(Limits()) > 2 * GRAPH.count(Limits())
-
-
-def test_a_straight_polyline_is_the_cylinder():
-    points = np.array([[5.0, 6, 3], [5, 6, 7], [5, 6, 12]])
-    assert len(legs(points)) == 2
-    np.testing.assert_allclose(
-        polyline_overlap(CORNERS, points, 1.0),
-        cylinder_overlap(CORNERS, points[0], points[-1], 1.0),
-        atol=1e-12,
-    )
-
-
-@settings(max_examples=15)
-@given(st.integers(0, 2**32 - 1))
-def test_a_bent_tube_has_the_volume_of_its_length_whatever_its_bends(seed):
-    rng = np.random.default_rng(seed)
-    # Three legs of 3 mm, each within 50 degrees of z: neighbours bend by up to 100.
-    tilt, turn = rng.uniform(0, np.radians(50), 3), rng.uniform(0, 2 * np.pi, 3)
-    way = np.stack([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)], axis=1)
-    points = np.array([8.0, 8.0, 3.0]) + np.vstack([np.zeros(3), np.cumsum(3 * way, axis=0)])
-    overlap = polyline_overlap(CORNERS, points, 1.0)
-    assert (overlap >= 0).all()
-    assert overlap.sum() == pytest.approx(np.pi * 9.0, rel=2e-5)
-
-
-def test_a_bent_tube_fills_each_element_by_its_own_share():
-    """Against points thrown at random: inside the nearer leg's cylinder, on its side of the mitre."""
-    points = np.array([[4.0, 4, 4], [9, 8, 8], [8, 12, 12]])
-    radius = 1.5
-    rng = np.random.default_rng(1)
-    some = np.flatnonzero(polyline_overlap(CORNERS, points, radius) > 0)[::9]
-    weights = rng.dirichlet(np.ones(4), (len(some), 20000))
-    thrown = np.einsum("eqa,eai->eqi", weights, CORNERS[some])
-    way = np.diff(points, axis=0)
-    way /= np.linalg.norm(way, axis=1)[:, None]
-    first = (thrown - points[1]) @ (way[0] + way[1]) < 0
-    inside = np.zeros(thrown.shape[:2], bool)
-    for leg, mine in ((0, first), (1, ~first)):
-        along = (thrown - points[leg]) @ way[leg]
-        off = np.linalg.norm(thrown - points[leg] - along[..., None] * way[leg], axis=2)
-        # Flat at the two free ends, open at the mitre.
-        within = along > 0 if leg == 0 else along < np.linalg.norm(points[2] - points[1])
-        inside |= mine & (off < radius) & within
-    share = inside.mean(axis=1)
-    error = 4 * np.sqrt(np.maximum(share * (1 - share), 1e-4) / 20000)
-    found = polyline_inclusion(CORNERS, np.ones(len(CORNERS), bool), points, radius).share[some]
-    assert (np.abs(found - share) < error).all()
-
-
-def test_a_bend_too_sharp_for_its_legs_is_refused():
-    with pytest.raises(InputError, match="bends too sharply"):
-        polyline_overlap(CORNERS, np.array([[5.0, 5, 5], [10, 5, 5], [5.5, 5.5, 5]]), 1.0)

@@ -87,7 +87,7 @@ def test_a_part_made_stiffer_moves_the_points_as_the_map_says(half, found, name)
     np.testing.assert_allclose(slope, expected, atol=2e-4 * np.abs(expected).max())
 
 
-@pytest.mark.nightly("tests/placement/test_search.py::test_the_half_mesh_predicts_what_the_whole_one_does")
+@pytest.mark.nightly("tests/placement/test_sensitivity_map.py::test_a_whole_mesh_gives_the_map_of_its_half")
 def test_a_whole_unit_gives_the_map_of_its_half(half, found):
     mesh, model = half
     whole = mirror(mesh, "x")

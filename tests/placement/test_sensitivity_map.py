@@ -4,21 +4,18 @@ import attrs
 import numpy as np
 import pytest
 
-from mu_addon.design.anchors import anchor_points
-from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MeshingError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.factor import IndefiniteError
 from mu_addon.fem.kinematics import probe
+from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.newton_settings import NewtonSettings
 from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory, simulate, whole_body
-from mu_addon.meshing.homogenised_unit import mesh_unit
-from mu_addon.meshing.mesh import LATTICE, mirror
-from mu_addon.meshing.settings import MeshSettings
+from mu_addon.meshing.mesh import LATTICE, MEMBRANE, mirror
 from mu_addon.placement.deviation import centreline, centreline_deviation
 from mu_addon.placement.sensitivity_map import (
     centreline_gradient,
@@ -35,30 +32,30 @@ from mu_addon.placement.sensitivity_map import (
 
 from ..fem import bodies
 
-UNIT = load_preset("mu-1.0x")
-POINTS = anchor_points(UNIT)
+# In the mirror plane, along the stiff wall's outside.
+POINTS = np.column_stack([np.zeros(6), np.full(6, 3.6), np.linspace(0.4, 3.6, 6)])
 TIGHT = NewtonSettings(tolerance=1e-12)
 PRESSURES = np.array([0.0, -10.0, 20.0, 20.0])
 
 
-def moduli(mesh):
-    m = UNIT.material
-    lattice = mesh.region == LATTICE
-    modulus = np.where(lattice, m.lattice_modulus_kPa, m.membrane_modulus_kPa) / 1e3
-    return modulus, np.where(lattice, m.lattice_poisson, m.membrane_poisson)
+def materials(mesh, factor=1.0):
+    """Stiff where the region is the lattice's; everywhere two laws in parallel, whose moduli add."""
+    modulus = factor * np.where(mesh.region == LATTICE, 0.6, 0.2)
+    rows = NeoHooke.parameters(modulus, np.full(len(mesh.tets), 0.3))
+    return Materials.neo_hooke(modulus, np.full(len(mesh.tets), 0.3)).blended(
+        np.full(len(mesh.tets), 0.4), NeoHooke, rows
+    )
 
 
-def solve(mesh, model, factor=None):
-    modulus, poisson = moduli(mesh)
-    if factor is not None:
-        modulus = modulus * factor
-    solver = Equilibrium(model, Materials.neo_hooke(modulus, poisson), TIGHT)
+def solve(mesh, model, factor=1.0):
+    solver = Equilibrium(model, materials(mesh, factor), TIGHT)
     return simulate(solver, np.arange(4.0), PRESSURES)
 
 
 @pytest.fixture(scope="module")
 def half():
-    mesh = mesh_unit(UNIT, MeshSettings(refine=0.5, order=1))
+    """Half a cube under pressure, clamped at z = 0, stiffer on its +y side, so that it bends."""
+    mesh = bodies.half_hollow_cube()
     model = Model(mesh)
     return mesh, model, solve(mesh, model)
 
@@ -66,7 +63,7 @@ def half():
 @pytest.fixture(scope="module")
 def found(half):
     mesh, model, baseline = half
-    return influence_map(model, Materials.neo_hooke(*moduli(mesh)), baseline, probe(mesh, POINTS))
+    return influence_map(model, materials(mesh), baseline, probe(mesh, POINTS))
 
 
 def moved(mesh, trajectory):
@@ -76,16 +73,16 @@ def moved(mesh, trajectory):
 
 @pytest.fixture(scope="module")
 def elements(half):
-    """One element of the lattice beside the anchors and one of the membrane, both off the mirror plane."""
+    """One element of either region, both off the mirror plane."""
     mesh = half[0]
     centre = mesh.nodes[mesh.corners].mean(axis=1)
     off_plane = mesh.nodes[mesh.corners][:, :, 0].min(axis=1) > 0.5
-    near = np.linalg.norm(centre - [4.0, 22.0, 40.0], axis=1) + np.where(off_plane, 0, 1e3)
-    apex = np.linalg.norm(centre - [12.0, 3.0, 30.0], axis=1) + np.where(off_plane, 0, 1e3)
-    return (
-        int(np.argmin(np.where(mesh.region == LATTICE, near, np.inf))),
-        int(np.argmin(np.where(mesh.region == LATTICE, np.inf, apex))),
-    )
+    near = (np.linalg.norm(centre - place, axis=1) for place in ([1.5, 3.5, 2.0], [1.5, 0.5, 3.0]))
+    regions = (LATTICE, MEMBRANE)
+    return [
+        int(np.argmin(np.where(off_plane & (mesh.region == region), distance, np.inf)))
+        for region, distance in zip(regions, near, strict=True)
+    ]
 
 
 def test_one_element_of_the_whole_body_made_stiffer_moves_the_points_as_the_map_says(half, found, elements):
@@ -110,7 +107,7 @@ def test_a_whole_mesh_gives_the_map_of_its_half(half, found):
     whole = mirror(mesh, "x")
     model = Model(whole)
     baseline = solve(whole, model)
-    same = influence_map(model, Materials.neo_hooke(*moduli(whole)), baseline, probe(whole, POINTS))
+    same = influence_map(model, materials(whole), baseline, probe(whole, POINTS))
     m = len(mesh.tets)
     scale = np.abs(found.displacement).max()
     np.testing.assert_allclose(same.displacement[..., :m], found.displacement, atol=1e-6 * scale)
@@ -122,7 +119,7 @@ def test_stiffening_everything_and_raising_the_pressure_alike_changes_nothing(ha
     """Stresses scale with the modulus: the map summed over all elements is minus the slope by ln p."""
     mesh, model, baseline = half
     total = 2 * found.displacement.sum(axis=-1)[:, :, 1:]
-    solver = Equilibrium(model, Materials.neo_hooke(*moduli(mesh)), TIGHT)
+    solver = Equilibrium(model, materials(mesh), TIGHT)
     monitor = probe(mesh, POINTS)
     for s, state in enumerate(loaded(baseline)):
         ends = [
@@ -153,12 +150,11 @@ def test_the_deviation_of_a_slightly_stiffer_element_is_the_map_times_its_stiffe
         assert J / step == pytest.approx(slope, rel=5e-3)
 
 
-def test_the_map_is_nowhere_negative_and_a_soft_lattice_element_matters_less_than_a_wall(half, found):
+def test_the_map_is_nowhere_negative(half, found):
     mesh, _, baseline = half
     gradients = gradients_of(baseline, POINTS, probe(mesh, POINTS), 21)
     J = deviation_map(found, gradients, shares_of_time(baseline))
-    assert J.min() >= 0
-    assert J[mesh.region == LATTICE].mean() < J[mesh.region != LATTICE].mean()
+    assert 0 <= J.min() < J.max()
 
 
 def test_shares_of_time_leave_out_rest(half):
@@ -178,7 +174,7 @@ def test_the_mirrored_trajectory_is_in_equilibrium(half):
     mesh, _, baseline = half
     whole, states = whole_body(mesh, baseline)
     assert whole.symmetry == ()
-    solver = Equilibrium(Model(whole), Materials.neo_hooke(*moduli(whole)))
+    solver = Equilibrium(Model(whole), materials(whole))
     for state in loaded(states):
         again = solver.newton(state.u, state.pressure_MPa)
         assert again.iterations == 0
@@ -188,7 +184,7 @@ def test_the_mirrored_trajectory_is_in_equilibrium(half):
 def test_representative_pressures_stand_for_all(half):
     """A state that was left out, from the polynomial through the others."""
     mesh, model, _ = half
-    made = Materials.neo_hooke(*moduli(mesh))
+    made = materials(mesh)
     pressure = np.array([0.0, -20.0, -10.0, 10.0, 20.0, 30.0])
     baseline = simulate(Equilibrium(model, made), np.arange(6.0), pressure)
     assert representative_pressures(baseline).tolist() == [-0.02, 0.01, 0.03]

@@ -126,7 +126,7 @@ def test_struts_of_a_resolved_unit_are_drawn_up_to_their_wall():
     """No triangle of a strut lies within the wall by all its nodes, and none of those outside is missing."""
     unit = load_preset("mu-1.0x")
     unit = attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, count=3))
-    mesh = mesh_printed(unit, MeshSettings(fidelity="resolved", refine=0.5))
+    mesh = mesh_printed(unit, MeshSettings(refine=0.5))
     drawn = region_skin(mesh, LATTICE)
     every = skin(mesh.tets[mesh.region == LATTICE])
     within = np.isin(every, mesh.tied).all(axis=1)

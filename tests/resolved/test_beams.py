@@ -19,7 +19,7 @@ from mu_addon.fem.rigid import Sphere
 from mu_addon.fem.stress import cauchy
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
-from mu_addon.meshing.settings import SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.beams import without_beams
 from mu_addon.resolved.joints import zones_of
 from mu_addon.resolved.printed_mesh import Sizes, mesh_printed
@@ -44,7 +44,7 @@ def random_state(mesh, size=0.02):
 def test_beams_bend_a_unit_as_solid_struts_do(mesh):
     """On the same wall, and with as many layers a strut."""
     found = []
-    solid = mesh_printed(SMALL, MeshSettings(refine=0.6, fidelity=SOLID), sizes=Sizes(layers=9))
+    solid = mesh_printed(SMALL, MeshSettings(refine=0.6), sizes=Sizes(layers=9), solid=True)
     for body in (mesh, solid):
         solver = Equilibrium(Model(body, threads=1), materials_of(SMALL, body))
         state = solver.reach(0.005, [solver.at_zero_pressure()])

@@ -12,7 +12,7 @@ from mu_addon.fem.newton_settings import RESOLVED_OBSTACLE_NEWTON
 from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.meshing.settings import SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.candidates import PrintedWaveguides
 from mu_addon.resolved.printed_mesh import mesh_printed
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def mesh():
-    return mesh_printed(SMALL, MeshSettings(refine=0.4, fidelity=SOLID))
+    return mesh_printed(SMALL, MeshSettings(refine=0.4), solid=True)
 
 
 def candidates(mesh, unit=SMALL, beside=False):

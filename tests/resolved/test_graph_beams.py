@@ -22,7 +22,7 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.stress import of_sections, peak_stretch
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
-from mu_addon.meshing.settings import RESOLVED, SOLID, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.tiling import tiled
 from mu_addon.resolved.beams import Layers, integrals
 from mu_addon.resolved.frame import frame_tensor, frame_zones
@@ -88,13 +88,11 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def meshes(unit, folder):
     """The unit's mesh of one of these names, made when it is asked for."""
-    kinds = {"half": (RESOLVED, "half"), "full": (RESOLVED, "full"), "solid": (SOLID, "half")}
 
     @functools.cache
     def of(name):
-        fidelity, fraction = kinds[name]
-        settings = MeshSettings(fidelity=fidelity, refine=0.5, fraction=fraction)
-        return mesh_printed(unit, settings, cache=folder)
+        settings = MeshSettings("full" if name == "full" else "half", 0.5)
+        return mesh_printed(unit, settings, cache=folder, solid=name == "solid")
 
     return of
 
@@ -197,8 +195,8 @@ def test_graded_struts_are_beams_of_their_own_sections(graded, folder):
 @pytest.mark.nightly("test_graded_struts_are_beams_of_their_own_sections")
 def test_a_graded_unit_bends_as_its_solid_struts_do(graded, folder):
     found = []
-    for fidelity in (RESOLVED, SOLID):
-        mesh = mesh_printed(graded, MeshSettings(fidelity=fidelity, refine=0.5), cache=folder)
+    for solid in (False, True):
+        mesh = mesh_printed(graded, MeshSettings(refine=0.5), cache=folder, solid=solid)
         solver = Equilibrium(Model(mesh, threads=1), materials_of(graded, mesh))
         u = solver.reach(0.005, [solver.at_zero_pressure()]).u
         found.append((bending_angle_deg(mesh, u), peak_stretch(mesh, u, LATTICE)))

@@ -70,7 +70,7 @@ def test_compression_alone_tears_nothing(body):
 
 
 def test_a_body_of_solid_struts_has_none():
-    mesh = mesh_printed(UNIT, MeshSettings(refine=0.5, fidelity="solid"))
+    mesh = mesh_printed(UNIT, MeshSettings(refine=0.5), solid=True)
     assert (
         joint_stretch(Model(mesh), materials_of(UNIT, mesh), UNIT.printed, np.zeros_like(mesh.nodes)) is None
     )

@@ -12,8 +12,7 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.morph import PrintedMorph
 from mu_addon.resolved.printed_mesh import mesh_printed
 
-SETTINGS = MeshSettings(refine=0.3, fidelity="solid")
-BEAMS = MeshSettings(refine=0.3, fidelity="resolved")
+SETTINGS = MeshSettings(refine=0.3)
 
 
 def unit(scale=1.0, **values):
@@ -29,7 +28,7 @@ def unit(scale=1.0, **values):
 @pytest.fixture(scope="module")
 def morph():
     drawn = unit()
-    return PrintedMorph(mesh_printed(drawn, SETTINGS), drawn, SETTINGS)
+    return PrintedMorph(mesh_printed(drawn, SETTINGS, solid=True), drawn, SETTINGS)
 
 
 def volume(mesh, region):
@@ -51,7 +50,7 @@ def volume(mesh, region):
 )
 def test_volumes_change_as_those_of_a_unit_that_is_meshed_anew(morph, values, of_struts):
     other = unit(**values)
-    moved, anew = morph.to(other), mesh_printed(other, SETTINGS)
+    moved, anew = morph.to(other), mesh_printed(other, SETTINGS, solid=True)
     for region in (MEMBRANE, LATTICE):
         before, after, found = (volume(m, region) for m in (morph.mesh, anew, moved))
         # Struts are cut by points, and dropped where next to nothing is left.
@@ -87,8 +86,8 @@ ANEW = pytest.mark.nightly("test_beams_are_those_of_a_unit_that_is_meshed_anew")
 )
 def test_beams_are_those_of_a_unit_that_is_meshed_anew(values):
     drawn, other = unit(), unit(**values)
-    moved = PrintedMorph(mesh_printed(drawn, BEAMS), drawn, BEAMS).to(other)
-    anew = mesh_printed(other, BEAMS)
+    moved = PrintedMorph(mesh_printed(drawn, SETTINGS), drawn, SETTINGS).to(other)
+    anew = mesh_printed(other, SETTINGS)
     assert np.array_equal(moved.beams, anew.beams)
     np.testing.assert_allclose(moved.flexible, anew.flexible, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(moved.nodes[moved.beams], anew.nodes[moved.beams], atol=1e-6)

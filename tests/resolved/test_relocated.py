@@ -9,16 +9,16 @@ from mu_addon.fem.model import Model
 from mu_addon.fem.moved_nodes import relocated
 from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
+from mu_addon.meshing.settings import MeshSettings
 from mu_addon.resolved.morph import PrintedMorph
-from mu_addon.resolved.printed_mesh import mesh_of
+from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = Unit().evolve(count=3)
-SETTINGS = MeshSettings(refine=0.35, fidelity=RESOLVED)
+SETTINGS = MeshSettings(refine=0.35)
 
 
 def test_the_tangent_of_a_moved_wall_is_that_of_a_new_model():
-    mesh = mesh_of(UNIT, SETTINGS)
+    mesh = mesh_printed(UNIT, SETTINGS)
     thicker = UNIT.evolve(wall_mm=1.1)
     moved = PrintedMorph(mesh, UNIT, SETTINGS).to(thicker)
     assert (moved.tied_weights != mesh.tied_weights).any()

@@ -16,7 +16,6 @@ from typing import Any
 
 import pytest
 
-from benchmarks.paper.table.settings import read_set
 from mu_addon import reading
 from mu_addon.cli.main import main
 from mu_addon.design.gripper import load_gripper, read_gripper
@@ -71,7 +70,6 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "lattice law": (read_effective, None),
     "calibration": (read_calibration, CALIBRATION),
     "sweep": (read_plan, PLAN),
-    "values": (lambda path: read_set(str(path)), "held_cells = 1\n[values]\n"),
     "bench": (read_bench, None),
     "protocol": (read_protocol, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "phases": (read_phases, None),

@@ -43,7 +43,7 @@ def work():
         time.sleep(3600)
     if how == "reads nothing after gmsh":
         import gmsh
-        from mu_addon.meshing.lattice_region import gmsh_model
+        from mu_addon.meshing.gmsh_model import gmsh_model
         with gmsh_model(gmsh):
             ctypes.string_at(0)
     if how == "starts another":

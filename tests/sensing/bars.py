@@ -28,7 +28,7 @@ def bent_to_a_circle(points: np.ndarray, curvature: float, y: float) -> np.ndarr
 
 
 def body(unit: Unit) -> Mesh:
-    """A unit's box, filled."""
+    """A unit's box, filled, with nodes at those of its lattice."""
     low, high = np.array(unit.dimensions.bounds).T
-    mesh = box((4, 6, 12), tuple(high - low), order=2)
+    mesh = box(tuple(np.rint((high - low) / unit.dimensions.cell * 2).astype(int)), tuple(high - low))
     return attrs.evolve(mesh, nodes=mesh.nodes + low)

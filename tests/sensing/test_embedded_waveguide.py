@@ -63,7 +63,7 @@ def test_nodes_on_a_circle_bend_the_bar_to_it() -> None:
     guide, curvature = of_window("alpha5"), 0.01
     mesh = body(load_preset("mu-1.0x"))
     u = bent_to_a_circle(mesh.nodes, curvature, y=25.0) - mesh.nodes
-    (leg,) = guide.legs(*Joints.of(mesh, guide.nodes, 12.5).moved(u))
+    (leg,) = guide.legs(*Joints.of(mesh, guide.nodes).moved(u))
     held_part = (leg.s > guide.s[1] + 0.5) & (leg.s < guide.s[-2] - 0.5)
     # The wells look toward +y, the inside of this bend.
     np.testing.assert_allclose(leg.curvature[held_part], -curvature, rtol=0.03)
@@ -75,10 +75,10 @@ def test_joints_turn_by_the_bodys_rotation_alone() -> None:
     a = np.radians(30)
     turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     strain = np.array([[1.1, 0.05, 0], [0.05, 0.95, 0.1], [0, 0.1, 1.0]])
-    joints = Joints.of(mesh, np.array([[0.0, 25, 40]]), 12.5)
+    joints = Joints.of(mesh, np.array([[0.0, 25, 43.75]]))
     position, rotation = joints.moved(mesh.nodes @ (turn @ strain).T - mesh.nodes)
     np.testing.assert_allclose(rotation[0], turn, atol=1e-9)
-    np.testing.assert_allclose(position[0], turn @ strain @ [0, 25, 40], atol=1e-9)
+    np.testing.assert_allclose(position[0], turn @ strain @ [0, 25, 43.75], atol=1e-9)
 
 
 def test_a_bar_gives_way_at_its_wells() -> None:
@@ -161,11 +161,11 @@ def _openings(length: float, wells: list[float], pull: float, turn: float) -> np
 
 def test_a_printed_joint_turns_with_its_body() -> None:
     unit = load_preset("mu-1.0x").evolve(count=3)
-    mesh = mesh_printed(unit, MeshSettings(refine=0.2, fidelity="resolved"))
+    mesh = mesh_printed(unit, MeshSettings(refine=0.2))
     nodes = np.array([[0.0, 25.0, 18.75], [12.5, 25.0, 18.75], [-12.5, 25.0, 18.75]])
     turn = Rotation.from_euler("x", 20.0, degrees=True).as_matrix()
-    at, turned = Joints.of(mesh, nodes, 12.5).moved(mesh.nodes @ turn.T - mesh.nodes)
+    at, turned = Joints.of(mesh, nodes).moved(mesh.nodes @ turn.T - mesh.nodes)
     np.testing.assert_allclose(at, nodes @ turn.T, atol=1e-9)
     np.testing.assert_allclose(turned, np.broadcast_to(turn, (3, 3, 3)), atol=1e-9)
     with pytest.raises(InputError, match="not a node"):
-        Joints.of(mesh, nodes + 1.0, 12.5)
+        Joints.of(mesh, nodes + 1.0)

@@ -183,7 +183,7 @@ UNIT = load_preset("mu-1.0x")
 STUDY = Job(
     unit=attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3)),
     protocol=PressureProtocol(np.arange(3.0), np.array([0.0, -2.0, 2.0])),
-    mesh=MeshSettings(refine=0.3, order=1),
+    mesh=MeshSettings(refine=0.35),
     times=3,
     mesh_check=False,
     workers=1,

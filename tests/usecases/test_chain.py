@@ -19,7 +19,7 @@ format = 1
 protocol = "protocol.csv"
 tip_mass_g = 10
 times = 3
-mesh = { order = 1, refine = 0.25 }
+mesh = { refine = 0.25 }
 [joint]
 pressure_step_kPa = 50.0
 loaded = false

@@ -45,7 +45,7 @@ ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "assets" / "examples" / "paper-moduli"
 OFFSET_mm = 0.09
 # Of data in closed form: a printed unit's effects are simulated at few sizes first.
-ALL_SIZES = {"settings": UnitSettings()}
+ALL_SIZES = {"settings": UnitSettings(changes=None, whole=None)}
 
 
 def run(folder, out, *arguments, **options):
@@ -297,22 +297,22 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
         assert again.texts() == job.texts()
 
 
-def test_every_face_simulates_the_printed_unit(tmp_path, monkeypatch):
+def test_every_face_keeps_walls_apart(tmp_path, monkeypatch):
     folder = ROOT / "assets" / "examples" / "paper-bending"
     measured, started = read_folder(folder), [Job(read_folder(folder)), Plan(read_folder(folder))]
     for use_case in (USE_CASE, PLANNING):
         monkeypatch.setattr(type(use_case), "start", lambda _, job, *__: started.append(job))
     for command in ("diagnose", "design-experiments"):
         main([command, str(folder), "--out", str(tmp_path / "out")])
-    assert all(job.unit_settings.mesh.resolved and job.self_contact for job in started)
+    assert all(job.unit_settings.self_contact and job.self_contact for job in started)
     assert len(started) == 4
     main(["diagnose", str(folder), "--no-self-contact", "--out", str(tmp_path / "out")])
     assert not started[-1].self_contact
     node = definitions()["diagnose"]
     assert {s.name: s.description.default for s in node.settings} == {"self_contact": True}
-    assert [Job(measured, settings=settings).body for settings in (None, UnitSettings())] == [
+    assert [Job(measured, self_contact=apart).body for apart in (True, False)] == [
         "the unit as printed, walls kept apart",
-        "the unit with a homogenised lattice",
+        "the unit as printed, walls may cross",
     ]
     # Of blocks nothing is said: their cells are computed either way.
     blocks = Job(read_folder(PAPER))
@@ -413,11 +413,9 @@ def test_a_printed_diagnosis_takes_longer_with_more_chambers_and_where_walls_tou
     small = attrs.evolve(small, chambers=attrs.evolve(small.chambers, count=3))
     pressed = [e for e in measured.experiments if e["pressure_kPa"].min() > 0.0]
 
-    def seconds(unit, experiments, settings=None):
-        return dict(simulations_plan(experiments, unit, settings or UnitSettings.printed()))["unit"]
+    def seconds(unit, experiments):
+        return dict(simulations_plan(experiments, unit, UnitSettings()))["unit"]
 
     every = measured.experiments
     assert seconds(load_preset("mu-1.0x"), every) == pytest.approx(2.0**1.6 * seconds(small, every))
     assert seconds(small, every) == 2.0 * seconds(small, pressed)
-    alike = UnitSettings()
-    assert seconds(small, every, alike) == seconds(load_preset("mu-1.0x"), pressed, alike)

@@ -26,7 +26,7 @@ from mu_addon.design.waveguide import waveguide
 from mu_addon.errors import InputError
 from mu_addon.materials.library import load_material
 from mu_addon.measured.folder import read_folder
-from mu_addon.meshing import lattice_region
+from mu_addon.meshing import gmsh_model
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.studies.specimens import Specimens
@@ -239,7 +239,7 @@ def test_a_package_that_breaks_a_rule_is_refused(old, new, words):
 
 def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
     def missing(*_):
-        raise lattice_region.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
+        raise gmsh_model.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
 
     monkeypatch.setattr("mu_addon.meshing.step_file.load_gmsh", missing)
     job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")

@@ -55,7 +55,7 @@ def for_good(request: pytest.FixtureRequest) -> bool:
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """Each 67th call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
+    monkeypatch.setattr(analysis_mesh, "mesh_printed", computed_once(analysis_mesh.mesh_printed))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)

@@ -60,7 +60,7 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """From the solid on; all is solved anew, each time."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
-    monkeypatch.setattr(analysis_mesh, "mesh_of", computed_once(analysis_mesh.mesh_of))
+    monkeypatch.setattr(analysis_mesh, "mesh_printed", computed_once(analysis_mesh.mesh_printed))
 
     def run(folder: Path, context: RunContext) -> None:
         placing.USE_CASE.start(STUDY, folder, context)

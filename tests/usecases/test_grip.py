@@ -17,24 +17,24 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
-from mu_addon.meshing.homogenised_unit import mesh_unit
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.pc2 import read_pc2
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.grip.grasp import grasp
 from mu_addon.usecases.grip.motion_files import even, write_halves
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
 from mu_addon.usecases.grip.settings import Cube, Grip
 from mu_addon.usecases.simulate_and_place.motion_files import read_motion
-from tests.headless.processes import homogenised
 
-COARSE = MeshSettings(refine=0.3)
+COARSE = MeshSettings(refine=0.35)
 
 
 @pytest.fixture(scope="module")
 def finger():
     gripper = load_gripper("gripper")
-    mesh = mesh_unit(gripper.unit, COARSE)
+    gripper = attrs.evolve(gripper, unit=gripper.unit.evolve(count=3))
+    mesh = mesh_printed(gripper.unit, COARSE)
     return gripper, mesh, materials_of(gripper.unit, mesh)
 
 
@@ -160,8 +160,7 @@ def squeezed(folder, *more):
     line = ["grip", "--gripper", str(short_gripper(folder)), "--out", str(folder / "out"), "--cube", "25"]
     line += ["--density", "0.6", "--friction", "0.3", "--coarse", "--no-self-contact"]
     line += ["--refine", "0.3", *more]
-    with homogenised():
-        assert main(line) == 0
+    assert main(line) == 0
     return line, folder / "out"
 
 
@@ -226,19 +225,14 @@ def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_do
     report = (out / "report.html").read_text()
     before = (out / "grasp_25.csv").read_text()
     assert "capacity / weight" in report
-    with homogenised():
-        assert main([*line, "--no-report"]) == 0
+    assert main([*line, "--no-report"]) == 0
     again = json.loads((out / "summary.json").read_text())
     assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
     assert (out / "grasp_25.csv").read_text() == before
 
 
-def test_self_contact_needs_printed_struts():
-    gripper = load_gripper("gripper")
-    with pytest.raises(InputError, match="walls and struts as they are printed"):
-        Job(gripper, self_contact=True)
-    job = Job(gripper, mesh=MeshSettings(fidelity="resolved"), self_contact=True)
-    assert "self_contact = true" in job.texts()["grip.toml"]
+def test_self_contact_is_in_the_file():
+    assert "self_contact = true" in Job(load_gripper("gripper"), self_contact=True).texts()["grip.toml"]
 
 
 def short_gripper(folder):
@@ -254,7 +248,7 @@ def short_gripper(folder):
 
 
 @pytest.mark.nightly(
-    "tests/resolved/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_as_by_the_homogenised_unit"
+    "tests/resolved/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_alike_on_a_finer_mesh"
 )
 def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""

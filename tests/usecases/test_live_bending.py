@@ -9,8 +9,8 @@ from mu_addon.design.parameters import Unit
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.meshing.settings import RESOLVED, MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_of
+from mu_addon.meshing.settings import MeshSettings
+from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from mu_addon.usecases.simulate_and_place.job import Job as Study
@@ -82,8 +82,8 @@ def test_other_struts_are_meshed_anew_and_begin_at_the_states_of_the_design_befo
     assert own.mesh.nodes.shape != moved.mesh.nodes.shape
     wanted, _ = answered(LiveBending(tmp_path / "thin"), 1, thin)
     assert third[8.0] == pytest.approx(wanted[8.0], rel=1e-4)
-    settings = MeshSettings(refine=requests.LEVELS[0][0], fidelity=RESOLVED)
-    assert (own.mesh.tied_weights == mesh_of(thin, settings).tied_weights).all()
+    settings = MeshSettings(refine=requests.LEVELS[0][0])
+    assert (own.mesh.tied_weights == mesh_printed(thin, settings).tied_weights).all()
     assert 0.0 < third[4.0] < third[8.0]
 
 

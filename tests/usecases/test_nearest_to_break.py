@@ -7,7 +7,6 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.report.results import nearest_to_break
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job
@@ -21,7 +20,7 @@ def test_a_brittle_resin_is_warned_of(tmp_path):
     job = Job(
         unit=UNIT.evolve(elongation_at_break=0.01),
         protocol=Protocol(np.arange(2.0), np.array([0.0, 2.0])),
-        mesh=MeshSettings(refine=0.35, fidelity="resolved"),
+        mesh=MeshSettings(refine=0.35),
         times=2,
         self_contact=False,
         workers=1,
@@ -40,10 +39,3 @@ def test_a_brittle_resin_is_warned_of(tmp_path):
     tough = attrs.evolve(job, unit=UNIT)
     summary = {"nearest_to_break": {**most, "percent": most["percent"] / 160.0}}
     assert not [text for text in doubts_of_motion(tough, study.mesh, study.states, summary) if "tear" in text]
-
-
-def test_a_homogenised_lattice_has_no_share_of_the_resins_elongation():
-    values = ("1.1", "0", "0", "1", "1.08")
-    rows = [("5", "wall", *values, "5"), ("5", "homogenised lattice", *values, "")]
-    assert nearest_to_break(rows)["part"] == "wall"
-    assert nearest_to_break(rows[1:]) == {}

@@ -101,7 +101,7 @@ def test_values_reach_the_study(tmp_path):
         assert 0.8 <= job.unit.chambers.wall_mm <= 1.2
         assert job.unit.material.membrane_modulus_kPa == v["material.membrane_modulus_kPa"]
         assert job.mesh.refine == v["simulate.mesh.refine"]
-        assert (job.mesh.fidelity, job.times, job.mesh_check, job.workers) == ("resolved", 7, False, 1)
+        assert (job.times, job.mesh_check, job.workers) == (7, False, 1)
         assert job.stations == v["place.stations"] in (11, 12, 13)
         assert job.protocol.pressure_kPa.max() == 40.0 * v["protocol.factor"]
     assert len({job.text() for job in (p.job for p in points)}) > 1
@@ -255,8 +255,16 @@ def test_what_is_no_table_is_told_so(table):
             "",
             "lattice_modulus_kPa moves nothing",
         ),
-        ('"chambers.wall_mm" = { low = 0.8, high = 1.0 }', 'fidelity = "homogenised"', "the printed body"),
-        ('"simulate.mesh.fidelity" = { values = ["solid", "homogenised"] }', "", "the printed body"),
+        (
+            '"chambers.wall_mm" = { low = 0.8, high = 1.0 }',
+            'fidelity = "homogenised"',
+            "unknown key 'fidelity'",
+        ),
+        (
+            '"simulate.mesh.fidelity" = { values = ["homogenised"] }',
+            "",
+            "unknown input 'simulate.mesh.fidelity'",
+        ),
     ],
 )
 def test_a_sweep_is_of_the_printed_body(vary, mesh, what):
@@ -266,5 +274,4 @@ def test_a_sweep_is_of_the_printed_body(vary, mesh, what):
     assert "sweep.toml" in error.value.where
     assert error.value.remedy
     found = parse_plan(head.replace(mesh, "") + '"chambers.wall_mm" = { low = 0.8, high = 1.0 }', Path("/"))
-    simulate = found.inputs.tables["simulate"]
-    assert (simulate["mesh"]["fidelity"], simulate["self_contact"]) == ("resolved", True)
+    assert found.inputs.tables["simulate"]["self_contact"]

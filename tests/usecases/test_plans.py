@@ -4,23 +4,26 @@ import numpy as np
 import pytest
 
 from mu_addon.cli.main import main
-from mu_addon.design.parameters import Unit
+from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run import progress
 from mu_addon.usecases.simulate_and_place import job as study
 from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work
-from tests.headless.processes import homogenised
 
-STUDY = ["--no-self-contact", "--refine", "0.3", "--times", "3"]
+STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
+SMALL = load_preset("mu-0.75x").evolve(count=3)
+MILD = "time_s,pressure_kPa\n0,0\n1,2\n2,0\n"
 SWEEP = """
 format = 1
-preset = "mu-0.75x"
+unit = "unit.toml"
+protocol = "mild.csv"
 stages = "simulate"
 method = "grid"
 
 [simulate]
 times = 3
-mesh = { order = 1, refine = 0.3 }
+mesh = { refine = 0.35 }
+self_contact = false
 
 [vary]
 "chambers.wall_mm" = { low = 0.9, high = 1.2, steps = 2 }
@@ -31,8 +34,7 @@ def messages_of(monkeypatch, tmp_path, words):
     """Every message of a command."""
     found = []
     monkeypatch.setattr(progress, "terminal", lambda stream: found.append)
-    with homogenised(order=1):
-        assert main([*words, "--out", str(tmp_path / "out"), "--no-report"]) == 0
+    assert main([*words, "--out", str(tmp_path / "out"), "--no-report"]) == 0
     return found
 
 
@@ -45,7 +47,7 @@ def messages_of(monkeypatch, tmp_path, words):
             ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
             marks=pytest.mark.nightly("test_a_command_does_what_it_planned"),
         ),
-        ["simulate", "--preset", "mu-0.75x", *STUDY],
+        ["simulate", "--unit", "unit.toml", "--protocol", "mild.csv", *STUDY],
         pytest.param(
             ["sweep", "sweep.toml"],
             marks=pytest.mark.nightly(
@@ -56,8 +58,10 @@ def messages_of(monkeypatch, tmp_path, words):
     ids=lambda words: words[0],
 )
 def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
-    (tmp_path / "sweep.toml").write_text(SWEEP)
-    words = [str(tmp_path / word) if word == "sweep.toml" else word for word in words]
+    files = {"sweep.toml": SWEEP, "unit.toml": to_toml(SMALL), "mild.csv": MILD}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    words = [str(tmp_path / word) if word in files else word for word in words]
     found = messages_of(monkeypatch, tmp_path, words)
     (plan,) = (m for m in found if m["type"] == "plan")
     told = [m for m in found if m["type"] == "progress"]
@@ -68,9 +72,8 @@ def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
     assert all(seconds is not None for seconds in left)
 
 
-@pytest.mark.parametrize(("printed", "suction"), [(False, 1.0), (True, TOUCHING)])
-def test_suction_takes_longest_where_walls_touch(printed, suction):
-    mesh = MeshSettings(fidelity="resolved" if printed else "homogenised")
-    job = study.Job(Unit(), study.grasp(), mesh, self_contact=printed)
+@pytest.mark.parametrize(("apart", "suction"), [(False, 1.0), (True, TOUCHING)])
+def test_suction_takes_longest_where_walls_touch(apart, suction):
+    job = study.Job(Unit(), study.grasp(), MeshSettings(), self_contact=apart)
     assert [work(job, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
     assert work(job, np.unique(job.samples[1])) == suction + max(suction / 4.0, 1.0) + 4

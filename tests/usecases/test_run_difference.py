@@ -18,7 +18,7 @@ def runs(tmp_path_factory):
     top = tmp_path_factory.mktemp("runs")
     write_bent_motion(top / "own")
     write_bent_motion(top / "more", 1.2 * ANGLES)
-    write_bent_motion(top / "finer", 1.2 * ANGLES, refine=0.7)
+    write_bent_motion(top / "finer", 1.2 * ANGLES, refine=0.35)
     return {name: read_motion(top / name) for name in ("own", "more", "finer")}
 
 

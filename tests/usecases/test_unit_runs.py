@@ -14,8 +14,8 @@ from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.comparison import compare
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 
-FULL = Job(load_preset("mu-0.75x"), grasp(), mesh=MeshSettings(fidelity="resolved"))
-COARSE = attrs.evolve(FULL, mesh=MeshSettings(refine=0.5, fidelity="resolved"))
+FULL = Job(load_preset("mu-0.75x"), grasp(), mesh=MeshSettings())
+COARSE = attrs.evolve(FULL, mesh=MeshSettings(refine=0.5))
 MOTION = attrs.evolve(FULL, stages=("design", "simulate"))
 SHORT = {"status": "complete", "angle_deg": {"-20": -3.0, "40": 6.0}, "seconds": {"Model A": 40.0}}
 RANKED = SHORT | {
@@ -42,21 +42,6 @@ def ran(home, job, summary, at_s):
 
 def design_of(job):
     return unit_runs.design_key(job.unit, "", [], {})
-
-
-@pytest.mark.parametrize(
-    ("mesh", "printed"),
-    [
-        (MeshSettings(), False),
-        (MeshSettings(refine=0.5, fidelity="resolved"), True),
-        (MeshSettings(refine=0.5, order=1), False),
-        (MeshSettings(fidelity="resolved"), True),
-        (MeshSettings(fidelity="solid"), True),
-    ],
-)
-def test_a_run_knows_its_model_and_mesh(tmp_path, mesh, printed):
-    run = ran(tmp_path, attrs.evolve(MOTION, mesh=mesh), SHORT, 100)
-    assert (run.printed, run.refine) == (printed, mesh.refine)
 
 
 def test_every_run_is_kept_and_a_small_one_replaces_no_large_one(tmp_path):

@@ -22,7 +22,6 @@ from mu_addon.evidence.prediction.pressure_step import PressureStep
 from mu_addon.evidence.prediction.unit_pose import STATIONS, UnitPose
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure, UnitResponse, Variant
 from mu_addon.evidence.simulator import Composite
-from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.evidence.verdict import Verdict
 from mu_addon.measured import Experiment, read_folder
 from mu_addon.run.context import run_to_end
@@ -165,14 +164,10 @@ def outcome(truth: Sequence[str], verdict: Verdict) -> str:
     return "partly" if hidden & every else "wrong_set"
 
 
-def verdict_on(folder: Path, unit: Path, out: Path, homogenised: bool = False) -> dict[str, Any]:
-    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there.
-
-    homogenised: the unit is simulated so, in place of the printed body.
-    """
-    settings = UnitSettings() if homogenised else None
+def verdict_on(folder: Path, unit: Path, out: Path) -> dict[str, Any]:
+    """The program's verdict on a folder, in one folder for all sets: its simulations are kept there."""
     with run_to_end(Progress([terminal(sys.stderr)])) as context:
-        USE_CASE.start(Job(read_folder(folder), read_unit(unit), settings), out, context)
+        USE_CASE.start(Job(read_folder(folder), read_unit(unit)), out, context)
     if context.status:
         raise SystemExit(context.status)
     return dict(json.loads((out / "verdict.json").read_text()))

@@ -117,7 +117,7 @@ class MU_PT_comparison(UnitPanel, bpy.types.Panel):
 
 def _name_lines(run) -> list[str]:
     """Lines of a run's name that fit into a column."""
-    return textwrap.wrap(run.title.replace("Homogenised", "Homo- genised"), COLUMN)
+    return textwrap.wrap(run.title, COLUMN)
 
 
 def _row(column, what: str, one: str, other: str) -> None:

@@ -65,7 +65,7 @@ def job_of(root: Any) -> Job:
     """Study job from a unit's properties; raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
-        from ...meshing.settings import RESOLVED, MeshSettings
+        from ...meshing.settings import MeshSettings
         from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
@@ -89,7 +89,7 @@ def job_of(root: Any) -> Job:
         obstacles=obstacles.rigid_bodies(root, unit),
         effects=effects.named_effects(root),
         stages=stages,
-        mesh=MeshSettings(refine=exact(settings.refine), fidelity=RESOLVED),
+        mesh=MeshSettings(refine=exact(settings.refine)),
         self_contact=settings.self_contact,
         device=settings.device,
         **extra,

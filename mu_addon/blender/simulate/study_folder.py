@@ -27,7 +27,6 @@ CONTACT = "contact.csv"
 
 # Of mu-1.0x at a refinement of 0.5 (docs/engineering/verification.md).
 COARSE = "coarse mesh ({:g}): angles up to 12 % too small under vacuum, 2 % under pressure"
-CONTINUUM = "homogenised: under vacuum it bends half as far as printed struts"
 
 
 @attrs.frozen
@@ -44,9 +43,7 @@ class Findings:
 
     @property
     def caveat(self) -> str:
-        """Known error of the run's model, as text; empty for printed struts on the default mesh."""
-        if not self.run.printed:
-            return CONTINUUM
+        """Known error of the run's model, as text; empty on the default mesh."""
         return COARSE.format(self.run.refine) if self.run.refine < REFINE.default else ""
 
     @property

@@ -15,7 +15,7 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.settings import USUAL_RESIN
 from ...errors import InputError
 from ...fem.protocol import read_protocol_text
-from ...meshing.settings import HOMOGENISED, RESOLVED, MeshSettings
+from ...meshing.settings import MeshSettings
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...toml_writer import toml_text
@@ -112,9 +112,7 @@ class Job:
     tip_couple_N_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     resin: str = USUAL_RESIN
     times: int = TIMES.field()
-    mesh: MeshSettings = attrs.field(
-        factory=lambda: MeshSettings(refine=REFINE.default, fraction="full", fidelity=RESOLVED)
-    )
+    mesh: MeshSettings = attrs.field(factory=lambda: MeshSettings(refine=REFINE.default, fraction="full"))
     joint: Sampling = attrs.field(factory=Sampling)
 
     def __attrs_post_init__(self) -> None:
@@ -200,7 +198,6 @@ def read_chain(path: Path, changes: Mapping[str, Any] | None = None) -> Job:
     if isinstance(mesh, dict):
         mesh.setdefault("fraction", "full")
         mesh.setdefault("refine", REFINE.default)
-        mesh.setdefault("fidelity", HOMOGENISED if mesh.get("order") == 1 else RESOLVED)
     return structured(Job, values, str(path), units=units, protocol=protocol)
 
 

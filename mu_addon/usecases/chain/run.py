@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,9 @@ from ...fem.state import State
 from ...files import write_csv
 from ...materials.library import load_material
 from ...measured.pose import down
-from ...meshing.homogenised_unit import MeshingWarning
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_trajectory
-from ...resolved.printed_mesh import mesh_of
+from ...resolved.printed_mesh import mesh_printed
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
@@ -34,8 +32,8 @@ from ...run.versions import package_versions
 from .job import LAYOUT, Job, read_job
 from .report import write_report
 
-JOINT_S, PRINTED = 17.0, 17.0
-"""Seconds in which a homogenised joint is learned at one pressure on the default mesh; factor if printed."""
+JOINT_S = 289.0
+"""Seconds in which a joint is learned at one pressure on the default mesh."""
 
 
 def run_chain(job: Job, folder: Path, context: RunContext) -> Running:
@@ -77,8 +75,7 @@ def plan_of(job: Job) -> Plan:
     for n, span in enumerate(spans.values(), 1):
         finer = job.mesh.refine / REFINE.default
         # Those at rest take as long as those under two pressures.
-        one_s = JOINT_S * (PRINTED if job.mesh.resolved else 1.0)
-        joint_s = one_s * finer * (len(job.joint.pressures(*span)) + 2)
+        joint_s = JOINT_S * finer * (len(job.joint.pressures(*span)) + 2)
         plan += [(f"mesh of unit {n}", 4.0 * finer**2), (f"joint of unit {n}", joint_s)]
     return [*plan, ("chain", 2.0 if job.target is None else 12.0), ("files", 2.0), ("report", 3.5)]
 
@@ -167,12 +164,8 @@ class Running:
     def _learned(self, unit: Unit, span: tuple[float, float], number: int) -> tuple[Mesh, Learned]:
         job, progress = self.job, self.progress
         pressures = job.joint.pressures(*span)
-        with progress.stage(f"mesh of unit {number}"), warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            mesh = mesh_of(unit, job.mesh, lambda _, share: progress.update(share), cache=self.cache.folder)
-        for warning in caught:
-            if issubclass(warning.category, MeshingWarning):
-                self.warn(str(warning.message))
+        with progress.stage(f"mesh of unit {number}"):
+            mesh = mesh_printed(unit, job.mesh, lambda _, share: progress.update(share), self.cache.folder)
         density = load_material(job.resin).density_g_per_ml
         # A state hangs on the free ones before it, and these on the pressures visited.
         name = key("joint", unit.hash(), mesh.hash(), attrs.astuple(job.joint), density, pressures)
@@ -321,7 +314,7 @@ class Running:
             region.append(mesh.region)
             first += len(mesh.nodes)
             height += float(mesh.nodes[mesh.tip[0], 2])
-        empty = np.zeros((0, 3 if self.meshes[0].order == 1 else 6))
+        empty = np.zeros((0, 6))
         last = first - len(self.meshes[-1].nodes) + self.meshes[-1].tip
         return Mesh(
             np.concatenate(nodes),

@@ -79,8 +79,6 @@ class Job:
         if not bends(self.measured.experiments):
             return ""
         settings = self.unit_settings
-        if not settings.mesh.resolved:
-            return "the unit with a homogenised lattice"
         return f"the unit as printed, {'walls kept apart' if settings.self_contact else 'walls may cross'}"
 
     @property
@@ -136,7 +134,7 @@ def unit_settings_of(job: Any) -> UnitSettings:
     from ...evidence.unit_fem import UnitSettings
 
     own: UnitSettings | None = job.settings
-    return own or UnitSettings.printed(job.self_contact)
+    return own or UnitSettings(self_contact=job.self_contact)
 
 
 def self_contact_of(job: Any) -> dict[str, Any]:

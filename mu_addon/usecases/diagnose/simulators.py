@@ -21,10 +21,10 @@ from ...run.progress_estimate import Plan
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings
 
-LATTICE_S, UNIT_S, PRINTED_S = 90.0, 150.0, 24.0
-"""Seconds of the simulation of a block, of a homogenised unit and of a printed one of one chamber."""
+LATTICE_S, UNIT_S = 90.0, 24.0
+"""Seconds of the simulation of a block, and of a unit of one chamber."""
 BY_CHAMBERS = 1.6
-"""Power of their number by which a printed unit's seconds grow: measured with three and six."""
+"""Power of their number by which a unit's seconds grow: measured with three and six."""
 BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
 """Stages of a unit's simulation: without effects, at each effect's first sizes, at the others."""
 DESIGNS, DESIGN_S = "unit of every design", 50.0
@@ -32,7 +32,7 @@ DESIGNS, DESIGN_S = "unit of every design", 50.0
 SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
 """Shares of the seconds; the last stage is left out where no effect is in question."""
 TOUCHING_KPA, TOUCHING = -8.0, 2.0
-"""Reading below which walls of a printed unit may touch, and the factor on its seconds then."""
+"""Reading below which walls of a unit may touch, and the factor on its seconds then."""
 # Kinds of a unit that bends freely, by what predicts them.
 FREE: dict[str, Callable[..., Simulator]] = {
     unit_pressure.KIND: unit_pressure.UnitPressure,
@@ -44,13 +44,9 @@ FREE: dict[str, Callable[..., Simulator]] = {
 def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, settings: UnitSettings) -> Plan:
     """Stages of `simulators_of` with the expected seconds of each on two cores."""
     kinds = {e.kind for e in experiments}
-    unit = UNIT_S
-    if settings.mesh.resolved:
-        lowest = min(
-            (float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0
-        )
-        chambers = behind.chambers.count if behind else 1
-        unit = PRINTED_S * chambers**BY_CHAMBERS * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
+    lowest = min((float(e["pressure_kPa"].min()) for e in experiments if e.kind in OF_A_UNIT), default=0.0)
+    chambers = behind.chambers.count if behind else 1
+    unit = UNIT_S * chambers**BY_CHAMBERS * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
     lattice = []
     if any(e.cells for e in experiments) and behind is not None:
         from ...evidence.lattice_fem import to_compute

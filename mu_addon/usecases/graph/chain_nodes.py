@@ -23,7 +23,7 @@ def _remark(outputs: Outputs) -> str:
 def _chain(call: Call) -> Order:
     from ...chain.joint_learning import Sampling
     from ...graph.evaluation import Order
-    from ...meshing.settings import RESOLVED, MeshSettings
+    from ...meshing.settings import MeshSettings
     from ..chain.job import MOST_UNITS, ChainUnit, Job, Target, read_pressures
     from ..chain.run import USE_CASE
     from .parts import refuse_body
@@ -55,7 +55,7 @@ def _chain(call: Call) -> Order:
         orientation_deg=s["orientation_deg"],
         tip_mass_g=s["tip_mass_g"],
         times=s["times"],
-        mesh=MeshSettings(refine=s["refine"], fraction="full", fidelity=RESOLVED),
+        mesh=MeshSettings(refine=s["refine"], fraction="full"),
         joint=Sampling(pressure_step_kPa=s["step_kPa"], loaded=s["loaded"]),
     )
     return Order(USE_CASE, job)

@@ -107,7 +107,7 @@ def _inputs(value: Any) -> Row:
     if isinstance(value, Study):
         job = value.job
         found |= {"times": job.times}
-        found |= {f"mesh.{key}": v for key, v in job.mesh.table().items()}
+        found |= {f"mesh.{key}": v for key, v in attrs.asdict(job.mesh).items()}
         found |= {"effects": "; ".join(job.effects.words())}
     return found
 

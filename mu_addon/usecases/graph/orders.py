@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...measured import Measured
-from ...meshing.settings import MeshSettings, fidelity_of
+from ...meshing.settings import MeshSettings
 from ..diagnose.job import Job as DiagnoseJob
 from ..diagnose.run import USE_CASE as DIAGNOSE
 from ..export.job import Job as ExportJob
@@ -62,7 +62,7 @@ def _simulated(call: Call) -> Job:
     return Job(
         unit=unit,
         protocol=protocol_of(s["protocol"] or None),
-        mesh=MeshSettings(refine=s["refine"], fidelity=fidelity_of(s["solid_struts"])),
+        mesh=MeshSettings(refine=s["refine"]),
         times=s["times"],
         self_contact=s["self_contact"],
         self_friction=s["self_friction"],
@@ -152,7 +152,7 @@ def export_order(call: Call) -> Order:
 def grip_order(call: Call) -> Order:
     """Run of a gripper's grasp."""
     s = call.settings
-    detail = detailed(s["coarse"], solid_struts=s["solid_struts"])
+    detail = detailed(s["coarse"])
     try:
         sides = [float(word) for word in s["cubes_mm"].split()]
     except ValueError:

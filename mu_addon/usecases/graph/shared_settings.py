@@ -10,7 +10,7 @@ from ...graph.definition import FILE, Setting
 from ...meshing import settings as mesh
 from ..simulate_and_place import settings as study
 
-SOLID_STRUTS, SELF_CONTACT = Setting(mesh.SOLID_STRUTS), Setting(mesh.SELF_CONTACT)
+SELF_CONTACT = Setting(mesh.SELF_CONTACT)
 SELF_FRICTION, TIMES = Setting(study.SELF_FRICTION), Setting(study.TIMES)
 ORIENTATION = Setting(study.ORIENTATION)
 PROTOCOL = Setting(study.PROTOCOL, FILE)

@@ -19,7 +19,6 @@ from .shared_settings import (
     REFINE,
     SELF_CONTACT,
     SELF_FRICTION,
-    SOLID_STRUTS,
     TIMES,
     of_orders,
 )
@@ -85,7 +84,6 @@ def study_nodes() -> tuple[Definition, ...]:
                 PROTOCOL,
                 TIMES,
                 REFINE,
-                SOLID_STRUTS,
                 SELF_CONTACT,
                 SELF_FRICTION,
                 ORIENTATION,
@@ -195,7 +193,6 @@ def study_nodes() -> tuple[Definition, ...]:
             (Output("grasp", "grasp", "the grasp"),),
             (
                 *(Setting(d) for d in (CUBES, DENSITY, FRICTION, COARSE)),
-                SOLID_STRUTS,
                 SELF_CONTACT,
             ),
             order=of_orders("grip_order"),

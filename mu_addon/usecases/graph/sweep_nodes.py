@@ -13,7 +13,6 @@ from .shared_settings import (
     QUICK_TIMES,
     SELF_CONTACT,
     SELF_FRICTION,
-    SOLID_STRUTS,
     of_orders,
 )
 
@@ -118,7 +117,6 @@ def sweep_nodes() -> tuple[Definition, ...]:
                 PROTOCOL,
                 QUICK_TIMES,
                 QUICK_REFINE,
-                SOLID_STRUTS,
                 SELF_CONTACT,
                 SELF_FRICTION,
                 setting("minimize", "", "columns of the table to minimise, for Pareto fronts"),

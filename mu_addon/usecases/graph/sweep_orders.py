@@ -13,7 +13,6 @@ import attrs
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
-from ...meshing.settings import fidelity_of
 from ...reading import file_text
 from ..parameter_study.plan import TABLE, Plan
 from ..parameter_study.run import LAST, USE_CASE, Job
@@ -58,10 +57,9 @@ def _plan_of(call: Call) -> Plan:
     s, design = call.settings, call.inputs["unit"]
     refuse_body(design, "a parameter study")
     protocol = protocol_of(s["protocol"] or None)
-    mesh = {"refine": s["refine"], "fidelity": fidelity_of(s["solid_struts"])}
     tables: dict[str, dict[str, Any]] = {
         "design": {},
-        "simulate": {"times": s["times"], "mesh": mesh}
+        "simulate": {"times": s["times"], "mesh": {"refine": s["refine"]}}
         | ({"self_contact": True} if s["self_contact"] else {})
         | ({"self_friction": s["self_friction"]} if s["self_friction"] else {}),
         "place": {},

@@ -11,8 +11,6 @@ from .settings import REFINE
 if TYPE_CHECKING:
     from ...run.progress_estimate import Plan
 
-PRINTED_PACE = 3.0
-"""Factor on the seconds of a grasp by printed struts."""
 GRASP_OF = "grasp of"
 
 
@@ -21,15 +19,13 @@ def stage_of(side_mm: float) -> str:
     return f"{GRASP_OF} {side_mm:g} mm"
 
 
-def expected_plan(sides_mm: Sequence[float], refine: float, step_s: float, printed: bool) -> Plan:
+def expected_plan(sides_mm: Sequence[float], refine: float, step_s: float) -> Plan:
     """Stages of a grasp of cubes with the expected seconds of each on two cores.
 
-    refine: of the mesh; step_s: longest interval between instants; printed: True for struts as printed.
+    refine: of the mesh; step_s: longest interval between instants.
     """
     finer = (refine / REFINE.default) ** BY_REFINEMENT
-    seconds = 140.0 * finer / step_s
-    if printed:
-        seconds *= PRINTED_PACE
+    seconds = 420.0 * finer / step_s
     plan = [("solid", 5.0), *([("mesh", 5.0 * finer)] if sides_mm else [])]
     plan += [(stage_of(side), seconds) for side in sides_mm]
     plan += [("light", 4.0 * len(sides_mm) / step_s)] if sides_mm else []

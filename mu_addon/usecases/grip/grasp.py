@@ -159,7 +159,7 @@ def _facing(gripper: Gripper, mesh: Mesh) -> OuterFaces:
     faces = outer_faces(mesh)
     (_, inner), (_, tip) = gripper.unit.printed.bounds[1:]
     y, z = mesh.nodes[faces.nodes[:, :3]][:, :, 1], mesh.nodes[faces.nodes[:, :3]][:, :, 2]
-    near = gripper.unit.printed.cell if mesh.resolved else 1e-6 * tip
+    near = gripper.unit.printed.cell
     return faces.of((y > inner - near).all(axis=1) | (z > tip - near).all(axis=1))
 
 
@@ -177,7 +177,7 @@ def grasp(
 ) -> Grasp:
     """Close a finger on a cube phase by phase, in time order, and lift the cube.
 
-    mesh and materials: of the gripper's unit, the half mesh, homogenised or resolved. on_instant: called with
+    mesh and materials: of the gripper's unit, the half mesh. on_instant: called with
     the share done. newton: settings for the mesh; self_contact: of the finger's parts. Raises InputError for
     a cube that does not fit, ConvergenceError where an instant has no equilibrium.
     """

@@ -11,7 +11,7 @@ from ...design.gripper import Gripper, read_gripper, to_toml
 from ...design.parameters import to_toml as unit_toml
 from ...design.settings import QUALITY
 from ...errors import InputError
-from ...meshing.settings import SELF_CONTACT, MeshSettings, fidelity_of, require_self_contact_resolvable
+from ...meshing.settings import SELF_CONTACT, MeshSettings
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs, structured
 from ...run.progress_estimate import Plan
@@ -19,7 +19,7 @@ from ...sensing.guide import Optics
 from ...toml_writer import toml_text
 from .expected import expected_plan
 from .phases import Phases, read_phases, shipped_phases
-from .settings import COARSE_REFINE, COARSE_STEP_S, OF_FIDELITY, REFINE, SIDES, STEP_S, Cube, Grip
+from .settings import COARSE_REFINE, COARSE_STEP_S, REFINE, SIDES, STEP_S, Cube, Grip
 
 GRIPPER, UNIT, PROTOCOL = "gripper.toml", "unit.toml", "protocol.csv"
 LAYOUT = FolderLayout(
@@ -47,19 +47,19 @@ class Detail:
 
     def grip(self, **values: Any) -> Grip:
         """Contact of fingers and cube, with values of `Grip`."""
-        return Grip(step_s=self.step_s, **OF_FIDELITY[self.mesh.fidelity], **values)
+        return Grip(step_s=self.step_s, **values)
 
 
-def detailed(coarse: bool, refine: float | None = None, solid_struts: bool = False) -> Detail:
+def detailed(coarse: bool, refine: float | None = None) -> Detail:
     """Detail of a quick look, or of a whole run; refine: replaces its refinement."""
     own = COARSE_REFINE if coarse else REFINE.default
-    mesh = MeshSettings(refine=own if refine is None else refine, fidelity=fidelity_of(solid_struts))
+    mesh = MeshSettings(refine=own if refine is None else refine)
     return Detail(mesh, COARSE_STEP_S if coarse else STEP_S)
 
 
 @attrs.frozen
 class Job:
-    """Inputs of a run. cubes: without any, no grasp; self_contact: of a printed finger's walls and struts.
+    """Inputs of a run. cubes: without any, no grasp; self_contact: of a finger's walls and struts.
 
     Raises InputError.
     """
@@ -74,7 +74,6 @@ class Job:
     self_contact: bool = SELF_CONTACT._replace(default=False).field()
 
     def __attrs_post_init__(self) -> None:
-        require_self_contact_resolvable(self.mesh, self.self_contact)
         self.gripper.unit.wall.require_without_memory("a grasp")
         sides = [cube.side_mm for cube in self.cubes]
         if len(set(sides)) < len(sides):
@@ -95,7 +94,7 @@ class Job:
             "quality": self.quality,
             "cubes": [attrs.asdict(cube) for cube in self.cubes],
             "grip": attrs.asdict(self.grip),
-            "mesh": self.mesh.table(),
+            "mesh": attrs.asdict(self.mesh),
             "optics": attrs.asdict(self.optics),
         }
         if self.self_contact:
@@ -119,4 +118,4 @@ def read_job(folder: Path) -> Job:
 def plan_of(job: Job) -> Plan:
     """Stages of a grasp with the expected seconds of each on two cores."""
     sides = [cube.side_mm for cube in job.cubes]
-    return expected_plan(sides, job.mesh.refine, job.grip.step_s, job.mesh.resolved)
+    return expected_plan(sides, job.mesh.refine, job.grip.step_s)

@@ -230,9 +230,6 @@ def _assumed(run: Gripping) -> str:
         "40 kPa, or the mass of its cubes. The plate is clamped, the weight of the fingers is neglected, "
         "and both fingers are equal. "
     )
-    if run.job.mesh.resolved:
-        parts = "keep apart" if run.job.self_contact else "may pass through each other"
-        words += f"The fingers are simulated as printed, strut by strut; their own walls and struts {parts}."
-    else:
-        words += "The lattice is simulated as a continuum."
+    parts = "keep apart" if run.job.self_contact else "may pass through each other"
+    words += f"The fingers are simulated as printed, strut by strut; their own walls and struts {parts}."
     return f"<p>{escape(words)}</p>" + table("", head, rows)

@@ -21,7 +21,7 @@ from ...fem.state import State, rest
 from ...fem.unit_materials import materials_of, self_contact_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
-from ...resolved.printed_mesh import mesh_of
+from ...resolved.printed_mesh import mesh_printed
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress
@@ -105,7 +105,7 @@ class Gripping:
     def make_mesh(self) -> None:
         """Analysis mesh of half a finger."""
         with self.progress.stage("mesh", 5.0):
-            mesh = self.mesh = mesh_of(self.job.gripper.unit, self.job.mesh)
+            mesh = self.mesh = mesh_printed(self.job.gripper.unit, self.job.mesh)
             self.progress.made(f"{len(mesh.nodes)} nodes and {len(mesh.tets)} elements")
         self.context.summary["mesh"] = {"nodes": len(mesh.nodes), "tetrahedra": len(mesh.tets)}
 
@@ -137,7 +137,7 @@ class Gripping:
                     self.materials,
                     job.grip,
                     on_instant=self.progress.update,
-                    newton=in_time_newton(self.mesh.resolved, job.self_contact),
+                    newton=in_time_newton(job.self_contact),
                     self_contact=apart,
                 )
                 self.cache.put("grasp", entry, _arrays(found))
@@ -178,10 +178,9 @@ class Gripping:
         states = [State(in_MPa(float(found.pressure_kPa[k])), found.u[k]) for k in opening]
         first = first_self_intersection(self.mesh, [rest(self.mesh), *states])
         if first is not None:
-            instead = " or --self-contact" if self.mesh.resolved else ""
             self.warn(
                 f"From {in_kPa(first.pressure_MPa):.4g} kPa on, walls of the opening finger intersect: "
-                f"{first.crossings[0]}. States beyond are invalid. Use a smaller vacuum{instead}."
+                f"{first.crossings[0]}. States beyond are invalid. Use a smaller vacuum or --self-contact."
             )
 
     def follow_light(self) -> None:
@@ -192,7 +191,7 @@ class Gripping:
             path = window(unit, self.job.gripper.path)
             nodes = anchor_points(unit)[list(path.indices)]
             bar = embed_waveguide(waveguide(unit, path), nodes, unit.printed)
-            joints = Joints.of(self.mesh, nodes, unit.dimensions.cell)
+            joints = Joints.of(self.mesh, nodes)
             for side, found in self.grasps.items():
                 moved = [joints.moved(u) for u in found.u]
                 self.signals[side] = traced_signal(bar, moved, optics, RAYS)

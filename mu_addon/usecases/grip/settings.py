@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 
 from ...design.quantity import described
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...fem.dead_loads import STANDARD_GRAVITY
-from ...meshing.settings import HOMOGENISED, RESOLVED, SOLID
 from ...meshing.settings import REFINE as REFINEMENT
 
 MOST_SIDE_MM = 200.0
@@ -78,17 +75,12 @@ class Grip:
 
     friction: float = FRICTION.field()
     beyond_mm: float = BEYOND.field()
-    pressure_MPa: float = 0.02
-    depth_mm: float = 0.1
+    pressure_MPa: float = 0.1
+    depth_mm: float = 0.05
     stick_mm: float = 0.1
-    halvings: int = 2
+    halvings: int = 1
     step_s: float = STEP_S
 
     def __attrs_post_init__(self) -> None:
         if not 0.0 < self.step_s <= 2.0:
             raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")
-
-
-_OF_STRUTS = {"pressure_MPa": 0.1, "depth_mm": 0.05, "halvings": 1}
-OF_FIDELITY: dict[str, dict[str, Any]] = {HOMOGENISED: {}, RESOLVED: _OF_STRUTS, SOLID: _OF_STRUTS}
-"""Values of `Grip` for each fidelity: struts bear on few small areas, and their faces are small."""

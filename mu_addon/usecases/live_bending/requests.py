@@ -14,7 +14,7 @@ import attrs
 
 from ...errors import InputError
 from ...files import write_json
-from ...meshing.settings import RESOLVED, MeshSettings
+from ...meshing.settings import MeshSettings
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, read_inputs
 from ...toml_writer import toml_text
@@ -61,7 +61,7 @@ def ask(folder: Path, number: int, study: Study, pressure_kPa: float, fields: bo
     pressure_kPa: found first, and above the protocol's pressures the largest. fields: find stress and
     stretch, too, after the shape.
     """
-    mesh = MeshSettings(refine=LEVELS[0][0], fidelity=RESOLVED)
+    mesh = MeshSettings(refine=LEVELS[0][0])
     study = attrs.evolve(
         study, mesh=mesh, self_contact=False, self_friction=0.0, stages=("design", "simulate")
     )

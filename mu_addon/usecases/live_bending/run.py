@@ -31,7 +31,7 @@ from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
 from ...resolved.morph import PrintedMorph
-from ...resolved.printed_mesh import mesh_of
+from ...resolved.printed_mesh import mesh_printed
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study
@@ -200,7 +200,7 @@ class LiveBending:
                     model.load = study.effects.load(unit, mesh, model.device)
                     return _Solved(study, drawn, mesh, model, {0.0: rest(mesh)})
         settings = study.mesh_settings(study.mesh)
-        mesh = mesh_of(study.unit, settings, cache=self.folder / CELLS, body=study.body)
+        mesh = mesh_printed(study.unit, settings, cache=self.folder / CELLS, body=study.body)
         self._look()
         model = study.model(mesh)
         model.factor = _Watched(model.factor, self._look)  # type: ignore[assignment]

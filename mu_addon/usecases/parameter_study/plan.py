@@ -15,7 +15,7 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.quantity import Description
 from ...errors import InputError, MuError, did_you_mean
 from ...fem.protocol import Protocol
-from ...meshing.settings import FIDELITY, HOMOGENISED, SELF_CONTACT
+from ...meshing.settings import SELF_CONTACT
 from ...reading import parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import FORMAT, read_toml
@@ -177,12 +177,12 @@ class Plan:
 def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
     document = read_toml(path, "parameter study", "give the path of a TOML file")
-    return _plan_of(_as_printed(document, str(path)), path.parent, str(path))
+    return _plan_of(_kept_apart(document), path.parent, str(path))
 
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    return _plan_of(_as_printed(parse_toml(text, where), where), folder, where)
+    return _plan_of(_kept_apart(parse_toml(text, where)), folder, where)
 
 
 def read_plan_of_run(folder: Path) -> Plan:
@@ -244,27 +244,13 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
     return plan
 
 
-def _as_printed(document: dict[str, Any], where: str) -> dict[str, Any]:
-    """The document with the printed body's fidelity and self-contact where it names none.
-
-    Raises InputError where it asks for a homogenised lattice.
-    """
-    simulate, vary = (document.get(name, {}) for name in ("simulate", "vary"))
+def _kept_apart(document: dict[str, Any]) -> dict[str, Any]:
+    """The document with self-contact where it names none and something is simulated."""
+    simulate = document.get("simulate", {})
     # What is no table is refused later, by name.
-    mesh = simulate.get("mesh", {}) if isinstance(simulate, dict) else None
-    stage = document.get("stages", LAST_STAGE.default)
-    if not isinstance(mesh, dict) or not isinstance(vary, dict) or stage == STAGES[0]:
+    if not isinstance(simulate, dict) or document.get("stages", LAST_STAGE.default) == STAGES[0]:
         return document
-    varied = _flat(vary).get("simulate.mesh.fidelity", {})
-    asked = [mesh.get("fidelity"), *(varied.get("values", ()) if isinstance(varied, dict) else ())]
-    if HOMOGENISED in asked:
-        raise InputError(
-            "a parameter study simulates the printed body, not a homogenised lattice",
-            f"{where}, mesh.fidelity",
-            "leave fidelity out",
-        )
-    apart = {"self_contact": SELF_CONTACT.default}
-    return document | {"simulate": apart | simulate | {"mesh": {"fidelity": FIDELITY.default} | mesh}}
+    return document | {"simulate": {"self_contact": SELF_CONTACT.default} | simulate}
 
 
 def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:

@@ -11,13 +11,9 @@ import attrs
 import numpy as np
 
 from ...errors import ConvergenceError
-from ...fem.kinematics import probe
-from ...fem.materials import Materials
-from ...fem.model import Model
 from ...fem.state import State
 from ...meshing.mesh import Mesh
-from ...placement.batch import CandidateBatch
-from ...placement.candidates import Candidate, roi
+from ...placement.candidates import Candidate
 from ...resolved.candidates import PrintedWaveguides
 from ...run.pool import Pool
 
@@ -31,43 +27,34 @@ Array = np.ndarray[Any, Any]
 class CandidateProblem:
     """Candidates of a study to be solved; plain data, so that it can be sent to another process.
 
-    anchors (p, 3) in mm: the monitored points. whole: the displacement of the whole mesh is also kept. job:
-    with the unit's effects and obstacles; without it only pressure acts.
+    mesh: of the job's unit. anchors (p, 3) in mm: the monitored points. whole: the displacement of the whole
+    mesh is also kept.
     """
 
+    job: Job
     mesh: Mesh
-    materials: Materials
     anchors: Array
     candidates: tuple[Candidate, ...]
-    radius_mm: float
-    sensor_MPa: float
     whole: bool = False
-    job: Job | None = None
-
-    @property
-    def parts(self) -> tuple[tuple[int, ...], ...]:
-        """Numbers of the candidates that are solved together: each printed waveguide has a separate mesh."""
-        every = tuple(range(len(self.candidates)))
-        return tuple((candidate,) for candidate in every) if self.mesh.resolved else (every,)
 
 
 class Moved(NamedTuple):
-    """A part's results at a state: anchors (c, p, 3) in mm of c candidates, differences of the whole mesh.
+    """A candidate's results at a state: anchors (p, 3) in mm, and its difference from Model A.
 
-    whole: displacements (w, n, 3) in mm against Model A's, single precision; w: c or 0.
+    whole (n, 3) in mm, of the whole mesh in single precision, or (0, 3) where it is not kept.
     """
 
     anchors: Array
     whole: Array
 
 
-class PrintedEvaluator:
-    """Evaluator of printed waveguides, on a mesh of the printed unit; otherwise as `Evaluator`."""
+class Evaluator:
+    """Solves candidates of a setting at states of Model A, having built the last one's model once."""
 
     def __init__(self, setting: CandidateProblem, threads: int) -> None:
         job = setting.job
-        assert job is not None
-        self._candidates = PrintedWaveguides(
+        self._whole = setting.whole
+        self.printed = PrintedWaveguides(
             job.unit,
             setting.mesh,
             tuple(candidate.points for candidate in setting.candidates),
@@ -77,87 +64,43 @@ class PrintedEvaluator:
             job.newton,
             job.body,
         )
-        self._setting = setting
 
-    def __call__(self, way: Sequence[State], part: int) -> list[Moved]:
-        """Results of a part's one candidate at the last of some states of Model A, or at each of them.
+    def __call__(self, way: Sequence[State], candidate: int) -> list[Moved]:
+        """Results of a candidate, by number, at the last of some states of Model A, or at each of them.
 
         At each where the candidate had to be followed from rest, see `PrintedWaveguides.states`. Raises
         ConvergenceError.
         """
-        (candidate,) = self._setting.parts[part]
+        states = self.printed.states(candidate, way)
+        points = self.printed.points(states)
         found = []
-        states = self._candidates.states(candidate, way)
-        for state, own in zip(way[-len(states) :], states, strict=True):
-            whole = [self._candidates.of_unit(candidate, own) - state.u] if self._setting.whole else []
-            shape = -1, *state.u.shape
-            found.append(Moved(self._candidates.points([own]), np.array(whole, np.float32).reshape(shape)))
+        for state, own, anchors in zip(way[-len(states) :], states, points, strict=True):
+            whole = self.printed.of_unit(candidate, own) - state.u if self._whole else np.empty((0, 3))
+            found.append(Moved(anchors, whole.astype(np.float32)))
         return found
 
-    def alone(self, candidate: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a candidate moves from rest on, see `CandidatePool.alone`."""
-        return self._candidates.alone(candidate, pressures_MPa)
 
-    def simulated_in_time(self, candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that one moves at k instants, see `CandidatePool.simulated_in_time`."""
-        return self._candidates.simulated_in_time(candidate, time_s, pressure_kPa)
-
-
-def evaluator_of(setting: CandidateProblem, threads: int) -> Evaluator | PrintedEvaluator:
-    """Evaluator of a setting's candidates on its mesh."""
-    return (PrintedEvaluator if setting.mesh.resolved else Evaluator)(setting, threads)
-
-
-class Evaluator:
-    """Solves all candidates of a setting at one state of Model A, having built its model once."""
-
-    def __init__(self, setting: CandidateProblem, threads: int) -> None:
-        s = setting
-        shares = [roi(s.mesh, one, s.radius_mm).share for one in s.candidates]
-        monitored = s.anchors, probe(s.mesh, s.anchors)
-        model = Model(s.mesh, threads=threads) if s.job is None else s.job.model(s.mesh, threads)
-        newton = None if s.job is None else s.job.effects.newton
-        self._sweep = CandidateBatch(model, s.materials, monitored, shares, s.sensor_MPa, newton)
-        self._whole = s.whole
-
-    def __call__(self, way: Sequence[State], part: int = 0) -> list[Moved]:
-        """Results of all candidates, in one part, at the last of some states of Model A. ConvergenceError."""
-        state = way[-1]
-        states = self._sweep.states(state)
-        apart = [(own.u - state.u).astype(np.float32) for own in states if self._whole]
-        whole = np.array(apart, np.float32).reshape(-1, *state.u.shape)
-        return [Moved(self._sweep.points(states), whole)]
-
-    def alone(self, candidate: int, pressures_MPa: Array) -> Array:
-        """Anchors (s, p, 3) in mm that a candidate moves from rest on, see `CandidatePool.alone`."""
-        return self._sweep.alone(candidate, pressures_MPa)
-
-    def simulated_in_time(self, candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
-        """Anchors (k, p, 3) in mm that one moves at k instants, see `CandidatePool.simulated_in_time`."""
-        return self._sweep.simulated_in_time(candidate, time_s, pressure_kPa)
-
-
-_evaluator: Evaluator | PrintedEvaluator | None = None
+_evaluator: Evaluator | None = None
 
 
 def _start(setting: CandidateProblem) -> None:
     global _evaluator
-    _evaluator = evaluator_of(setting, threads=1)
+    _evaluator = Evaluator(setting, threads=1)
 
 
-def _work(way: Sequence[State], part: int) -> list[Moved]:
+def _work(way: Sequence[State], candidate: int) -> list[Moved]:
     assert _evaluator is not None
-    return _evaluator(way, part)
+    return _evaluator(way, candidate)
 
 
 def _work_alone(candidate: int, pressures_MPa: Array) -> Array:
     assert _evaluator is not None
-    return _evaluator.alone(candidate, pressures_MPa)
+    return _evaluator.printed.alone(candidate, pressures_MPa)
 
 
 def _work_in_time(candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
     assert _evaluator is not None
-    return _evaluator.simulated_in_time(candidate, time_s, pressure_kPa)
+    return _evaluator.printed.simulated_in_time(candidate, time_s, pressure_kPa)
 
 
 def _found_or_why(solve: Callable[[], list[Moved]]) -> list[Moved] | ConvergenceError:
@@ -172,15 +115,21 @@ class CandidatePool:
 
     def __init__(self, setting: CandidateProblem, workers: int) -> None:
         self.setting, self.workers = setting, workers
-        self._alone: Evaluator | PrintedEvaluator | None = None
+        self._here: Evaluator | None = None
         self._pool = Pool(workers, "candidates", _start, (setting,))
         self._submitted: dict[tuple[float, int], Future[list[Moved]]] = {}
 
-    def submit(self, way: Sequence[State], part: int) -> Future[list[Moved]]:
+    @property
+    def _evaluator(self) -> Evaluator:
+        """Evaluator in this process, for one worker."""
+        self._here = self._here or Evaluator(self.setting, threads=1)
+        return self._here
+
+    def submit(self, way: Sequence[State], candidate: int) -> Future[list[Moved]]:
         """Submit a task of `solve` to a process unless it was; needs two workers or more."""
-        name = way[-1].pressure_MPa, part
+        name = way[-1].pressure_MPa, candidate
         if name not in self._submitted:
-            self._submitted[name] = self._pool.submit(_work, way, part)
+            self._submitted[name] = self._pool.submit(_work, way, candidate)
         return self._submitted[name]
 
     def leave_out(self, pressure_MPa: float) -> None:
@@ -195,8 +144,7 @@ class CandidatePool:
         Of each candidate as far as it has an equilibrium; ConvergenceError for one without any.
         """
         if self.workers == 1:
-            self._alone = self._alone or evaluator_of(self.setting, threads=1)
-            return [self._alone.alone(*task) for task in tasks]
+            return [self._evaluator.printed.alone(*task) for task in tasks]
         waiting = [self._pool.submit(_work_alone, *task) for task in tasks]
         return [self._pool.result(done) for done in waiting]
 
@@ -209,8 +157,7 @@ class CandidatePool:
         """
         if self.workers == 1:
             for candidate in candidates:
-                self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield candidate, self._alone.simulated_in_time(candidate, time_s, pressure_kPa)
+                yield candidate, self._evaluator.printed.simulated_in_time(candidate, time_s, pressure_kPa)
             return
         waiting = {
             self._pool.submit(_work_in_time, candidate, time_s, pressure_kPa): candidate
@@ -222,19 +169,18 @@ class CandidatePool:
     def solve(
         self, tasks: Sequence[tuple[Sequence[State], int]]
     ) -> Iterator[tuple[int, list[Moved] | ConvergenceError]]:
-        """Number of each finished task, and the results of its candidates, or the reason of its failure.
+        """Number of each finished task, and the results of its candidate, or the reason of its failure.
 
-        A task: Model A's states on one side of rest, in order of pressure, and a part. Its candidates are
+        A task: Model A's states on one side of rest, in order of pressure, and a candidate's number. It is
         solved at the last of these, and possibly at all before it. The same for any `workers`.
         """
         if self.workers == 1:
-            for number, (way, part) in enumerate(tasks):
-                self._alone = self._alone or evaluator_of(self.setting, threads=1)
-                yield number, _found_or_why(partial(self._alone, way, part))
+            for number, (way, candidate) in enumerate(tasks):
+                yield number, _found_or_why(partial(self._evaluator, way, candidate))
             return
         for task in tasks:
             self.submit(*task)
-        numbers = {self._submitted[way[-1].pressure_MPa, part]: n for n, (way, part) in enumerate(tasks)}
+        numbers = {self._submitted[way[-1].pressure_MPa, one]: n for n, (way, one) in enumerate(tasks)}
         for done in as_completed(numbers):
             yield numbers[done], _found_or_why(partial(self._pool.result, done))
 

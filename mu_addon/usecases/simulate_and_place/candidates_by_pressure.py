@@ -34,8 +34,8 @@ Array = np.ndarray[Any, Any]
 
 # Pressures between those solved are interpolated where that changes no path's mean deviation by more.
 SAMPLING_ERROR = 0.02
-# A candidate along its whole path from rest and one that started from Model A's state agree to this, or, of
-# printed struts that snap and touch one by one, to this share of what the candidate deviates by.
+# A candidate along its whole path from rest and one that started from Model A's state agree to this, or, as
+# struts snap and touch one by one, to this share of what the candidate deviates by.
 PATH_DIFFERENCE_MM = 1e-5
 PATH_DIFFERENCE_SHARE = 0.02
 BEFORE_VERIFYING = 0.8
@@ -68,30 +68,22 @@ class CandidateSolver:
         whole: bool = False,
     ) -> None:
         self._job, self._cache, self._mesh, self._candidates = job, cache, mesh, candidates
-        unit = job.unit
-        self._anchors = anchor_points(unit)
-        radius = unit.dimensions.inclusion_radius
-        sensor = unit.material.sensor_modulus_MPa
-        materials = job.materials(mesh)
-        self._sweeper = CandidatePool(
-            CandidateProblem(mesh, materials, self._anchors, tuple(candidates), radius, sensor, whole, job),
-            job.workers,
-        )
+        self._anchors, self._whole = anchor_points(job.unit), whole
+        problem = CandidateProblem(job, mesh, self._anchors, tuple(candidates), whole)
+        self._sweeper = CandidatePool(problem, job.workers)
         self._key = key(
             mesh.hash(),
-            materials.hash(),
+            job.materials(mesh).hash(),
             pressure_kPa,
             job.newton,
             self._anchors,
             *(candidate.points for candidate in candidates),
-            radius,
-            sensor,
             *job.effects.parts,
         )
         distinct = in_MPa(np.unique(pressure_kPa))
-        # States that are always solved; the rest only if these do not suffice. A printed candidate followed
-        # from rest to an extreme pressure passes those before it.
-        certain = self._rounds(distinct)[: 1 if mesh.resolved else 2]
+        # States that are always solved; the rest only if these do not suffice. A candidate followed from rest
+        # to an extreme pressure passes those before it.
+        certain = self._rounds(distinct)[:1]
         self._certain = {float(distinct[i]) for pair in certain for i in pair}
         self._passed: list[State] = []
         # A file is written by one thread at a time.
@@ -110,46 +102,41 @@ class CandidateSolver:
     def _rounds(self, distinct: Array) -> list[list[int]]:
         return solution_order(distinct, self._job.effects.has_gravity)
 
-    def _name(self, state: State, part: int) -> str:
-        return key(self._key, state.pressure_MPa, part)
+    def _name(self, state: State, candidate: int) -> str:
+        return key(self._key, state.pressure_MPa, candidate)
 
     def reached(self, state: State) -> None:
         """Start on a state that Model A has just reached, in parallel with its next one."""
         self._passed.append(state)
         if any(abs(state.pressure_MPa - p) < 1e-12 for p in self._certain):
             way = _way(self._passed, state)
-            for part in self._parts:
-                if not self._is_kept(state, part):
-                    done = self._sweeper.submit(way, part)
+            for candidate in range(len(self._candidates)):
+                if not self._is_kept(state, candidate):
+                    done = self._sweeper.submit(way, candidate)
                     # Model A's next state may take minutes, and the run may be stopped before.
-                    done.add_done_callback(partial(self._keep_done, way, part))
+                    done.add_done_callback(partial(self._keep_done, way, candidate))
 
-    def _keep_done(self, way: Sequence[State], part: int, done: Future[list[Moved]]) -> None:
+    def _keep_done(self, way: Sequence[State], candidate: int, done: Future[list[Moved]]) -> None:
         """Keep a process's result, if it has one; its error is raised where the result is needed."""
         if not done.cancelled() and done.exception() is None:
             with suppress(MuError):
-                self._keep(way, part, done.result())
+                self._keep(way, candidate, done.result())
 
-    def _keep(self, way: Sequence[State], part: int, found: list[Moved]) -> None:
-        """Keep a part's results at the last of some states of Model A, and on the way there."""
-        whole = self._sweeper.setting.whole
+    def _keep(self, way: Sequence[State], candidate: int, found: list[Moved]) -> None:
+        """Keep a candidate's results at the last of some states of Model A, and on the way there."""
         with self._keeping:
             for state, moved in zip(way[-len(found) :], found, strict=True):
-                if self._is_kept(state, part):
+                if self._is_kept(state, candidate):
                     continue
-                name = self._name(state, part)
-                if whole:
+                name = self._name(state, candidate)
+                if self._whole:
                     self._cache.put("whole", name, {"difference_mm": moved.whole})
                 self._cache.put("sweep", name, {"moved_mm": moved.anchors})
 
-    @property
-    def _parts(self) -> range:
-        return range(len(self._sweeper.setting.parts))
-
-    def _is_kept(self, state: State, part: int) -> bool:
-        """Return True if the cache holds all results of a part's candidates at a state."""
-        kinds = ("sweep", "whole") if self._sweeper.setting.whole else ("sweep",)
-        return all(self._cache.has(kind, self._name(state, part)) for kind in kinds)
+    def _is_kept(self, state: State, candidate: int) -> bool:
+        """Return True if the cache holds all results of a candidate at a state."""
+        kinds = ("sweep", "whole") if self._whole else ("sweep",)
+        return all(self._cache.has(kind, self._name(state, candidate)) for kind in kinds)
 
     def evaluations(
         self, trajectory: Trajectory, on_progress: Callable[[float], None], verify: bool = False
@@ -231,9 +218,9 @@ class CandidateSolver:
     def _together(self, distinct: Array, pair: list[int]) -> list[list[int]]:
         """Numbers of pressures in the groups that are solved one after the other.
 
-        A printed candidate may be followed from rest to a pressure, and then needs no other on that side.
+        A candidate may be followed from rest to a pressure, and then needs no other on that side.
         """
-        if self._mesh.resolved and len(pair) == 2 and np.prod(distinct[pair]) > 0:
+        if len(pair) == 2 and np.prod(distinct[pair]) > 0:
             return sorted(([n] for n in pair), key=lambda n: -abs(distinct[n[0]]))
         return [pair]
 
@@ -257,8 +244,7 @@ class CandidateSolver:
         if len(moved) < len(way):
             self._missed(distinct[way[len(moved)]], int(candidate))
         self.path_difference_mm = float(np.abs(moved[-1] - still[number] - known[number][candidate]).max())
-        if self._mesh.resolved:
-            self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
+        self._path_allowed_mm = max(PATH_DIFFERENCE_MM, PATH_DIFFERENCE_SHARE * float(size.max()))
         found = {"difference_mm": self.path_difference_mm, "allowed_mm": self._path_allowed_mm}
         self._cache.put("path", self._key, found)
         return self.independent_of_path
@@ -294,36 +280,35 @@ class CandidateSolver:
     def _solved(
         self, trajectory: Trajectory, numbers: list[int], on_progress: Callable[[float], None]
     ) -> dict[int, Array]:
-        """Anchors (c, p, 3) in mm moved by c candidates at some states, by number; cached part by part.
+        """Anchors (c, p, 3) in mm moved by c candidates at some states, by number; each is cached.
 
         on_progress: called with the finished share. Raises _NotReachedError.
         """
-        setting = self._sweeper.setting
-        points = np.empty((len(numbers), len(self._candidates), *self._anchors.shape))
+        count = len(self._candidates)
+        points = np.empty((len(numbers), count, *self._anchors.shape))
         missing = []
-        # Part by part: a printed candidate's model serves all states that follow each other.
-        for part in self._parts:
+        # Candidate by candidate: a model serves all states that follow each other.
+        for candidate in range(count):
             for row, number in enumerate(numbers):
                 state = trajectory.solved[number]
-                kept = self._cache.get("sweep", self._name(state, part))
-                if kept is None or not self._is_kept(state, part):
-                    missing.append((row, part))
+                kept = self._cache.get("sweep", self._name(state, candidate))
+                if kept is None or not self._is_kept(state, candidate):
+                    missing.append((row, candidate))
                 else:
-                    points[row, list(setting.parts[part])] = kept["moved_mm"]
+                    points[row, candidate] = kept["moved_mm"]
         weights = [max(work(self._job, [trajectory.solved[n].pressure_kPa]), 1.0) for n in numbers]
-        total = sum(weights) * len(self._parts)
+        total = sum(weights) * count
         done = total - sum(weights[row] for row, _ in missing)
         ways = {row: _way(trajectory.solved, trajectory.solved[numbers[row]]) for row, _ in missing}
-        tasks = [(ways[row], part) for row, part in missing]
+        tasks = [(ways[row], candidate) for row, candidate in missing]
         on_progress(done / total)
         for task, found in self._sweeper.solve(tasks):
-            row, part = missing[task]
+            row, candidate = missing[task]
             if isinstance(found, ConvergenceError):
-                paths = {self._candidates[candidate].name for candidate in setting.parts[part]}
-                path = paths.pop() if len(paths) == 1 else "one of the paths"
+                path = self._candidates[candidate].name
                 raise _NotReachedError(trajectory.solved[numbers[row]].pressure_MPa, path, found.what)
-            self._keep(ways[row], part, found)
-            points[row, list(setting.parts[part])] = found[-1].anchors
+            self._keep(ways[row], candidate, found)
+            points[row, candidate] = found[-1].anchors
             done += weights[row]
             on_progress(done / total)
         return dict(zip(numbers, points, strict=True))
@@ -336,16 +321,15 @@ class CandidateSolver:
         """
         if not self.independent_of_path:
             return
-        setting = self._sweeper.setting
         states = [
             s for s in trajectory.solved if any(abs(s.pressure_kPa - p) < 1e-9 for p in self.solved_kPa)
         ]
-        for part in self._parts:
-            kept = [self._cache.get("whole", self._name(s, part)) for s in states]
+        pressures = np.array([s.pressure_kPa for s in states])
+        for number, candidate in enumerate(self._candidates):
+            kept = [self._cache.get("whole", self._name(s, number)) for s in states]
             found = [arrays["difference_mm"] for arrays in kept if arrays is not None]
-            for row, candidate in enumerate(setting.parts[part] if found and len(found) == len(kept) else ()):
-                pressures = np.array([s.pressure_kPa for s in states])
-                yield self._candidates[candidate].name, pressures, np.array([d[row] for d in found])
+            if found and len(found) == len(kept):
+                yield candidate.name, pressures, np.array(found)
 
     def close(self) -> None:
         """End the processes."""

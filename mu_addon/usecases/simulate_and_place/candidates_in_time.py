@@ -39,14 +39,13 @@ def evaluations(
     is solved through all instants and kept in the cache. Raises ConvergenceError.
     """
     unit, materials = job.unit, job.materials(mesh)
-    points, radius = anchor_points(unit), unit.dimensions.inclusion_radius
-    sensor = unit.material.sensor_modulus_MPa
+    points = anchor_points(unit)
     time, pressure = trajectory.time_s, trajectory.pressure_kPa
-    setting = CandidateProblem(mesh, materials, points, tuple(candidates), radius, sensor, job=job)
+    setting = CandidateProblem(job, mesh, points, tuple(candidates))
     friction = [o.friction for o in job.obstacles]
     if job.self_friction:
         friction.append(job.self_friction)
-    contact = job.newton, *PRESSURE_AND_HALVINGS[job.mesh.fidelity], DEPTH_mm, friction
+    contact = job.newton, *PRESSURE_AND_HALVINGS, DEPTH_mm, friction
     names = [
         key(
             mesh.hash(),
@@ -57,8 +56,6 @@ def evaluations(
             job.obstacles_text() or "",
             points,
             candidate.points,
-            radius,
-            sensor,
             *job.effects.parts,
         )
         for candidate in candidates

@@ -12,11 +12,8 @@ from ...design.quantity import describe
 from .unit_runs import Run
 
 _SETTINGS = (
-    ("model", "simulate", "mesh", "fidelity"),
-    ("element order", "simulate", "mesh", "order"),
     ("refinement", "simulate", "mesh", "refine"),
     ("meshed part", "simulate", "mesh", "fraction"),
-    ("mesher", "simulate", "mesher"),
     ("instants", "simulate", "times"),
     ("self-contact", "simulate", "self_contact"),
     ("self-friction", "simulate", "self_friction"),

@@ -22,9 +22,9 @@ Array = np.ndarray[Any, Any]
 
 # Error of the gap at 1.0x at the expected contact pressure, and slip at which friction slides.
 DEPTH_mm = 0.05
-# The contact pressure in MPa, and how often faces are halved: contact is felt at their points. Faces of a
-# homogenised envelope are some 15 mm long; struts bear on few small places.
-PRESSURE_AND_HALVINGS = {"homogenised": (0.02, 2), "resolved": (0.1, 1)}
+# The contact pressure in MPa, and how often faces are halved: contact is felt at their points, and struts
+# bear on few small places.
+PRESSURE_AND_HALVINGS = (0.1, 1)
 # Deeper than this at rest, as a share of DEPTH_mm, is an overlap and no rounding of the mesh.
 _OVERLAP = 0.2
 
@@ -32,7 +32,7 @@ _OVERLAP = 0.2
 def obstacles_of(bodies: Sequence[RigidBody], unit: Unit, mesh: Mesh) -> tuple[Obstacle, ...]:
     """The bodies as obstacles of a unit's mesh; InputError where it overlaps one at rest: where, how deep."""
     depth = DEPTH_mm * unit.dimensions.cell / CELL_MM
-    pressure, halvings = PRESSURE_AND_HALVINGS["resolved" if mesh.resolved else "homogenised"]
+    pressure, halvings = PRESSURE_AND_HALVINGS
     found = []
     for rigid in bodies:
         surface = Surface(rigid.body.vertices, rigid.body.triangles, rigid.name)

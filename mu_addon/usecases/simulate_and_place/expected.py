@@ -14,36 +14,26 @@ if TYPE_CHECKING:
 BEST = "solid with the best path"
 """Stage of the printable unit with the path that a ranking chose."""
 FULL_S = {
-    "solid": 1.5, "mesh": 1.5, "Model A": 32.0, "candidates": 15.0, "mesh check": 20.0, "map": 8.0,
-    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 200.0,
+    "solid": 1.5, "mesh": 10.0, "Model A": 350.0, "candidates": 2200.0, "mesh check": 450.0, "map": 8.0,
+    "light": 7.0, BEST: 2.5, "ranking of the lattice's paths": 30.0, "check of the best paths": 2200.0,
     "motion of the best path": 60.0, "report": 14.0,
 }  # fmt: skip
-"""Seconds on two cores, of a homogenised unit on its default mesh under the shipped protocol."""
+"""Seconds on two cores, on the default mesh under the shipped protocol."""
 UNSOLVED_REPORT_S = 7.0
 """Seconds of a report on a unit that was not simulated."""
-PRINTED_S = {
-    "mesh": 10.0,
-    "Model A": 350.0,
-    "candidates": 2200.0,
-    "mesh check": 450.0,
-    "check of the best paths": 2200.0,
-}
-"""The same of a printed body, where they differ."""
 LEAST_S = {"Model A": 1.0, "candidates": 1.5, "mesh check": 3.5, "map": 0.3}
 """Seconds of a stage that are independent of the mesh, for stages that depend on it."""
 SOLVED = ("Model A", "candidates", "mesh check", "check of the best paths")
-SOLVING = {"Model A": (0.8, 0.88), "candidates": (0.45, 0.97)}
-"""Share of a stage's time until its last equilibrium, of a homogenised unit and of a printed body."""
+SOLVING = {"Model A": 0.88, "candidates": 0.97}
+"""Share of a stage's time until its last equilibrium."""
 TOUCHING = 6.0
-"""Factor on the seconds of a state at -20 kPa where the printed body's walls touch; by the square of that."""
+"""Factor on the seconds of a state at -20 kPa where walls touch; by the square of that."""
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.
 _SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5
-# Below a refinement of 1 the printed body's wall alone grows coarser.
+# Below a refinement of 1 the wall alone grows coarser.
 BY_WALL = 1.8
-# Linear elements have an eighth of the unknowns, and fewer neighbours.
-LINEAR = 0.1
 
 # Bytes of a study, with a margin: a constant, and a part for each node and distinct pressure.
 BYTES = {"interactive": 30_000_000, "export": 150_000_000}
@@ -51,11 +41,10 @@ BYTES_A_NODE = {"simulate": 300, "place": 1000}
 
 
 def expected_nodes(job: Job) -> int:
-    """Expected number of a mesh's nodes, from mu-1.0x: 18 500 at a refinement of 1, 71 000 at 1.8."""
+    """Expected number of a mesh's nodes, from mu-1.0x: 54 000 at a refinement of 0.35, 81 000 at 1."""
     share = {"half": 1.0, "full": 2.0}[job.mesh.fraction]
-    of_order = {1: 0.15, 2: 1.0}[job.mesh.order]
     units = job.unit.dimensions.count / 6
-    return int(share * of_order * units * (4_000 + 17_000 * job.mesh.refine**2.3))
+    return int(share * units * (50_000 + 31_000 * job.mesh.refine**2.7))
 
 
 def expected_bytes(job: Job, nodes: int) -> int:
@@ -76,21 +65,19 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
 
 def work(job: Job, pressures_kPa: Iterable[float]) -> float:
     """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
-    touches = job.mesh.resolved and job.self_contact
+    touches = job.self_contact
     return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
 
 
-def seconds_of(name: str, printed: bool, factor: float = 1.0) -> float:
+def seconds_of(name: str, factor: float = 1.0) -> float:
     """Seconds of a stage on two cores. factor: work by that of the shipped protocol on the default mesh."""
     seconds = FULL_S[BEST if name.startswith("solid with ") else name]
-    if printed:
-        seconds = PRINTED_S.get(name, seconds)
     return max(LEAST_S.get(name, 0.0), seconds * (factor if name in LEAST_S or name in SOLVED else 1.0))
 
 
-def of_mesh(refine: float, printed: bool) -> float:
+def of_mesh(refine: float) -> float:
     """Work on a mesh of that refinement, in units of the work on the default one."""
-    return float(refine ** (BY_WALL if printed and refine < 1.0 else BY_REFINEMENT))
+    return float(refine ** (BY_WALL if refine < 1.0 else BY_REFINEMENT))
 
 
 def plan_of(job: Job) -> Plan:
@@ -99,13 +86,10 @@ def plan_of(job: Job) -> Plan:
     names = stage_names(place, job.mesh_check, job.paths == "graph", simulates)
     if job.path:
         names.insert(1, f"solid with {job.path}")
-    printed = job.mesh.resolved
     if not simulates:
-        return [*((name, seconds_of(name, printed)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
+        return [*((name, seconds_of(name)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
     _, pressure = job.samples
     states = work(job, np.unique(pressure)) if not job.in_time else len(pressure)
     shipped = work(job, _SHIPPED)
-    factor = of_mesh(job.mesh.refine, printed) * max(states, 1) / shipped
-    if job.mesh.order == 1:
-        factor *= LINEAR
-    return [(name, seconds_of(name, printed, factor)) for name in names]
+    factor = of_mesh(job.mesh.refine) * max(states, 1) / shipped
+    return [(name, seconds_of(name, factor)) for name in names]

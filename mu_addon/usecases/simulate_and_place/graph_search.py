@@ -9,14 +9,14 @@ import numpy as np
 
 from ...design.quantity import in_kPa
 from ...errors import ConvergenceError, InputError
-from ...fem.kinematics import Probe, probe
+from ...fem.kinematics import probe
 from ...fem.materials import Materials
 from ...fem.model import Model
 from ...fem.trajectory import Trajectory, whole_body
 from ...files import write_csv
 from ...placement.candidates import Candidate
 from ...placement.graph import Graph, lattice_graph
-from ...placement.response import Response, reduced_response
+from ...placement.response import Response
 from ...placement.search import SearchSettings, front, search_paths
 from ...placement.sensitivity_map import (
     Parity,
@@ -133,7 +133,7 @@ def search_graph(study: Study) -> LatticeSearch:
 
     def check(numbers: Array) -> Array:
         paths = {n: graph.nodes[list(chains[n])] for n in numbers.tolist()}
-        made = [n for n, points in paths.items() if not mesh.resolved or _is_printable(study, points)]
+        made = [n for n, points in paths.items() if _is_printable(study, points)]
         candidates = [Candidate(f"path{n}", 0, paths[n]) for n in made]
         solved = study.solve_candidates(mesh, trajectory, candidates) if candidates else []
         found = dict(zip(made, (e.deviation.J_hat for e in solved), strict=True))
@@ -198,26 +198,13 @@ def _is_printable(study: Study, points: Array) -> bool:
     return True
 
 
-def _response(study: Study, stable: Trajectory, graph: Graph, monitor: Probe) -> Response:
-    """The response that ranks paths: of bars between joints as printed, else of stiffened elements.
-
-    stable: Model A's motion so far.
-    """
+def _response(study: Study, stable: Trajectory, graph: Graph) -> Response:
+    """The response that ranks paths, about Model A's motion so far, `stable`."""
     assert study.mesh is not None
-    job, unit = study.job, study.job.unit
-    if study.mesh.resolved:
-        mesh, trajectory = whole_body(study.mesh, stable)
-        whole = probe(mesh, study.anchors)
-        return bar_response(job.model(mesh), job.materials(mesh), unit.printed, trajectory, whole, graph)
-    return reduced_response(
-        job.model(study.mesh),
-        job.materials(study.mesh),
-        unit.material.sensor_modulus_MPa,
-        stable,
-        monitor,
-        graph,
-        unit.dimensions.inclusion_radius,
-    )
+    job = study.job
+    mesh, trajectory = whole_body(study.mesh, stable)
+    monitor = probe(mesh, study.anchors)
+    return bar_response(job.model(mesh), job.materials(mesh), job.unit.printed, trajectory, monitor, graph)
 
 
 def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]]) -> Array:
@@ -232,7 +219,7 @@ def _predicted(study: Study, graph: Graph, chains: list[tuple[int, ...]]) -> Arr
             "--paths graph",
             "simulate smaller pressures, or leave out --paths graph",
         )
-    found = _response(study, stable, graph, monitor)
+    found = _response(study, stable, graph)
     pressures = np.array([s.pressure_MPa for s in loaded(stable)])
     gradients = gradients_of(stable, study.anchors, monitor, study.job.stations)
     shares = shares_of_time(stable)

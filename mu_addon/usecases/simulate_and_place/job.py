@@ -20,21 +20,20 @@ from ...design.settings import FRICTION, QUALITY
 from ...errors import InputError
 from ...fem.device import device_field, require_device
 from ...fem.newton_settings import (
-    CONTACT_NEWTON,
     RESOLVED_CONTACT_NEWTON,
     RESOLVED_NEWTON,
     RESOLVED_OBSTACLE_NEWTON,
     NewtonSettings,
 )
 from ...fem.protocol import Protocol, read_protocol
-from ...meshing.settings import SELF_CONTACT, MeshSettings, require_self_contact_resolvable
+from ...meshing.settings import SELF_CONTACT, MeshSettings
 from ...placement.graph import Limits
 from ...run.folder import claim, keep_inputs
 from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.guide import Optics
 from .named_effects import NamedEffects
-from .settings import CHECKS, MESH_CHECK, MESHER, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
+from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
 from .study_file import FILES, FILES_OF, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
@@ -57,7 +56,6 @@ class Job:
     unit: Unit
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
-    mesher: str = MESHER.field()
     times: int = TIMES.field()
     stations: int = STATIONS.field()
     quality: str = QUALITY.field()
@@ -74,7 +72,7 @@ class Job:
     obstacles: tuple[RigidBody, ...] = attrs.field(default=(), converter=tuple)
     # Effects named by measured data beyond the unit's parameters, and the direction of gravity.
     effects: NamedEffects = attrs.field(factory=NamedEffects)
-    # Self-contact of a resolved unit's walls and struts, at several times the cost.
+    # Self-contact of walls and struts, at several times the cost.
     self_contact: bool = SELF_CONTACT._replace(default=False).field()
     self_friction: float = SELF_FRICTION.field()
     # Of the finite elements: within the solver's tolerance it decides nothing.
@@ -88,23 +86,14 @@ class Job:
         if self.path:
             # Only its name is kept: an unknown one must be found before the solid is built.
             window(self.unit, self.path)
-        require_self_contact_resolvable(self.mesh, self.self_contact)
         for refused, what, where, remedy in self._refusals():
             if refused:
                 raise InputError(what, where, remedy)
 
     def _refusals(self) -> Iterator[tuple[bool, str, str, str]]:
         """Pairs of settings that exclude each other: True if both are given, then what, where and remedy."""
-        places, simulates = "place" in self.stages, "simulate" in self.stages
         without, one = "the search of the whole lattice does not support", "leave one of them out"
-        graph = places and self.paths == "graph"
-        resolved = simulates and self.mesh.resolved
-        yield (
-            resolved and self.mesh.order == 1,
-            "a printed body has no linear elements",
-            "mesh.order",
-            "choose order 2",
-        )
+        graph = "place" in self.stages and self.paths == "graph"
         yield graph and bool(self.obstacles), f"{without} obstacles", "obstacles, paths", one
         yield (
             bool(self.self_friction) and not self.self_contact,
@@ -163,7 +152,7 @@ class Job:
 
         Not `workers` and `device`, which do not.
         """
-        simulate: dict[str, Any] = {"times": self.times, "mesher": self.mesher}
+        simulate: dict[str, Any] = {"times": self.times}
         if self.self_contact:
             simulate["self_contact"] = True
         if self.self_friction:
@@ -172,7 +161,7 @@ class Job:
             simulate["friction"] = [o.friction for o in self.obstacles]
         tables: Tables = {
             "design": {"quality": self.quality},
-            "simulate": simulate | {"mesh": self.mesh.table()} | self.effects.tables,
+            "simulate": simulate | {"mesh": attrs.asdict(self.mesh)} | self.effects.tables,
             "place": {
                 "stations": self.stations,
                 "mesh_check": self.mesh_check,
@@ -224,9 +213,7 @@ class Job:
     def newton(self) -> NewtonSettings:
         """Settings of Newton's method for this unit."""
         if self.in_time:
-            return in_time_newton(self.mesh.resolved, self.self_contact)
-        if not self.mesh.resolved:
-            return self.effects.newton
+            return in_time_newton(self.self_contact)
         return RESOLVED_CONTACT_NEWTON if self.self_contact else RESOLVED_NEWTON
 
     @property
@@ -279,11 +266,9 @@ class Job:
         return attrs.evolve(settings, fraction="full")
 
 
-def in_time_newton(resolved: bool, self_contact: bool) -> NewtonSettings:
+def in_time_newton(self_contact: bool) -> NewtonSettings:
     """Settings of Newton's method where a motion is solved instant by instant."""
-    if self_contact:
-        return RESOLVED_CONTACT_NEWTON
-    return RESOLVED_OBSTACLE_NEWTON if resolved else CONTACT_NEWTON
+    return RESOLVED_CONTACT_NEWTON if self_contact else RESOLVED_OBSTACLE_NEWTON
 
 
 def protocol_text(protocol: Protocol) -> str:
@@ -353,13 +338,17 @@ def job_with(tables: Mapping[str, Mapping[str, Any]], where: str, **given: Any) 
                 inner = _inner(values.pop(key), f"{where}, [{stage}.{key}]")
                 if key == "search" and "most_checks" in inner:
                     job["most_checks"] = inner.pop("most_checks")
+                _require_known(inner, [f.name for f in attrs.fields(kind)], f"{where}, [{stage}.{key}]")
                 job["limits" if key == "search" else key] = _built(kind, inner, f"{where}, [{stage}.{key}]")
-        known = SETTINGS[stage]
-        for key in values:
-            if key not in known:
-                raise InputError(f"unknown key {key!r}", f"{where}, [{stage}]", f"known: {', '.join(known)}")
+        _require_known(values, SETTINGS[stage], f"{where}, [{stage}]")
         job |= values
     return _built(Job, {**job, "stages": tuple(tables)}, where)
+
+
+def _require_known(values: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    for key in values:
+        if key not in known:
+            raise InputError(f"unknown key {key!r}", where, f"known: {', '.join(known)}")
 
 
 def _inner(value: Any, where: str) -> dict[str, Any]:
@@ -373,7 +362,7 @@ OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),
-    "simulate": ("times", "mesher", "orientation_deg", "self_contact", "self_friction"),
+    "simulate": ("times", "orientation_deg", "self_contact", "self_friction"),
     "place": ("stations", "mesh_check", "paths"),
 }
 

@@ -62,7 +62,7 @@ def _signals(study: Study, optics: Optics) -> Signals:
         still = next((s.u for s in states if not s.pressure_MPa), np.zeros_like(study.mesh.nodes))
         displacements = [still, *(s.u for s in states)]
         angle = np.array([study.bending_angle_deg(u) + 0.0 for u in displacements])
-        joints = Joints.of(study.mesh, study.anchors, unit.dimensions.cell)
+        joints = Joints.of(study.mesh, study.anchors)
         moved = [joints.moved(u) for u in displacements]
         bars = _bars(study)
         own = {name: [(at[i], turned[i]) for at, turned in moved] for name, (i, _) in bars.items()}

@@ -13,14 +13,8 @@ if TYPE_CHECKING:
     from ...meshing.mesh import Mesh
     from .job import Job
 
+
 # With self-contact, refine 0.7: docs/engineering/verification.md, the paper.
-HOMOGENISED = (
-    "The lattice is simulated as a homogenised continuum. With its struts as printed, which buckle, mu-1.0x "
-    "bends 1.8 to 2.7 times as far at -5 and -10 kPa and 0.6 times as far at 50 kPa: where the size of the "
-    "motion matters, simulate the printed body."
-)
-
-
 def doubts_of_job(job: Job) -> Iterator[str]:
     """Warnings on the omissions of a simulation's settings."""
     # Uniform samples miss the protocol's extremes.
@@ -31,10 +25,6 @@ def doubts_of_job(job: Job) -> Iterator[str]:
                 f"The protocol goes to {extreme:g} kPa, but its {job.times} samples reach only "
                 f"{met:g} kPa: choose a number of samples that includes its extremes."
             )
-    if job.mesh.order == 1:
-        yield "Linear elements lock in thin walls: these results are for a quick look only."
-    if not job.mesh.resolved:
-        yield HOMOGENISED
 
 
 def doubts_of_motion(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[str, Any]) -> Iterator[str]:
@@ -62,11 +52,10 @@ def _walls_cross(job: Job, mesh: Mesh, states: Sequence[State], summary: dict[st
         if first is None:
             continue
         pressure = f"{in_kPa(first.pressure_MPa):.4g}"
-        instead = ", --self-contact" if job.mesh.resolved else ""
         found[pressure] = [str(c) for c in first.crossings]
         yield (
             f"From {pressure} kPa on, walls intersect: {first.crossings[0]}. Self-contact is not "
-            f"modelled, so states beyond this pressure are invalid. Use a thicker wall{instead} or a "
+            f"modelled, so states beyond this pressure are invalid. Use a thicker wall, --self-contact or a "
             "smaller pressure."
         )
 

@@ -79,21 +79,20 @@ def write_stretch(
 ) -> list[Row]:
     """Write the largest stretches of wall, struts and joints in every state, and where; return the rows.
 
-    A homogenised lattice has no share of the resin's elongation, nor joints. cache: as in `joint_stretch`.
+    cache: as in `joint_stretch`.
     """
     mesh, elongation = model.mesh, job.unit.material.elongation_at_break
     d = covering(job.unit.printed, job.body)
     rows: list[Row] = []
     for state in states:
         found = {"wall": peak_stretch(mesh, state.u, MEMBRANE)}
-        found["struts" if mesh.resolved else "homogenised lattice"] = peak_stretch(mesh, state.u, LATTICE)
+        found["struts"] = peak_stretch(mesh, state.u, LATTICE)
         joints = joint_stretch(model, job.materials(mesh), d, state.u, cache) if len(mesh.beams) else None
         if joints is not None:
             found["joints"] = joints
         for part, peak in found.items():
             place = (f"{x:.2f}" for x in peak.place_mm)
-            of_resin = part == "wall" or mesh.resolved
-            share = f"{100.0 * (peak.exceeded - 1.0) / elongation:.3g}" if of_resin else ""
+            share = f"{100.0 * (peak.exceeded - 1.0) / elongation:.3g}"
             values = (f"{peak.largest:.4f}", *place, f"{peak.exceeded:.4f}", share)
             rows.append((f"{state.pressure_kPa:.6g}", part, *values))
     write_csv(folder / "stretch.csv", list(STRETCH_COLUMNS), rows)

@@ -13,8 +13,7 @@ from ...errors import InputError, did_you_mean
 from ...evidence.effect import LIBRARY, Parameter
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
 from ...evidence.prediction.unit_pressure import RELAXING, SPREADING, TIMED, TWO_VOLUMES
-from ...evidence.unit_effects import EFFECTS, SMOOTH, Body
-from ...fem.newton_settings import NewtonSettings
+from ...evidence.unit_effects import EFFECTS, Body
 from ...reading import is_finite
 from .settings import ORIENTATION
 
@@ -153,12 +152,6 @@ class NamedEffects:
             return {}
         turned = {"orientation_deg": self.orientation_deg} if self.has_gravity else {}
         return {**turned, "effects": {name: dict(given) for name, given in self.values.items()}}
-
-    @property
-    def newton(self) -> NewtonSettings:
-        """Newton's settings required by these effects."""
-        asked = [EFFECTS[name].newton for name in self.sizes]
-        return next((n for n in asked if n != SMOOTH), NewtonSettings())
 
     @property
     def parts(self) -> tuple[Any, ...]:

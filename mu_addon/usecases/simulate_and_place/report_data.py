@@ -197,7 +197,6 @@ def _parameters(study: Study) -> list[Parameter]:
     rows += [
         Parameter("study.times", k, "", "samples of the protocol; the paper gives none", True),
         Parameter("study.stations", j, "", "stations along the backbone; the paper gives none", True),
-        Parameter("mesh.order", m.order, "", "1: linear elements, which lock in thin walls; 2: quadratic"),
         Parameter("mesh.refine", m.refine, "", "divides every element size"),
         Parameter("protocol", "protocol.csv", "", "between the paper's pressures; it gives no times", True),
     ]

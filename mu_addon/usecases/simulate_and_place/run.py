@@ -35,7 +35,7 @@ def run_stages(study: Study) -> None:
     if "place" in job.stages:
         if job.paths == "graph":
             chains_within(job)
-        elif job.mesh.resolved:
+        else:
             _require_a_waveguide(job)
     study.design()
     if path is not None:

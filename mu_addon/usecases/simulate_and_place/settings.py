@@ -15,7 +15,6 @@ PROTOCOL = described(
     "",
     "pressure protocol, CSV with the columns time_s,pressure_kPa; empty: the shipped grasp protocol",
 )
-MESHER = described("mesher", "auto", "mesh generator", choices=("auto", "gmsh", "pytetwild"))
 TIMES = described("times", 13, "number of time samples of the protocol", low=2, high=1001)
 STATIONS = described("stations", 51, "number of stations along the backbone", low=2, high=10_001)
 WORKERS = described("workers", 2, "number of worker processes; results do not depend on it", low=1, high=256)

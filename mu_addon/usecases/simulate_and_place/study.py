@@ -51,8 +51,8 @@ Array = np.ndarray[Any, Any]
 _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
-# Printed paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only
-# paths near the best can be tied with it.
+# Paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only paths
+# near the best can be tied with it.
 PATHS_CHECKED = 3
 
 
@@ -99,7 +99,7 @@ class Study:
             summary["body"] = {"low_mm": low, "high_mm": high, "triangles": len(job.body.triangles)}
         if simulates:
             summary["study"] = {"times": job.times, "stations": job.stations}
-            summary["study"] |= {"mesh": job.mesh.table(), "mesher": job.mesher}
+            summary["study"] |= {"mesh": attrs.asdict(job.mesh)}
             if job.effects:
                 summary["study"] |= job.effects.tables
             study.warn(*doubts_of_job(job))
@@ -194,11 +194,10 @@ class Study:
         """Make the analysis mesh and its quality."""
         job = self.job
         with self.progress.stage("mesh"):
-            mesh = self.mesh = analysis_mesh(job, job.mesh, self.cache, self.progress.update, self.warn)
+            mesh = self.mesh = analysis_mesh(job, job.mesh, self.cache, self.progress.update)
             self.progress.made(f"{len(mesh.nodes)} nodes and {len(mesh.tets)} elements")
             require_space(self.folder, expected_bytes(job, len(mesh.nodes)))
-            struts = strut_volume_mm3(job.unit, job.body) if mesh.resolved else None
-            self.quality = mesh_quality(mesh, job.unit, job.body, struts)
+            self.quality = mesh_quality(mesh, job.unit, strut_volume_mm3(job.unit, job.body))
             modulus, _ = job.materials(mesh).small_strain(len(mesh.tets))
             write_mesh(self.folder / "mesh.vtu", mesh, modulus)
         own = {"beams": len(mesh.beams), "hash": mesh.hash()}
@@ -211,7 +210,7 @@ class Study:
         candidates_beside: let other processes solve the candidates as soon as a state is there.
         """
         assert self.mesh is not None
-        job, samples, states = self.job, self.job.samples, self._solving("Model A")
+        job, samples, states = self.job, self.job.samples, SOLVING["Model A"]
         with self.progress.stage("Model A"):
             model = job.model(self.mesh)
             if candidates_beside and job.workers > 1 and not job.in_time:
@@ -239,12 +238,6 @@ class Study:
             "largest_relative_residual": max((s.residual for s in solved), default=0.0),
         }
         return self.trajectory
-
-    def _solving(self, stage: str) -> float:
-        """Share of a stage's time until its last equilibrium; the rest is for tables, fields and files."""
-        assert self.mesh is not None
-        homogenised, printed = SOLVING[stage]
-        return printed if self.mesh.resolved else homogenised
 
     def _reached(self, state: State) -> None:
         self.states.append(state)
@@ -332,7 +325,7 @@ class Study:
         assert self.mesh is not None
         shown = (self.folder, self.mesh) if to_look_at else None
         update = within(self.progress.update, done, 1.0)
-        solving = self._solving("candidates") if shown else 1.0
+        solving = SOLVING["candidates"] if shown else 1.0
         found, figures = solve_candidates(
             self.job, self.cache, mesh, trajectory, candidates, update, solving, under_way, verify, shown
         )
@@ -350,7 +343,7 @@ class Study:
     def _compare_meshes(self) -> None:
         """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures.
 
-        Of printed paths, the best `PATHS_CHECKED`.
+        Of the best `PATHS_CHECKED` paths.
         """
         job, pressure = self.job, self.job.samples[1]
         coarse = attrs.evolve(job.mesh, refine=job.mesh.refine * COARSER)
@@ -361,13 +354,11 @@ class Study:
             # The history of contact or wall is of the whole protocol.
             samples = job.protocol.sample(job.times)
             instants = list(range(job.times))
-        checked = self.candidates
-        if self.mesh is not None and self.mesh.resolved:
-            checked = self.ranking.best(checked, PATHS_CHECKED)
+        checked = self.ranking.best(self.candidates, PATHS_CHECKED)
         with self.progress.stage("mesh check"):
             meshing, moving = 0.04, 0.5
             update = self.progress.update
-            mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing), self.warn)
+            mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing))
             model = job.model(mesh)
             trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
             found = self.solve_candidates(mesh, trajectory, checked, done=moving)

@@ -17,7 +17,7 @@ from .settings import STAGES
 NAME = "study.toml"
 # The first line, by which a study's folder is known.
 HEADER = "# The inputs of this study; unit.toml and protocol.csv beside it belong to them."
-FORMAT = 2
+FORMAT = 3
 # Files of inputs that a stage's table names, each under the key that names it.
 FILES = {
     "unit": "unit.toml",
@@ -112,7 +112,7 @@ def parse(text: str, folder: Path) -> Tables:
         raise InputError(
             f"study.toml is of format {found!r}, and this version reads {FORMAT}",
             where,
-            "use the newer version that wrote it" if newer else "choose another folder",
+            "use the newer version that wrote it" if newer else "run its unit again in another folder",
         )
     stages = STAGES[: len(document)]
     if set(document) != set(stages) or not document:

@@ -24,7 +24,7 @@ from ...design.parameters import Unit, read_unit
 from ...design.rigid_body import read_rigid_bodies
 from ...errors import InputError, MuError
 from ...files import make_folder, output_error, write_text
-from ...meshing.settings import HOMOGENISED, REFINE
+from ...meshing.settings import REFINE
 from ...reading import file_bytes, file_text, parse_json, parse_toml
 from ...run.cache import key
 from ...run.folder import ALWAYS, OWN
@@ -116,11 +116,6 @@ class Run:
         return self.tables.get("simulate", {}).get("mesh") or {}
 
     @property
-    def printed(self) -> bool:
-        """True if struts are simulated as printed; False for a homogenised lattice."""
-        return self._mesh.get("fidelity", HOMOGENISED) != HOMOGENISED
-
-    @property
     def refine(self) -> float:
         """Refinement of the mesh: every element size is divided by it."""
         return float(self._mesh.get("refine", REFINE.default))
@@ -136,8 +131,7 @@ class Run:
         what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
-        # What was found tells a motion from a ranking; both words would not fit into a list.
-        return self.name or (what if self.printed else "Homogenised")
+        return self.name or what
 
     @property
     def seconds(self) -> float:
@@ -249,14 +243,13 @@ def read_run(folder: Path) -> Run:
 def best_of(found: Sequence[Run], design: str) -> Run | None:
     """Run whose results are shown for a design: the best of its runs, or else the latest of all.
 
-    Complete before incomplete, printed struts before a homogenised lattice, a finer mesh before a coarser
-    one, a ranking before the motion alone, then the latest. A run that has just begun is shown only if there
-    is no other.
+    Complete before incomplete, a finer mesh before a coarser one, a ranking before the motion alone, then the
+    latest. A run that has just begun is shown only if there is no other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
     if ready:
-        return max(ready, key=lambda r: (r.complete, r.printed, r.refine, bool(r.ranking), r.changed_s))
+        return max(ready, key=lambda r: (r.complete, r.refine, bool(r.ranking), r.changed_s))
     others = [run for run in found if run.has_results]
     return next(iter(ordered(others or own)), None)
 

@@ -15,11 +15,12 @@ import pytest
 from mu_addon.design.parameters import load_preset
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits
+from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
-from ...headless.processes import coarse, run
 from ...made_once import made_once
 from ...usecases.bent_motion import write_bent_run
 from ...usecases.diagnosis_data import weighed_blocks
+from ...usecases.made_up import place
 from ..filming import ANGLES, film, pressures
 from ..session import Blender, needs_bpy
 
@@ -95,7 +96,7 @@ def blender(each_bpy, blenders, tmp_path_factory):
 
 # A coarse ranking, with one path of the whole lattice beside the ten of the anchors.
 PLACE = {
-    "mesh": MeshSettings(refine=0.4, order=1),
+    "mesh": MeshSettings(refine=0.2),
     "times": 7,
     "stations": 51,
     "mesh_check": False,
@@ -107,12 +108,10 @@ PLACE = {
 
 @pytest.fixture(scope="session")
 def placed(tmp_path_factory, with_light):
-    """A finished study of `place`; whoever writes into it takes `study`."""
+    """A finished study, whose motion is made up; whoever writes into it takes `study`."""
 
     def make(folder):
-        line = coarse(with_light(folder), load_preset("mu-0.75x"), **PLACE)
-        done = run(*line, "--workers", "1", "--no-report")
-        assert done.returncode == 0, done.stderr
+        place(with_light(folder), Job(load_preset("mu-0.75x"), grasp(), workers=1, **PLACE))
 
     return made_once(tmp_path_factory, "placed", make)
 

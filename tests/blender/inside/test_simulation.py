@@ -203,7 +203,7 @@ def test_the_printed_body_is_simulated_on_the_mesh_that_is_asked_for():
     root = add()
     study = root.mu_unit.study
     study.command = "simulate"
-    assert job_of(root).mesh == MeshSettings(refine=0.5, fidelity="resolved")
+    assert job_of(root).mesh == MeshSettings(refine=0.5)
     assert job_of(root).self_contact
     study.refine = 0.7
     assert job_of(root).mesh.refine == 0.7

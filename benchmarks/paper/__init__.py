@@ -1,1 +1,0 @@
-"""The paper's table and bending ranges, done again beside its printed numbers."""

@@ -1,1 +1,0 @@
-"""Table I and bending at three scales, and the statements of the paper that they bear on."""
