@@ -269,8 +269,8 @@ def _unit_slip(verdict: Verdict) -> str:
                 near = abs(factor / times - 1.0) < SLIP_SHARE or low < times - 1.0 < high
                 if near and high - low < SLIP_SHARE * 10.0 * factor:
                     return (
-                        f"Readings {factor:.3g} times as large, which is the factor of {written} and {under}: "
-                        f"check the unit of {c.effect.whose}."
+                        f"Readings {factor:.3g} times as large, which is the factor of {written} and "
+                        f"{under}: check the unit of {c.effect.whose}."
                     )
     return ""
 
