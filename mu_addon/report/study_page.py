@@ -63,6 +63,10 @@ def _one(work: Execution, part: Part) -> str:
     if isinstance(part, Table):
         rows = [([*map(number, cells)], i in part.best) for i, cells in enumerate(part.rows)]
         return table(part.caption, part.head, rows, part.groups)
+    if isinstance(part, Beside):
+        stacks = [one if isinstance(one, list) else [one] for one in part.parts]
+        columns = "".join(f"<div>{_html(work, stack)}</div>" for stack in stacks)
+        return f'<div class="pair">{columns}</div>'
     # A run that was asked to stop leaves out what takes long to draw.
     if work.context.hurried:
         return ""
@@ -74,10 +78,6 @@ def _one(work: Execution, part: Part) -> str:
             write_bytes(work.folder / name, picture.png)
         shown = "".join(picture_figure(picture) for _, picture in found)
         return f'<div class="{"pair" if len(found) < 3 else "triple"}">{shown}</div>'
-    if isinstance(part, Beside):
-        stacks = [one if isinstance(one, list) else [one] for one in part.parts]
-        columns = "".join(f"<div>{_html(work, stack)}</div>" for stack in stacks)
-        return f'<div class="pair">{columns}</div>'
     return ""
 
 
@@ -85,4 +85,4 @@ def _files(work: Execution) -> dict[str, Any]:
     """Content of each file that the folder has, inputs first."""
     inputs = dict.fromkeys(work.study.texts(), "inputs of this run")
     known = {**inputs, **work.study.files, **_ALWAYS}
-    return {name: what for name, what in known.items() if (work.folder / name).exists()}
+    return {name: what for name, what in known.items() if any(work.folder.glob(name))}

@@ -11,12 +11,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, MuError
+from ..errors import InputError, MuError, OutputError
 from ..files import write_bytes
 from .cache import key
 from .context import KEEP_EVERY_S, RunContext
 from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
-from .pool import Pool
+from .pool import Pool, WorkerDiedError
 from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
 from .results import Results, Task
@@ -40,6 +40,8 @@ class Execution:
         self._stages = self.results.stages
         self._done: set[Task] = set()
         self._parts: dict[str, tuple[str, list[Part]]] = {}
+        self._recorded: list[list[str]] = []
+        self._told: set[str] = set()
         self._shown_s = 0.0
 
     @property
@@ -74,56 +76,55 @@ class Execution:
 
     def _make_all(self, tasks: list[Task]) -> None:
         """Make the results of tasks, each after those that it takes, in this process or in several."""
-        waiting, running, found = list(tasks), dict[Future[None], Task](), 0
+        waiting, running = list(tasks), dict[Future[None], Task]()
         workers = self.study.processes if any(self._stages[name].parallel for name, _ in tasks) else 1
         with closing(Pool(workers, tasks[0][0], _begin, (self.study, self.folder))) as pool:
             while waiting or running:
-                for task in self._worth(waiting):
-                    if workers == 1 or not self._stages[task[0]].parallel or self.results.is_kept(task):
-                        self._finish(task)
-                        self._settle(task, waiting)
-                        break
-                    if len(running) == workers:
-                        break
-                    running[pool.submit(_in_process, task, self.results.failed, self.results.members)] = task
+                worth = self._worth(waiting, first=workers == 1)
+                here = next((t for t in worth if workers == 1 or not self._is_for_pool(t)), None)
+                if here is not None:
+                    self._finish(here, waiting)
+                for task in [] if here is not None else worth[: workers - len(running)]:
+                    failed, members = self.results.failed, self.results.members
+                    running[pool.submit(_in_process, task, failed, members)] = task
                     waiting.remove(task)
-                else:
-                    if not running:
-                        # Never chosen, or without what they take.
-                        self.results.failed |= dict.fromkeys(waiting, "")
-                        self._done.update(waiting)
-                        break
-                if running and (len(running) == workers or not self._worth(waiting)):
+                if here is None and running:
                     for future in wait(running, return_when=FIRST_COMPLETED).done:
-                        task = running.pop(future)
-                        self._finish(task, partial(pool.result, future))
-                        self._settle(task, waiting)
-                found = sum(task in self._done for task in tasks)
-                self.context.progress.update(found / max(len(tasks), found + len(waiting) + len(running)))
+                        self._finish(running.pop(future), waiting, partial(pool.result, future))
+                elif here is None and waiting:
+                    self._give_up(waiting)
+                done = sum(task in self._done for task in tasks)
+                self.context.progress.update(done / max(len(tasks), done + len(waiting) + len(running)))
                 if waiting and time.monotonic() - self._shown_s > KEEP_EVERY_S:
                     self.show()
 
-    def _settle(self, task: Task, waiting: list[Task]) -> None:
-        """Take a finished task from those that wait, and add the members that grow from it."""
-        if task in waiting:
-            waiting.remove(task)
-        over = self._stages[task[0]].over
-        if over and over.grows:
-            known = self.results.members[task[0]]
-            new = [m for m in over.grows(self.study, self._so_far(task[0])) if m not in known]
-            known += new
-            waiting += [(task[0], member) for member in new]
+    def _is_for_pool(self, task: Task) -> bool:
+        return self._stages[task[0]].parallel and not self.results.is_kept(task)
 
-    def _worth(self, waiting: Sequence[Task]) -> list[Task]:
-        """The tasks that can be made now, and are worth it, in order."""
-        ready = [task for task in waiting if self._is_ready(task)]
+    def _give_up(self, waiting: list[Task]) -> None:
+        """Leave members that were not chosen, and what needs them; raises TypeError if there are none."""
+        if not any(self._is_ready(task) for task in waiting):
+            names = ", ".join({name for name, _ in waiting})
+            raise TypeError(f"stages need each other in a circle: {names}")
+        self.results.failed |= dict.fromkeys(waiting, "")
+        self._done.update(waiting)
+        waiting.clear()
+
+    def _worth(self, waiting: Sequence[Task], first: bool) -> list[Task]:
+        """The tasks that can be made now, and are worth it, in order; first: the first of them suffices."""
         found: list[Task] = []
-        for name, group in groupby(ready, lambda task: task[0]):
-            members = [member for _, member in group]
+        for name, group in groupby(waiting, lambda task: task[0]):
             over = self._stages[name].over
-            if over and over.choose:
-                members = [m for m in over.choose(self.study, members, self._so_far(name)) if m in members]
-            found += [(name, member) for member in members]
+            if over is None or over.choose is None:
+                ready = (task for task in group if self._is_ready(task))
+                found += [one for one in [next(ready, None)] if one] if first else ready
+            else:
+                members = [task[1] for task in group if self._is_ready(task)]
+                found += [
+                    (name, m) for m in over.choose(self.study, members, self._so_far(name)) if m in members
+                ]
+            if first and found:
+                break
         return found
 
     def _so_far(self, name: str) -> Members:
@@ -139,53 +140,77 @@ class Execution:
                     return False
         return True
 
-    def _finish(self, task: Task, work: Callable[[], Any] | None = None) -> None:
+    def _finish(self, task: Task, waiting: list[Task], work: Callable[[], Any] | None = None) -> None:
         """Make a task's result, by `work` if that is given; a failure that may be becomes a warning."""
         stage = self._stages[task[0]]
         try:
             if work is not None:
                 work()
-            if self.results.digest(task) is None or not stage.kept:
+            if not self.results.is_kept(task):
                 self.results.value(task)
         except Dropped:
             self.results.failed[task] = ""
+        except (OutputError, WorkerDiedError):
+            raise
         except MuError as error:
             if not stage.failing:
                 raise
             where = f" ({error.where})" if error.where and isinstance(error, InputError) else ""
-            text = f"{stage.failing.format(**stage.of_member(task[1]))}: {error.what}{where}."
-            self.results.failed[task] = text
-            self.warn(text)
+            words = stage.failing.format(**stage.of_member(task[1]))
+            self.results.failed[task] = f"{words}: {error.what}{where}."
+            self._tell(self.results.failed[task])
         self._done.add(task)
+        if task in waiting:
+            waiting.remove(task)
+        if stage.over and stage.over.grows:
+            known = self.results.members[task[0]]
+            new = [m for m in stage.over.grows(self.study, self._so_far(task[0])) if m not in known]
+            self.results.grow(task[0], new)
+            waiting += [(task[0], member) for member in new]
 
     def _forget(self) -> None:
         """Release results that no task to come takes: a factor, a field of displacements."""
-        to_come = [task for task in self.tasks if task not in self._done]
-        needed: set[str] = set()
-        names = {name for name, _ in to_come}
-        while names - needed:
-            needed |= names
-            names = {n for name in needed for n in self._stages[name].needs if n in self._stages}
+        needed: set[Task] = set()
+        asked = [task for task in self.tasks if task not in self._done]
+        while asked:
+            taken = [
+                t
+                for task in asked
+                for name in self._stages[task[0]].needs
+                for t in self.results.taken(task, name)
+            ]
+            needed.update(taken)
+            # A kept result that is not there any more is read again.
+            asked = [task for task in set(taken) if not self._stages[task[0]].title]
         self.results.forget(needed.__contains__)
 
-    def warn(self, text: str) -> None:
-        """Warn the user, now and in the report."""
-        warnings = self.context.summary.setdefault("warnings", [])
-        if text not in warnings:
-            warnings.append(text)
-            self.context.progress.warning(text)
+    def _tell(self, text: str, where: str = "", remedy: str = "") -> None:
+        """Warn the user, once."""
+        if text not in self._told:
+            self._told.add(text)
+            self.context.progress.warning(text, where, remedy)
 
     def show(self) -> None:
         """Write files and summary of all results that there are."""
-        self.shown, self.lines, self._shown_s = [], [], time.monotonic()
-        for one in self.study.sections():
-            parts = self._section(one)
-            self.shown.append((one, parts))
-            for part in flat(parts):
-                if isinstance(part, Fact) and part.key:
-                    _put(self.context.summary, part.key.split("."), part.value)
-                elif isinstance(part, Sentence) and part.terminal:
-                    self.lines.append(part.text)
+        shown = [(one, self._section(one)) for one in self.study.sections()]
+        every = [part for _, parts in shown for part in flat(parts)]
+        summary = self.context.summary
+        for path in self._recorded:
+            _drop(summary, path)
+        self._recorded = [part.key.split(".") for part in every if isinstance(part, Fact) and part.key]
+        for part in every:
+            if isinstance(part, Fact) and part.key:
+                _put(summary, part.key.split("."), part.value)
+        warned = [part for part in every if isinstance(part, Warn)]
+        for one in warned:
+            self._tell(one.text, one.where, one.remedy)
+        texts = [text for text in self.results.failed.values() if text]
+        texts = [*dict.fromkeys([*texts, *(one.text for one in warned if one.repeated)])]
+        summary.pop("warnings", None)
+        summary |= {"warnings": texts} if texts else {}
+        self.fault = next((part.error for part in every if isinstance(part, Fault)), None)
+        self.lines = [part.text for part in every if isinstance(part, Sentence) and part.terminal]
+        self.shown, self._shown_s = shown, time.monotonic()
 
     def _section(self, one: Section) -> list[Part]:
         """A section's parts, made anew if what it shows is; its files are then written."""
@@ -196,19 +221,15 @@ class Execution:
         )
         if name in self._parts and self._parts[name][0] == state:
             return self._parts[name][1]
-        lacking = [p for p, needed in one.parameters.items() if needed and p in there and not there[p]]
-        values = {} if lacking else {p: self._for_show(p, there.get(p, [])) for p in one.parameters}
-        parts = [] if lacking else list(one.method(self.study, **values))
-        self._parts[name] = state, parts
+        parts: list[Part] = []
+        if all(there[p] for p, needed in one.parameters.items() if needed and p in there):
+            values = {p: self._for_show(p, there.get(p, [])) for p in one.parameters}
+            if not any(values[p] is None for p, needed in one.parameters.items() if needed and p in there):
+                parts = list(one.method(self.study, **values))
         for part in flat(parts):
             if isinstance(part, File):
                 self._write(part)
-            elif isinstance(part, Warn) and part.repeated:
-                self.warn(part.text)
-            elif isinstance(part, Warn):
-                self.context.progress.warning(part.text, part.where, part.remedy)
-            elif isinstance(part, Fault):
-                self.fault = part.error
+        self._parts[name] = state, parts
         return parts
 
     def _there(self, name: str) -> list[Task]:
@@ -248,6 +269,15 @@ def _in_process(task: Task, failed: dict[Task, str], members: dict[str, list[Any
     (results,) = _HERE
     results.failed, results.members = failed, members
     results.value(task)
+
+
+def _drop(table: dict[str, Any], path: Sequence[str]) -> None:
+    """Take a value out of nested tables, and the tables that this leaves empty."""
+    name, *rest = path
+    if rest and isinstance(table.get(name), dict):
+        _drop(table[name], rest)
+    if not rest or table.get(name) == {}:
+        table.pop(name, None)
 
 
 def _put(table: dict[str, Any], path: Sequence[str], value: Any) -> None:

@@ -33,13 +33,15 @@ class FolderLayout:
     """Layout of a folder of one kind of run.
 
     inputs: name of its first input file; header: first line of that file, which identifies the folder;
-    results: files and folders by name or pattern; optional: inputs that a run may lack.
+    results: files and folders by name or pattern; optional: inputs that a run may lack; to_fill: results that
+    are filled in by hand, which stay whatever the inputs become.
     """
 
     inputs: str
     header: str
     results: tuple[str, ...]
     optional: tuple[str, ...] = ()
+    to_fill: tuple[str, ...] = ()
 
     def is_of(self, folder: Path) -> bool:
         """Return True if a folder is of such a run."""
@@ -78,7 +80,7 @@ def claim(folder: Path, layout: FolderLayout, inputs: Mapping[str, str]) -> None
             )
     before = {name: _read(folder / name) for name in may if (folder / name).is_file()}
     if any(not _same(name, text, inputs.get(name)) for name, text in before.items()):
-        _set_aside(folder, (*may, *layout.results, *ALWAYS))
+        _set_aside(folder, [n for n in (*may, *layout.results, *ALWAYS) if n not in layout.to_fill])
     keep_inputs(folder, inputs, layout.inputs)
 
 

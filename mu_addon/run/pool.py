@@ -17,6 +17,10 @@ Task = TypeVar("Task")
 Found = TypeVar("Found")
 
 
+class WorkerDiedError(MuError):
+    """A process of a pool ended before its work."""
+
+
 class Pool:
     """Processes of one thread each that end with this one; started on demand, until closed.
 
@@ -54,7 +58,7 @@ class Pool:
         try:
             yield
         except BrokenProcessPool:
-            raise MuError(
+            raise WorkerDiedError(
                 "a worker process ended unexpectedly",
                 self.what,
                 "run the command again, it resumes; if memory is short, use --workers 1",

@@ -39,6 +39,8 @@ class Results:
         self._contents: dict[str, str] = {}
         self._values: dict[Task, Any] = {}
         self._digests: dict[Task, str] = {}
+        # Known to have no result so far: asked again once something was made.
+        self._missing: set[Task] = set()
 
     def given(self, name: str) -> Any:
         """An input, or a value derived from inputs; made once."""
@@ -56,8 +58,10 @@ class Results:
 
     def _wanted(self, task: Task, name: str) -> Any:
         """What a task takes of another stage: a member, or a list of members."""
-        over = self.stages[task[0]].over
-        needs = over.needs(self.study, task[1]) if over else {}
+        stage = self.stages[task[0]]
+        needs = stage.over.needs(self.study, task[1]) if stage.over else {}
+        if unknown := set(needs) - set(stage.needs):
+            raise TypeError(f"stage {stage.name} has no parameter {', '.join(unknown)}")
         if name in needs:
             return needs[name]
         return self.members.get(name, []) if self.stages[name].over else None
@@ -86,14 +90,23 @@ class Results:
     def digest(self, task: Task) -> str | None:
         """Hash of a result's content, or None while there is none."""
         if task not in self._digests:
-            name = None if task in self.failed or task[0] not in self.members else self.key(task)
-            if name is None:
+            if task in self._missing:
                 return None
-            if not self.stages[task[0]].kept:
+            name = self._name(task)
+            if name is not None and not self.stages[task[0]].kept:
                 self._digests[task] = name
-            elif not self._load(task, name):
+            elif name is None or not self._load(task, name):
+                self._missing.add(task)
                 return None
         return self._digests[task]
+
+    def _name(self, task: Task) -> str | None:
+        """Key of a task that may have a result, else None."""
+        if task in self.failed or task[0] not in self.members:
+            return None
+        if task[1] not in self.members[task[0]]:
+            raise TypeError(f"stage {task[0]} has no member {task[1]!r}")
+        return self.key(task)
 
     def is_kept(self, task: Task) -> bool:
         """Return True if a result is in the cache."""
@@ -128,7 +141,7 @@ class Results:
     def value(self, task: Task) -> Any:
         """A result: remembered, from the cache, or made now. Raises Dropped where it has none."""
         if task not in self._values:
-            name = None if task in self.failed or task[0] not in self.members else self.key(task)
+            name = self._name(task)
             if name is None:
                 raise Dropped
             if not self.stages[task[0]].kept or not self._load(task, name):
@@ -151,10 +164,14 @@ class Results:
         values = {n: self._of_parameter(task, n) for n in stage.needs} | stage.of_member(member)
         if TELL in parameters_of(stage.method):
             values[TELL] = Tell(self.progress)
-        found = stage.method(self.study, **values)
+        # Without the study: what a stage does not name cannot decide its result.
+        found = stage.method(None, **values)
         self._values[task], self._digests[task] = found, name
+        self._missing.clear()
         if stage.kept:
             arrays = packed(found)
+            if content(unpacked(stage.result_type, arrays)) != content(found):
+                raise TypeError(f"stage {stage.name} does not give a {stage.result_type}")
             digest = key(*(part for item in sorted(arrays.items()) for part in item))
             self.cache.put(stage.name, name, {**arrays, _CONTENT: np.asarray(digest)})
             self._digests[task] = digest
@@ -165,9 +182,18 @@ class Results:
         wanted = self._wanted(task, name)
         return self.several(name, wanted) if isinstance(wanted, list) else self.value((name, wanted))
 
-    def forget(self, is_needed: Callable[[str], bool]) -> None:
-        """Release results of stages that are not needed, and that are kept or can be made anew."""
-        for name, member in [*self._values]:
-            stage = self.stages[name]
-            if not is_needed(name) and (stage.kept or not stage.title):
-                del self._values[name, member]
+    def forget(self, is_needed: Callable[[Task], bool]) -> None:
+        """Release results that are not needed, and that are kept or can be made anew."""
+        for task in [*self._values]:
+            stage = self.stages[task[0]]
+            if not is_needed(task) and (stage.kept or not stage.title):
+                del self._values[task]
+
+    def grow(self, name: str, members: Sequence[Any]) -> None:
+        """Add members to a stage's set; what was made in memory of the smaller set is forgotten."""
+        self.members[name] = [*self.members[name], *members]
+        self._missing.clear()
+        for task in [*self._digests]:
+            if not self.stages[task[0]].title:
+                del self._digests[task]
+                self._values.pop(task, None)

@@ -121,9 +121,11 @@ def content(value: Any) -> str:
 
 def _feed(digest: hashlib._Hash, value: Any) -> None:
     """Add a value to a digest, each part after its kind and size, so that none runs into the next."""
+    if isinstance(value, np.generic):
+        value = value.item()
     if value is None or isinstance(value, (*_PLAIN, bytes)):
         digest.update(f"{type(value).__name__} {value!r};".encode())
-    elif isinstance(value, np.ndarray | np.generic):
+    elif isinstance(value, np.ndarray):
         digest.update(f"array {value.shape} {value.dtype.str};".encode())
         # Its memory as it is: a copy of a large array would double it.
         digest.update(np.ascontiguousarray(value).data)
@@ -146,8 +148,9 @@ def _feed(digest: hashlib._Hash, value: Any) -> None:
                 _feed(digest, getattr(value, field.name))
     elif isinstance(value, type):
         digest.update(f"{value.__module__}.{value.__qualname__};".encode())
-    elif isinstance(value, types.FunctionType):
+    elif isinstance(value, types.FunctionType) and value.__closure__ is None:
         code = value.__code__
-        digest.update(f"{value.__qualname__} {code.co_names} ".encode() + code.co_code)
+        constants = [c for c in code.co_consts if isinstance(c, _PLAIN)]
+        digest.update(f"{value.__qualname__} {code.co_names} {constants}".encode() + code.co_code)
     else:
         raise TypeError(f"the content of a {type(value).__name__} is unknown: give it `hash()`")

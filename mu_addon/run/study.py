@@ -81,6 +81,10 @@ class Input:
         """The value, its keys taken out of what was found; raises InputError."""
         raise NotImplementedError
 
+    def file_names(self, name: str) -> tuple[str, ...]:
+        """Names of the further files that it may have."""
+        return ()
+
 
 @attrs.frozen
 class Found:
@@ -171,16 +175,19 @@ def stage(
     revision: int = 1,
     parallel: bool = False,
 ) -> Callable[[Any], Any]:
-    """A method that makes one result, or one for each member of a set.
+    """A method that makes one result, or one for each member of a set; its `self` is None.
 
     title: of its progress, with a set's names in braces; members of one title are one stage to a user.
     seconds: expected on two cores, of the study; of a set, for all members of one title. wanted: False of a
-    study that does without it. kept: in the cache, which needs a result of arrays, numbers, texts and attrs
-    classes of these; else it is made in each run, without a title only when something takes it. failing:
-    words for a warning; an error of the stage then does not end the run, and what needs it is left out.
-    revision: raise it when a change of the code changes the result. parallel: members may be made in
-    processes of their own, the study's `workers`, side by side with other parallel stages of the same title.
+    study that does without it. kept: in the cache, which needs a result of the type that the method declares,
+    of arrays, numbers, texts and attrs classes of these; else it is made in each run. failing: words for a
+    warning; an error of the stage then does not end the run, and what needs it is left out. revision: raise
+    it when a change of the code changes the result. parallel: members may be made in processes of their own,
+    the study's `workers`, side by side with other parallel stages of the same title.
     """
+
+    if parallel and not kept:
+        raise TypeError(f"stage {title!r}: what another process makes must be kept")
 
     def mark(method: Any) -> Any:
         in_time = seconds if callable(seconds) else lambda study: seconds
@@ -192,6 +199,11 @@ def stage(
         return method
 
     return mark
+
+
+def intermediate(over: Over | None = None) -> Callable[[Any], Any]:
+    """A method that makes something in memory, such as a model, whenever a stage takes it; it is not kept."""
+    return stage("", kept=False, over=over)
 
 
 def derived(method: Any) -> Any:
@@ -280,11 +292,13 @@ class Study:
     """Base of all studies; see the module.
 
     name: of its command; its inputs are in `name`.toml. files: content of each file of the run's folder, by
-    name or pattern. example: a command line. node: None of a study that is no node.
+    name or pattern; to_fill: files that are filled in by hand, which no run removes. example: a command line.
+    node: None of a study that is no node.
     """
 
     name: ClassVar[str]
     files: ClassVar[Mapping[str, str]]
+    to_fill: ClassVar[tuple[str, ...]] = ()
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
 
@@ -327,7 +341,9 @@ class Study:
     @classmethod
     def layout(cls) -> FolderLayout:
         """The files of its folder."""
-        return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", (*cls.files, "report.html"))
+        optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
+        results = (*cls.files, "report.html")
+        return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", results, optional, cls.to_fill)
 
     # Inputs as files.
 
@@ -352,12 +368,15 @@ class Study:
         path = folder / cls.layout().inputs
         keys, run = read_inputs(path)
         found = Found(path, keys, run, {})
+        special = {}
         for name, one in cls.inputs().items():
             if one.kind != "setting":
-                found.given[name] = one.read(name, found)
-            elif not one.decides and name in run:
+                special[name] = found.given[name] = one.read(name, found)
+                continue
+            if not one.decides and name in run:
                 keys[name] = run[name]
-        return structured(cls, keys, str(path), **found.given)
+            found.given[name] = keys.get(name, one.descriptions[0].default)
+        return structured(cls, keys, str(path), **special)
 
 
 def _marked(cls: Any, mark: str, bare: bool = False) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..files import json_text
 from ..run.inputs import digest, named_path, require_digest
 from ..run.parts import Beside, Chart, Fact, Fault, File, Part, Pictures, Sentence, Table, Warn, recorded
-from ..run.study import Found, Input, Node, Study, Tell, Written, given, section, setting, stage
+from ..run.study import Found, Input, Node, Study, Tell, Written, given, intermediate, section, setting, stage
 from .inputs import NumbersInput, OnceInput, PrinterInput, UnitInput, WindowInput
 
 MOST_TRIANGLES = 1_000_000
@@ -260,7 +260,7 @@ class Check(Study):
         tell.made(f"{len(found.triangles)} triangles")
         return found
 
-    @stage("", kept=False)
+    @intermediate()
     def nominal(
         self, unit: design.Unit | None, stl: PartFile | None, path: design.Window | None, quality: str
     ) -> Surface | None:

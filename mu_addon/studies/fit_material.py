@@ -15,7 +15,7 @@ from ..design.quantity import described
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
 from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, recorded
-from ..run.study import Members, Over, Study, derived, given, section, setting, stage
+from ..run.study import Members, Over, Study, derived, given, intermediate, section, setting, stage
 from .inputs import MeasuredInput, WordsInput
 
 TITLES = {"uniaxial": "uniaxial", "equibiaxial": "equibiaxial", "pure_shear": "pure shear"}
@@ -134,7 +134,7 @@ class FitMaterial(Study):
         except InputError:
             return {}
 
-    @stage("", kept=False)
+    @intermediate()
     def fitting(self, coupons: tuple[Coupons, Coupons], fits: Members, unseen: Members) -> Fitting:
         """All of it, with the law that is chosen."""
         fitted, held = coupons

@@ -12,7 +12,20 @@ from ..design.quantity import described
 from ..errors import InputError
 from ..meshing.settings import REFINE
 from ..run.parts import Beside, Chart, Fact, File, Part, Pictures, Sentence, Table, Warn, csv, recorded
-from ..run.study import Dropped, Members, Node, Over, Study, Tell, derived, given, section, setting, stage
+from ..run.study import (
+    Dropped,
+    Members,
+    Node,
+    Over,
+    Study,
+    Tell,
+    derived,
+    given,
+    intermediate,
+    section,
+    setting,
+    stage,
+)
 from .inputs import Resin, ResinInput, UnitInput
 
 FRICTIONS: tuple[homogenize.Friction, ...] = ("slide", "stick")
@@ -167,12 +180,12 @@ class Homogenize(Study):
         tell.made(f"{len(mesh.nodes)} nodes and {len(mesh.tets)} elements")
         return mesh
 
-    @stage("", kept=False)
+    @intermediate()
     def mesh(self, octant: meshing.Mesh, cell: design.StrutCell) -> meshing.Mesh:
         """The eighth at the cell's size."""
         return attrs.evolve(octant, nodes=octant.nodes * cell.half_mm)
 
-    @stage("", kept=False)
+    @intermediate()
     def filled(
         self, mesh: meshing.Mesh, cell: design.StrutCell, stiffness: tuple[float, float]
     ) -> fem.Materials:
@@ -236,7 +249,7 @@ class Homogenize(Study):
         """An eighth of the block's cell, at a size of 2 mm."""
         return homogenize.mesh_cell(shape, coarse)
 
-    @stage("", kept=False, wanted=lambda study: study.frictions)
+    @intermediate()
     def specimen(
         self, block_octant: meshing.Mesh, cell: design.StrutCell, cells: int, stiffness: tuple[float, float]
     ) -> homogenize.Specimen:
@@ -244,7 +257,7 @@ class Homogenize(Study):
         mesh = attrs.evolve(block_octant, nodes=block_octant.nodes * cell.half_mm)
         return homogenize.block_specimen(mesh, cells, homogenize.cell_materials(cell, mesh, *stiffness))
 
-    @stage("", kept=False, over=Over(("contact",), lambda study: study.frictions))
+    @intermediate(Over(("contact",), lambda study: study.frictions))
     def plates(self, contact: homogenize.Friction, specimen: homogenize.Specimen) -> homogenize.Plates:
         """The plates and the block's equations."""
         return homogenize.Plates(specimen, contact)
@@ -288,10 +301,8 @@ class Homogenize(Study):
             raise Dropped
         return homogenize.limits_of(specimen, contact, list(states.values()))
 
-    @stage(
-        "",
-        kept=False,
-        over=Over(
+    @intermediate(
+        Over(
             ("contact",),
             lambda study: study.frictions,
             lambda study, friction: {

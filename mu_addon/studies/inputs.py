@@ -38,6 +38,10 @@ class UnitInput(Input):
             return None
         return design.read_unit(found.path.parent / UNIT)
 
+    def file_names(self, name: str) -> tuple[str, ...]:
+        """Its file."""
+        return (UNIT,)
+
 
 @attrs.frozen
 class WordsInput(Input):
@@ -147,13 +151,17 @@ class MaterialInput(Input):
         """Its name, and its file unless it is the usual one."""
         if value is None:
             return Written({name: USUAL_RESIN})
-        return Written({name: value.name}, files={f"{name}.toml": materials.material_text(value)})
+        return Written({name: f"{name}.toml"}, files={f"{name}.toml": materials.material_text(value)})
 
     def read(self, name: str, found: Found) -> materials.Material | None:
-        """The resin of the folder; raises InputError."""
-        found.keys.pop(name, None)
-        kept = found.path.parent / f"{name}.toml"
-        return materials.read_material(kept) if kept.is_file() else None
+        """The resin that the file names; raises InputError."""
+        if found.keys.pop(name, USUAL_RESIN) == USUAL_RESIN:
+            return None
+        return materials.read_material(found.path.parent / f"{name}.toml")
+
+    def file_names(self, name: str) -> tuple[str, ...]:
+        """Its file."""
+        return (f"{name}.toml",)
 
 
 @attrs.frozen
@@ -226,7 +234,7 @@ class NumbersInput(Input):
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> tuple[float, ...]:
         """The numbers of a text, or a list of them; raises InputError."""
         if len(self.descriptions) > 1:
-            return tuple(float(value) for value in values)
+            return tuple(d.checked(float(value)) for d, value in zip(self.descriptions, values, strict=True))
         words = values[0].split() if isinstance(values[0], str) else values[0] or ()
         try:
             return tuple(float(word) for word in words)

@@ -71,6 +71,8 @@ class Specimens(Study):
         TEMPLATE: "templates that `diagnose` reads once they are filled in",
     }
 
+    to_fill = ("gauge.csv", "limits.csv", TEMPLATE)
+
     unit: design.Unit = given(UnitInput(default=PRESET))
     resin: materials.Material | None = given(
         MaterialInput(

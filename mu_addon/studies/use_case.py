@@ -27,7 +27,7 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
     """Make every result of a study in its folder, and report those that there are."""
     from ..report.study_page import write_page
 
-    work = Execution(job, folder, context)
+    work: Execution = context.work or Execution(job, folder, context)
     context.report = lambda stopped: write_page(work, stopped)
     context.console_summary = lambda summary: work.lines
     work.run()
@@ -41,4 +41,5 @@ def run(job: Study, folder: Path, context: RunContext) -> Execution:
 
 def plan(job: Study, folder: Path, context: RunContext) -> Plan:
     """Stages with the seconds that are left of each."""
-    return [*Execution(job, folder, context).plan(), ("report", REPORT_S)]
+    context.work = Execution(job, folder, context)
+    return [*context.work.plan(), ("report", REPORT_S)]

@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from mu_addon.design.quantity import described
-from mu_addon.errors import ConvergenceError, InputError
+from mu_addon.errors import ConvergenceError, InputError, OutputError
 from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
-from mu_addon.run.parts import Fact, Sentence, csv
+from mu_addon.run.parts import Fact, Sentence, Warn, csv
 from mu_addon.run.progress import Progress
 from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
-from mu_addon.run.study import Dropped, Over, Study, derived, section, setting, stage
+from mu_addon.run.study import Dropped, Over, Study, derived, intermediate, section, setting, stage
 from mu_addon.studies import STUDIES, study
 
 CALLS = []
@@ -61,7 +61,7 @@ class Spring(Study):
         CALLS.append("rest")
         return State(0.0, np.zeros(rounded))
 
-    @stage("", kept=False)
+    @intermediate()
     def model(self, stiffness: float) -> float:
         CALLS.append("model")
         return stiffness
@@ -265,7 +265,7 @@ class Race(Study):
     def pace(self, paces):
         return tuple(float(pace) for pace in paces.split())
 
-    @stage("", kept=False)
+    @intermediate()
     def ground(self, pace: tuple) -> int:
         return os.getpid()
 
@@ -335,6 +335,95 @@ def test_a_set_grows_from_its_results_and_a_resumed_one_alike(tmp_path):
 def test_an_error_in_a_process_is_that_of_the_stage(tmp_path):
     with pytest.raises(ConvergenceError, match="out of breath"):
         raced(tmp_path, paces="10 2", workers=2)
+
+
+# What a declaration must not do, and what may go wrong.
+
+
+def declared(**parts):
+    """A study of these stages and sections."""
+    body = {"name": "toy", "files": MappingProxyType({}), "title": lambda self: "toy", **parts}
+    return attrs.frozen(kw_only=True, eq=False)(type("Toy", (Study,), body))
+
+
+def test_a_stage_cannot_depend_on_what_it_does_not_name(tmp_path):
+    def uses_its_study(self) -> float:
+        return self.size
+
+    kind = declared(stiff=stage("stiff")(uses_its_study))
+    with pytest.raises(AttributeError):
+        Execution(kind(), tmp_path, RunContext(Progress())).run()
+
+
+@pytest.mark.parametrize(
+    ("hint", "given"), [(list, [1.0]), (float, 0), (dict[int, float], {1: 2.0}), (str, 1.0)]
+)
+def test_a_result_of_another_type_than_declared_is_refused_at_once(tmp_path, hint, given):
+    def made(self):
+        return given
+
+    made.__annotations__["return"] = hint
+    kind = declared(made=stage("made")(made))
+    with pytest.raises((TypeError, ValueError)):
+        Execution(kind(), tmp_path, RunContext(Progress())).run()
+
+
+def test_a_full_disk_is_no_left_out_member(tmp_path):
+    def full(self) -> float:
+        raise OutputError("the disk is full")
+
+    kind = declared(full=stage("full", failing="Full")(full))
+    with pytest.raises(OutputError):
+        Execution(kind(), tmp_path, RunContext(Progress())).run()
+
+
+def test_a_misspelt_need_is_named(tmp_path):
+    def first(self, k: int, first: dict) -> float:
+        return 1.0
+
+    over = Over(("k",), lambda study: [1, 2], lambda study, k: {"frist": 1})
+    kind = declared(first=stage("first", over=over)(first))
+    with pytest.raises(TypeError, match="frist"):
+        Execution(kind(), tmp_path, RunContext(Progress())).run()
+
+
+def test_a_long_chain_of_members_is_planned_and_made(tmp_path):
+    def step(self, k: int, step: dict) -> int:
+        return k + sum(step.values())
+
+    over = Over(("k",), lambda study: range(700), lambda study, k: {"step": [k - 1] if k else []})
+    kind = declared(step=stage("step", over=over)(step))
+    work = Execution(kind(), tmp_path, RunContext(Progress()))
+    assert len(work.plan()) == 1
+    work.run()
+    assert work.results.value(("step", 699)) == sum(range(700))
+
+
+def test_what_was_shown_of_a_part_is_gone_once_all_is_there(tmp_path):
+    def slow(self, k: int) -> int:
+        return k
+
+    def seen(self, slow):
+        yield Fact("k", 1, key="parts.first" if not slow.complete else "parts.all")
+        if not slow.complete:
+            yield Warn("some are missing")
+
+    kind = declared(
+        slow=stage("slow", over=Over(("k",), lambda study: range(3)))(slow),
+        seen=section("seen", "Seen")(seen),
+    )
+    context = RunContext(Progress())
+    work = Execution(kind(), tmp_path, context)
+    work.results.value(("slow", 0))
+    work.show()
+    assert context.summary == {"parts": {"first": 1}, "warnings": ["some are missing"]}
+    work.run()
+    assert context.summary == {"parts": {"all": 1}}
+
+
+def test_what_another_process_makes_must_be_kept():
+    with pytest.raises(TypeError, match="must be kept"):
+        stage("race", parallel=True, kept=False)
 
 
 # Results as arrays.

@@ -403,6 +403,13 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     run(use_case("specimens"), Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    for scale in (0.75, 1.5):
+        unit = attrs.evolve(Unit(), scale=scale)
+        run(use_case("specimens"), Specimens(unit=unit, resin=None, printer=load_printer()), printed[0])
+    now = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert {name: now[name] for name in before} == before
+    # The resin of the first run is not that of the last.
+    assert Specimens.read(printed[0]).resin is None
 
 
 def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
