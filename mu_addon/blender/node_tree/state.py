@@ -151,6 +151,8 @@ def show_units(context: Any, tree: Any) -> list[Any]:
         after = (link.to_node for out in node.outputs for link in out.links)
         if any(hasattr(other, "follower") and other.name in designs for other in after):
             continue
+        if context.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
         root = unit_object.create(context, design.unit)
         root.mu_unit.path = design.path
         landing.land(context, root)
