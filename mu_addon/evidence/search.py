@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
-from .effect import BATCH, CAMERA, CURVED_CELL, FORCE_SCALE, GEOMETRY, HEATING, STEP, THICKNESS, Effect
+from .effect import BATCH, CAMERA, CURVED_CELL, HEATING, OF, STEP, THICKNESS, Effect
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined
@@ -22,7 +22,7 @@ MOST_EFFECTS = 3
 # Ratio of the gain by scales of single tests to a first effect's, above which no second is tried.
 ELSEWHERE = 4.0
 # Changes of the scale of some tests, and what differs among specimens that would do as much.
-OF_SOME = frozenset((STEP, HEATING, FORCE_SCALE, GEOMETRY))
+OF_SOME = frozenset((STEP, HEATING))
 OF_SPECIMENS = frozenset((BATCH, THICKNESS))
 # Faults that two physical effects together imitate.
 IMITATED = CAMERA | {CURVED_CELL}
@@ -347,12 +347,18 @@ def _beside_the_step(found: Selection, fits: Sequence[tuple[float, Fit]]) -> Sel
         and fit.chi2 < found.chosen.chi2 + RIVAL_DELTA_CHI2
     ]
     causes = [
-        attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *found_too))))
+        attrs.evolve(c, rivals=tuple(dict.fromkeys((*c.rivals, *(t for t in found_too if _new(t, c))))))
         if c.effect.whose and c.effect.name in OF_SOME
         else c
         for c in found.causes
     ]
     return attrs.evolve(found, causes=tuple(causes))
+
+
+def _new(title: str, cause: Cause) -> bool:
+    """Return True if a difference among specimens is not that of one specimen, which is a rival already."""
+    name = title.partition(" ")[0]
+    return not any(t.startswith(f"{name}{OF}") for t in cause.rivals)
 
 
 def further_owners(

@@ -107,6 +107,7 @@ def test_a_law_that_refines_is_offered_apart():
     simulator = Composite({"coupon": CouponStress([e])})
     assert {r.name for r in simulator.refinements} == {
         "force_drift",
+        "frame_compliance",
         "force_lag",
         "rate_independent_hysteresis",
         "viscoelasticity",

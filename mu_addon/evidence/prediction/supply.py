@@ -14,9 +14,9 @@ Array = np.ndarray[Any, Any]
 
 SHORT, SLOW = f"{SUPPLY_LIMIT}.short_kPa", f"{SUPPLY_RATE}.slowness_s_kPa"
 # Of the largest pressure: what a supply may fall short by, and where fits begin.
-MOST_SHORT, STARTS = 0.8, (0.05, 0.2)
+MOST_SHORT, STARTS = 0.8, (0.15,)
 # Share of a record's changes that are slower than its fastest; of those the time a kPa, times the starts.
-FASTEST, LONGER, LONGEST = 0.95, (1.5, 4.0), 50.0
+FASTEST, LONGER, LONGEST = 0.95, (2.0,), 50.0
 
 
 def supply(kind: str, experiments: Sequence[Experiment]) -> tuple[Effect, ...]:
