@@ -92,9 +92,7 @@ class Specimens(Study):
     @derived
     def parts(self, unit: design.Unit, printer: design.Printer) -> dict[str, Specimen]:
         """Every part by its name."""
-        limits = design.limit_parts(printer, math.sqrt(0.75) * unit.dimensions.cell)
-        every = [*specimens(unit), *(Specimen(p.name, p.make, p.measure) for p in limits)]
-        return {one.name: one for one in every}
+        return parts_of(unit, printer)
 
     @derived
     def material(self, resin: materials.Material | None) -> materials.Material:
@@ -105,15 +103,15 @@ class Specimens(Study):
         "specimens",
         4.0,
         kept=False,
-        over=Over(("part",), lambda study: list(study.parts(study.unit, study.printer))),
+        over=Over(("part",), lambda study: list(parts_of(study.unit, study.printer))),
     )
-    def printed(self, part: str, parts: dict[str, Specimen]) -> Printed:
+    def printed(self, part: str, unit: design.Unit, printer: design.Printer) -> Printed:
         """A part's STL, read back."""
         import numpy as np
 
         from ..design.surface import bad_edges, stl_bytes, stl_surface, volume
 
-        vertices, triangles = parts[part].make()
+        vertices, triangles = parts_of(unit, printer)[part].make()
         enclosed, content = volume(vertices, triangles), stl_bytes(vertices, triangles)
         points, faces = stl_surface(content)
         again = volume(points, faces)
@@ -246,6 +244,13 @@ class Specimens(Study):
 def _to_fill(name: str, text: Callable[[], str]) -> File:
     """A file that is filled in at the bench: one that is there is left."""
     return File(name, lambda path: None if path.exists() else text())
+
+
+def parts_of(unit: design.Unit, printer: design.Printer) -> dict[str, Specimen]:
+    """Every part by its name."""
+    limits = design.limit_parts(printer, math.sqrt(0.75) * unit.dimensions.cell)
+    every = [*specimens(unit), *(Specimen(p.name, p.make, p.measure) for p in limits)]
+    return {one.name: one for one in every}
 
 
 def experiments(parts: Mapping[str, Specimen]) -> str:
