@@ -98,6 +98,7 @@ class MU_MT_object(bpy.types.Menu):
         for key, name, _ in handles.ITEMS:
             layout.operator("mu.drag", text=f"Drag {name}", icon="ARROW_LEFTRIGHT").what = key
         layout.separator()
+        layout.operator_menu_enum("mu.resin", "name", icon="MATERIAL")
         layout.operator("mu.simulate", icon="PLAY")
         layout.operator_menu_enum("mu.field_show", "field", text="Show on the Unit", icon="SHADING_RENDERED")
         layout.separator()
