@@ -22,7 +22,8 @@ DENSITY = 1.01
 
 @pytest.fixture(scope="module")
 def unit():
-    return UNIT
+    """Short and of a stiff wall: no lattice bears what presses on it."""
+    return UNIT.evolve(count=3, membrane_modulus_kPa=3 * UNIT.material.membrane_modulus_kPa)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +79,8 @@ def test_a_free_tip_on_a_plate_bends_about_as_the_unit_does(unit, mesh, learned)
     equilibrium = Equilibrium(Model(half, threads=1), materials_of(unit, half))
     state = equilibrium.reach(0.02, [rest(half)])
     angle = bending_angle_deg(half, state.u)
-    # Positive toward +y, a negative rotation about x. A plate on the tip can only stiffen it.
-    assert 0.9 * angle < -np.degrees(learned.joint.at(20.0).eta0[0]) < angle
+    # Positive toward +y, a negative rotation about x. Without a plate the tip's face bulges as well.
+    assert 0.9 * angle < -np.degrees(learned.joint.at(20.0).eta0[0]) < 1.05 * angle
 
 
 @pytest.mark.slow
