@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.chain import Chain, Link, Loads, Sampling, learn
 from mu_addon.chain.rigid_motion import rotation_vector
 from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.errors import InputError
 from mu_addon.fem import Equilibrium, Model, materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.run.cache import Cache
 
 from ..evidence.hollow_finger import UNIT, finger

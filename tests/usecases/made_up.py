@@ -5,12 +5,12 @@ import functools
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.run import run_stages
