@@ -96,6 +96,10 @@ def place(folder, job):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "solve_model_a", model_a)
         patch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", Waveguides)
+        # Seeking crossings in made-up states takes minutes.
+        patch.setattr(
+            "mu_addon.usecases.simulate_and_place.motion_checks.first_self_intersection", lambda *_: None
+        )
         patch.setattr(graph_search, "_stable", lambda study, *_: study.trajectory)
         patch.setattr(graph_search, "influence_map", influence)
         patch.setattr(graph_search, "_predicted", lambda study, graph, chains: 0.1 + np.arange(len(chains)))
