@@ -10,6 +10,7 @@ import time
 import attrs
 
 from benchmarks.table import circumstances, options_of, print_head
+from mu_addon.body import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem import factor, model, self_contact
 from mu_addon.fem.bending_angle import bending_angle_deg
@@ -18,7 +19,6 @@ from mu_addon.fem.newton_settings import RESOLVED_CONTACT_NEWTON
 from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of, self_contact_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved import mesh_printed
 
 BARRIER = "pairs, distances and the barrier's derivatives"
 PATTERNS = "new patterns, their order and analysis"

@@ -17,6 +17,7 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from benchmarks.table import options_of
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design import shapes
 from mu_addon.design.dimensions import Dimensions
 from mu_addon.design.lattice import lattice_of
@@ -35,9 +36,8 @@ from mu_addon.meshing.mesh import (
     second_order,
 )
 from mu_addon.meshing.quality import dihedral_angles, element_volumes, folded_corners
-from mu_addon.resolved.printed_mesh import mesh_printed
 
-from ..resolved.convergence import angles, resin
+from ..body.convergence import angles, resin
 from .remesh import Reference, remesh
 
 COARSE = Facets(around_axis=64, along_arc=4, around_strut=8, along_strut=8)

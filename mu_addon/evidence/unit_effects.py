@@ -51,7 +51,7 @@ OBSTACLE_HALVINGS = 2
 @lru_cache(maxsize=2)
 def _mesh_kept(unit: Unit, settings: MeshSettings, cache: Path | None) -> Mesh:
     """A unit's mesh, cached: a process makes many runs of one unit."""
-    from ..resolved.printed_mesh import mesh_printed
+    from ..body.printed_mesh import mesh_printed
 
     return mesh_printed(unit, settings, cache=cache)
 
@@ -79,7 +79,7 @@ class Body:
 
     def meshed(self, cache: Path | None = None) -> Mesh:
         """The unit's mesh; raises InputError and MeshingError. cache: see `mesh_printed`."""
-        from ..resolved.printed_mesh import mesh_printed
+        from ..body.printed_mesh import mesh_printed
 
         # One of a changed unit is used once.
         make = mesh_printed if self.drawn else _mesh_kept

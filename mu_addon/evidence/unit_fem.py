@@ -12,13 +12,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..body.printed_mesh import mesh_printed
 from ..design.parameters import Unit
 from ..errors import ConvergenceError, InputError
 from ..measured import Experiment
 from ..measured.pose import Direction, X
 from ..meshing.mesh import AXES
 from ..meshing.settings import SELF_CONTACT, MeshSettings
-from ..resolved.printed_mesh import mesh_printed
 from ..run.cache import Cache
 from ..run.pool import each
 from ..run.processes import cores

@@ -11,6 +11,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..body.candidates import states_along
+from ..body.morph import PrintedMorph
+from ..body.printed_mesh import mesh_printed
+from ..body.waveguide import bar_of, moved_with_waveguide, with_waveguide
 from ..design.anchors import anchor_points, window
 from ..design.body import Body, envelope
 from ..design.parameters import Unit
@@ -22,10 +26,6 @@ from ..fem.newton_settings import RESOLVED_CONTACT_NEWTON, RESOLVED_NEWTON, Newt
 from ..fem.unit_materials import materials_of, relocated_contact, self_contact_of
 from ..meshing.mesh import Mesh
 from ..meshing.settings import MeshSettings
-from ..resolved.candidates import states_along
-from ..resolved.morph import PrintedMorph
-from ..resolved.printed_mesh import mesh_printed
-from ..resolved.waveguide import bar_of, moved_with_waveguide, with_waveguide
 from .freedoms import Freedom, changed_unit
 from .gradient import Pair
 from .structure import Structure

@@ -170,7 +170,7 @@ def test_print_offset_is_added_and_not_multiplied():
     assert radii == pytest.approx(np.tile([0.8 * 0.75 + 0.1, 0.8 * 1.0 + 0.1], (len(radii), 1)), rel=1e-9)
 
 
-@pytest.mark.nightly("tests/resolved/test_graded.py::test_an_even_grading_is_other_diameters")
+@pytest.mark.nightly("tests/body/test_graded.py::test_an_even_grading_is_other_diameters")
 def test_an_even_grading_is_other_diameters():
     """The printable solid of factor f everywhere is that of diameters f times as large, drawn otherwise."""
     graded = build_solid(with_grading(cells="* * *: 0.8"), window(UNIT, "alpha4"))

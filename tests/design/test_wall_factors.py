@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mu_addon.body.printed_mesh import Sizes, wall_mesh
 from mu_addon.design import load_preset
 from mu_addon.design.parameters import from_toml, to_toml
 from mu_addon.design.profile import (
@@ -21,7 +22,6 @@ from mu_addon.design.profile import (
 from mu_addon.design.wall_factors import canonical_text, factor_at, parsed, text_of
 from mu_addon.errors import InputError
 from mu_addon.meshing.quality import cavity_enclosed, element_volumes
-from mu_addon.resolved.printed_mesh import Sizes, wall_mesh
 
 PLAIN = load_preset("mu-1.0x")
 
@@ -100,7 +100,7 @@ def test_print_adds_to_every_wall_alike():
 
 
 def test_a_mesh_has_the_wall_that_is_drawn():
-    """As near as that of even walls is held to in `tests/resolved/test_wall`."""
+    """As near as that of even walls is held to in `tests/body/test_wall`."""
     mesh = wall_mesh(UNEVEN.printed, Sizes())
     assert 2 * element_volumes(mesh).sum() == pytest.approx(membrane_volume(UNEVEN.dimensions), rel=2e-4)
     assert 2 * cavity_enclosed(mesh) == pytest.approx(cavity_volume(UNEVEN.dimensions), rel=1e-4)

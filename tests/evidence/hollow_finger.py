@@ -69,7 +69,7 @@ def beam(unit, settings=None, *_, **__):
 def in_place_of_units(made=finger):
     """Let evidence simulate such bodies."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mu_addon.resolved.printed_mesh.mesh_printed", made)
+        patch.setattr("mu_addon.body.printed_mesh.mesh_printed", made)
         patch.setattr("mu_addon.evidence.unit_fem.mesh_printed", made)
         unit_effects._mesh_kept.cache_clear()
         yield

@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_effects
@@ -15,7 +16,6 @@ from mu_addon.fem.beam_fibres import Mixture, fibres_of
 from mu_addon.fem.beams import Beams, frames_along, sections_of
 from mu_addon.fem.laws import Foam, Layered, NeoHooke, Prony, Yeoh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 from .derivatives import assert_beams_consistent
 

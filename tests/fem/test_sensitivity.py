@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem import Layer, NeoHooke, Yeoh
 from mu_addon.fem.laws import CubicShear
@@ -11,7 +12,6 @@ from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.fem.sensitivity import of_residual
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from tests.fem.bodies import box
 
 PRESSURE = 0.01

@@ -3,12 +3,12 @@
 import attrs
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.grading import Grading
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.laws import NeoHooke
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))

@@ -17,7 +17,7 @@ PACKAGES = (
     "meshing",
     "optimization",
     "placement",
-    "resolved",
+    "body",
     "sensing",
 )
 

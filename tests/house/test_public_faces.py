@@ -23,7 +23,7 @@ PACKAGES = (
     "placement",
     "report",
 )
-PACKAGES += ("chain", "optimization", "resolved", "sensing")
+PACKAGES += ("chain", "optimization", "body", "sensing")
 HEAVY = ("bpy", "gmsh", "matplotlib", "meshio", "scipy", "trimesh", "warp")
 FOLDER = Path(mu_addon.__file__).parent
 

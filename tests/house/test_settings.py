@@ -41,7 +41,6 @@ OTHERWISE = {
     "evidence/prediction/specimen.py": {"strain"},
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
     "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
-    "evidence/unit_fem.py": {"self_contact"},
     "measured/experiment.py": {"orientation_deg"},
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points
 from mu_addon.fem.equilibrium import Equilibrium
@@ -15,7 +16,6 @@ from mu_addon.fem.trajectory import simulate, whole_body
 from mu_addon.meshing.mesh import LATTICE, mirror
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.sensitivity_map import influence_map, loaded, parities
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 UNIT = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.surface import volume
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, Mesh, mirror, second_order
@@ -14,7 +15,6 @@ from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report import unit_pictures as pictures
 from mu_addon.report.render import Part
 from mu_addon.report.unit_pictures import region_skin, skin
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 
 def cube(order, low=(0.0, -1.0, 0.0), high=(1.0, 1.0, 2.0)):

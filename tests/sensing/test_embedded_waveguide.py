@@ -8,13 +8,13 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.anchors import window
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.waveguide import waveguide
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import Limits, lattice_graph
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.sensing.embedded_waveguide import Joints, WaveguideShape, embed_waveguide
 from mu_addon.sensing.guide import Centreline
 from mu_addon.sensing.light_law import straight_guide

@@ -7,12 +7,12 @@ import os
 import attrs
 import numpy as np
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
 from mu_addon.usecases.simulate_and_place.motion_files import write_model_a

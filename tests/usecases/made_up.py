@@ -5,12 +5,12 @@ import functools
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.kinematics import probe
 from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.run import run_stages
@@ -96,6 +96,10 @@ def place(folder, job):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "solve_model_a", model_a)
         patch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", Waveguides)
+        # Seeking crossings in made-up states takes minutes.
+        patch.setattr(
+            "mu_addon.usecases.simulate_and_place.motion_checks.first_self_intersection", lambda *_: None
+        )
         patch.setattr(graph_search, "_stable", lambda study, *_: study.trajectory)
         patch.setattr(graph_search, "influence_map", influence)
         patch.setattr(graph_search, "_predicted", lambda study, graph, chains: 0.1 + np.arange(len(chains)))

@@ -218,7 +218,7 @@ def test_a_unit_is_judged_by_its_angle_and_markers(request, tmp_path, gauge_kPa)
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "fast cycles" in html
     # What it was simulated as stands under the title.
-    assert "held out; the unit with a homogenised lattice" in html
+    assert "held out; the unit as printed, walls" in html
     # Of each experiment the angle and the two markers that move most; the rest is in the table.
     assert f"{3 * (len(analytic.CHANNELS) - 3)} more channels are in residuals.csv." in html
     channels = {r["channel"] for r in csv.DictReader((out / "residuals.csv").open())}

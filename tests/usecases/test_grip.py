@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main
 from mu_addon.design.assets import asset_root
 from mu_addon.design.gripper import load_gripper
@@ -19,7 +20,6 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.report.pc2 import read_pc2
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.grip.grasp import grasp
 from mu_addon.usecases.grip.motion_files import even, write_halves
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
@@ -248,7 +248,7 @@ def short_gripper(folder):
 
 
 @pytest.mark.nightly(
-    "tests/resolved/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_alike_on_a_finer_mesh"
+    "tests/body/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_alike_on_a_finer_mesh"
 )
 def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
     """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""

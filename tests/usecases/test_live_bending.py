@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import Unit
 from mu_addon.design.rigid_body import RigidBody
 from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.live_bending import requests, run
 from mu_addon.usecases.live_bending.run import LiveBending
 from mu_addon.usecases.simulate_and_place.job import Job as Study

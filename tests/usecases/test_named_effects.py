@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.cli.main import main, parser
 from mu_addon.cli.options import modelled, modelled_unit
 from mu_addon.design import shapes
@@ -26,7 +27,6 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.time_stepping import simulate_in_time
 from mu_addon.fem.trajectory import simulate
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.run.context import run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress

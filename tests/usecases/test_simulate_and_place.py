@@ -338,7 +338,7 @@ def test_walls_that_slide_dissipate_and_a_second_run_says_the_same(tmp_path):
 
 
 @pytest.mark.nightly(
-    "tests/resolved/test_waveguide.py::test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path"
+    "tests/body/test_waveguide.py::test_a_candidate_is_found_from_model_a_s_state_as_along_its_own_path"
 )
 def test_a_printed_candidate_that_is_lost_is_solved_alone(tmp_path):
     """Each printed waveguide is kept as soon as it is solved: a killed run loses no other's."""

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import (
     HIGHEST_POISSON,
     Chambers,
@@ -29,7 +30,6 @@ from mu_addon.materials.law_forms import FORMS
 from mu_addon.materials.library import load_material, material_text, parse_material
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job, read_job

@@ -54,8 +54,7 @@ class MU_PT_results(UnitPanel, bpy.types.Panel):
         if not found.run.complete:
             wrapped(layout, sentence(found.run.state), "INFO")
         if found.caveat:
-            icon = "INFO" if found.run.printed else "ERROR"
-            wrapped(layout, sentence(found.caveat), icon)
+            wrapped(layout, sentence(found.caveat), "INFO")
         column = layout.column(align=True)
         column.active = not found.stale
         for pressure, angle in found.angles:

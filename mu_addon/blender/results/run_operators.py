@@ -85,8 +85,7 @@ class MU_OT_run_restore(RunOperator, bpy.types.Operator):
             from_unit(props, run.unit)
             props.title = title
             props.study.command = "place" if "place" in run.tables else "simulate"
-            if run.printed:
-                props.study.refine = run.refine
+            props.study.refine = run.refine
         unit_object.rebuild(root)
         if studies.design_of(root) != run.design:
             # Bodies, obstacles and named effects belong to the scene, and stay.

@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...body.printed_mesh import mesh_printed
 from ...chain.chain import Chain, ChainState, Link, Loads
 from ...chain.inverse import Reach, reach_point
 from ...chain.joint_learning import Learned, learn
@@ -22,7 +23,6 @@ from ...materials.library import load_material
 from ...measured.pose import down
 from ...meshing.mesh import Mesh
 from ...report.vtk import write_trajectory
-from ...resolved.printed_mesh import mesh_printed
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...body.printed_mesh import mesh_printed
 from ...design.anchors import anchor_points, window
 from ...design.gripper import GripperSolid, build_gripper
 from ...design.quantity import in_kPa, in_MPa
@@ -21,7 +22,6 @@ from ...fem.state import State, rest
 from ...fem.unit_materials import materials_of, self_contact_of
 from ...files import write_bytes, write_csv
 from ...meshing.mesh import Mesh
-from ...resolved.printed_mesh import mesh_printed
 from ...run.cache import Cache, key
 from ...run.context import RunContext
 from ...run.progress import Progress

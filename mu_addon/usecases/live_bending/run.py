@@ -17,6 +17,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...body.morph import PrintedMorph
+from ...body.printed_mesh import mesh_printed
 from ...design.dimensions import Dimensions
 from ...design.quantity import in_kPa, in_MPa
 from ...errors import ConvergenceError, InputError, MeshingError, MuError
@@ -30,8 +32,6 @@ from ...fem.trajectory import Trajectory
 from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
-from ...resolved.morph import PrintedMorph
-from ...resolved.printed_mesh import mesh_printed
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study

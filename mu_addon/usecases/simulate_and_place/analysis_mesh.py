@@ -7,11 +7,11 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
+from ...body.printed_mesh import mesh_printed
 from ...design.parameters import Material
 from ...design.wall_material import Wall
 from ...meshing.mesh import Mesh
 from ...meshing.settings import MeshSettings
-from ...resolved.printed_mesh import mesh_printed
 from ...run.cache import Cache, key
 from .job import Job
 

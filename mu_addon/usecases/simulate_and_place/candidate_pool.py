@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 
+from ...body.candidates import PrintedWaveguides
 from ...errors import ConvergenceError
 from ...fem.state import State
 from ...meshing.mesh import Mesh
 from ...placement.candidates import Candidate
-from ...resolved.candidates import PrintedWaveguides
 from ...run.pool import Pool
 
 if TYPE_CHECKING:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...body.response import bar_response
+from ...body.waveguide import bar_of
 from ...design.quantity import in_kPa
 from ...errors import ConvergenceError, InputError
 from ...fem.kinematics import probe
@@ -32,8 +34,6 @@ from ...placement.sensitivity_map import (
 )
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
-from ...resolved.response import bar_response
-from ...resolved.waveguide import bar_of
 from .motion_files import write_sensitivity
 
 if TYPE_CHECKING:

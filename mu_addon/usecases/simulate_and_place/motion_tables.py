@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...body.joint_stretch import joint_stretch
 from ...design.body import covering
 from ...fem.bending_angle import TipSection
 from ...fem.kinematics import cavity_volume_mm3
@@ -16,7 +17,6 @@ from ...fem.stress import peak_stretch
 from ...files import write_csv
 from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
 from ...report.results import SELF_CONTACT_COLUMNS, STRETCH_COLUMNS
-from ...resolved.joint_stretch import joint_stretch
 
 if TYPE_CHECKING:
     from ...fem.model import Model

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...body.waveguide import bar_of
 from ...design.anchors import window, windows
 from ...errors import InputError
-from ...resolved.waveguide import bar_of
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from .expected import BEST, plan_of

@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...body.lattice import strut_volume_mm3
 from ...design.anchors import Window, anchor_points, windows
 from ...design.settings import USUAL_RESIN
 from ...design.solid import Solid, build_solid
@@ -27,7 +28,6 @@ from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...reading import file_bytes, parse_json
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
 from ...report.vtk import write_mesh, write_trajectory
-from ...resolved.lattice import strut_volume_mm3
 from ...run.cache import Cache
 from ...run.context import RunContext
 from ...run.folder import begin, keep_inputs, require_space

@@ -155,7 +155,7 @@ def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study)
 
     seconds = studies.findings(root).summary["seconds"]
     assert dict(plan_of(root))["Model A"] != seconds["Model A"], (
-        "a homogenised run tells nothing of a printed one"
+        "a run on a coarser mesh tells nothing of this one"
     )
 
 

@@ -257,7 +257,7 @@ def test_the_legend_stands_in_the_scene(study):
     assert not bar.hide_render
     for frame, state in ((1, "0.00 s, 0.0 kPa"), (193, "8.00 s, 40.0 kPa")):
         bpy.context.scene.frame_set(frame)
-        expected = f"Displacement [mm]\n{state}\nhomogenised"
+        expected = f"Displacement [mm]\n{state}"
         assert texts("head") == [expected], texts("head")
     root.mu_motion.lock = True
     root.mu_motion.low, root.mu_motion.high = 0.0, 4.0

@@ -3,7 +3,7 @@
 `mesh_printed` meshes struts and wall separately and ties them where they meet. See
 docs/engineering/method.md.
 
-    >>> from mu_addon.resolved import strut_mesh
+    >>> from mu_addon.body import strut_mesh
     >>> from mu_addon.design import load_preset
     >>> len(strut_mesh(load_preset("mu-1.0x").printed, rings=1, layers=5).tets)
     90

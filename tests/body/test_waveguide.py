@@ -5,6 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mu_addon.body.bar import bar_mesh, outside_bar
+from mu_addon.body.candidates import PrintedWaveguides
+from mu_addon.body.octants import thickened_nodes
+from mu_addon.body.printed_mesh import mesh_printed
+from mu_addon.body.start import eased, started
+from mu_addon.body.waveguide import bar_of, with_waveguide
 from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.lattice import lattice_of
@@ -20,12 +26,6 @@ from mu_addon.fem.state import State
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.bar import bar_mesh, outside_bar
-from mu_addon.resolved.candidates import PrintedWaveguides
-from mu_addon.resolved.octants import thickened_nodes
-from mu_addon.resolved.printed_mesh import mesh_printed
-from mu_addon.resolved.start import eased, started
-from mu_addon.resolved.waveguide import bar_of, with_waveguide
 
 from .ties import require_linear_motions_kept
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from mu_addon.body.morph import PrintedMorph
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import Unit
 from mu_addon.errors import InputError
 from mu_addon.fem.model import Model
@@ -10,8 +12,6 @@ from mu_addon.fem.moved_nodes import relocated
 from mu_addon.fem.state import rest
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.morph import PrintedMorph
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 UNIT = Unit().evolve(count=3)
 SETTINGS = MeshSettings(refine=0.35)

@@ -6,6 +6,9 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from mu_addon.body.beams import without_beams
+from mu_addon.body.joints import zones_of
+from mu_addon.body.printed_mesh import Sizes, mesh_printed
 from mu_addon.design.body import Body
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.wall_material import Wall
@@ -20,9 +23,6 @@ from mu_addon.fem.stress import cauchy
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.beams import without_beams
-from mu_addon.resolved.joints import zones_of
-from mu_addon.resolved.printed_mesh import Sizes, mesh_printed
 
 UNIT = load_preset("mu-1.0x")
 SMALL = attrs.evolve(UNIT, chambers=attrs.evolve(UNIT.chambers, count=3))

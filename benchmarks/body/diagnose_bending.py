@@ -1,6 +1,6 @@
 """The diagnosis of the paper's bending ranges with the printed body, walls and struts that touch, as base.
 
-    python -m benchmarks.resolved.diagnose_bending FOLDER [--unknown FILE] [--refine 0.5] [--finer 0.7]
+    python -m benchmarks.body.diagnose_bending FOLDER [--unknown FILE] [--refine 0.5] [--finer 0.7]
         [--pressures 7] [--effects NAME ...] [--workers 1]
 
 As `diagnose assets/examples/paper-bending`, on a coarser mesh, at fewer pressures and for chosen effects,

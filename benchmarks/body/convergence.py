@@ -1,6 +1,6 @@
 """How a resolved unit's bending angle depends on its mesh: sizes of wall and struts, one by one or together.
 
-    python -m benchmarks.resolved.convergence [--sizes MERIDIAN HOOP THROUGH RINGS LAYERS] [--refine 1 ...]
+    python -m benchmarks.body.convergence [--sizes MERIDIAN HOOP THROUGH RINGS LAYERS] [--refine 1 ...]
         [--chambers 3] [--pressure -10 -5 5 10 20 40] [--tie-from 0]
 
 Each mesh is one row: the angle of the tip's cap and seconds. `--tie-from`: nodes of struts are tied from
@@ -15,13 +15,13 @@ import attrs
 import numpy as np
 
 from benchmarks.table import options_of, print_head, print_row
+from mu_addon.body.lattice import clearance, struts
+from mu_addon.body.printed_mesh import Sizes, tied, wall_mesh
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
-from mu_addon.resolved.lattice import clearance, struts
-from mu_addon.resolved.printed_mesh import Sizes, tied, wall_mesh
 
 from .tip import tip_section
 

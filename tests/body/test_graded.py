@@ -4,6 +4,10 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.lattice import strut_volume_mm3, struts
+from mu_addon.body.octants import graded_nodes
+from mu_addon.body.printed_mesh import mesh_printed
+from mu_addon.body.waveguide import bar_of, with_waveguide
 from mu_addon.design.anchors import windows
 from mu_addon.design.grading import Grading
 from mu_addon.design.parameters import load_preset
@@ -11,10 +15,6 @@ from mu_addon.errors import InputError
 from mu_addon.meshing.mesh import LATTICE, boundary_faces
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.lattice import strut_volume_mm3, struts
-from mu_addon.resolved.octants import graded_nodes
-from mu_addon.resolved.printed_mesh import mesh_printed
-from mu_addon.resolved.waveguide import bar_of, with_waveguide
 from tests.design.kinds import cross, custom
 
 UNIT = load_preset("mu-1.0x")

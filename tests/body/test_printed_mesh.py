@@ -6,6 +6,8 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.lattice import without_loose_parts
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design import load_preset, shapes
 from mu_addon.design.body import read_body
 from mu_addon.design.lattice import lattice_of
@@ -19,8 +21,6 @@ from mu_addon.fem.self_contact import SelfContact
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE, boundary_faces, mirror, mirror_displacement
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.lattice import without_loose_parts
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 from ..fem.bodies import box
 from .ties import require_linear_motions_kept

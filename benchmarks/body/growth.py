@@ -1,6 +1,6 @@
 """How the cost of beams and of solid struts grows with the lattice's cells, from the mesh to a load step.
 
-    python -m benchmarks.resolved.growth [--cells 3x4x3 3x4x6 3x4x20 5x4x20] [--refine 1]
+    python -m benchmarks.body.growth [--cells 3x4x3 3x4x6 3x4x20 5x4x20] [--refine 1]
 
 Cells across x, across y and along the unit, which has one chamber a cell. A half of `mu-1.0x` with so many,
 without contact. Seconds are of processor time of one thread; a load step is from rest to -1 kPa, memory the
@@ -18,11 +18,11 @@ from typing import Any
 import attrs
 
 from benchmarks.table import options_of, print_head, print_row
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import Unit, load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from mu_addon.usecases.simulate_and_place.job import Job, grasp
 
 STEP_KPA = -1.0

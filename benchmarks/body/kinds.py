@@ -1,6 +1,6 @@
 """Struts of other lattices as beams against the same meshes solid.
 
-    python -m benchmarks.resolved.kinds [--kinds cross octet ...] [--chambers 3] [--pressure 10]
+    python -m benchmarks.body.kinds [--kinds cross octet ...] [--chambers 3] [--pressure 10]
 
 Units of `mu-1.0x` with that lattice, without a waveguide, refine 0.5, without contact: the bending angle.
 Nothing is fitted to them: rigid zones come from one solid cell, three elements to a diameter.
@@ -14,6 +14,7 @@ from pathlib import Path
 import attrs
 
 from benchmarks.table import circumstances, options_of, print_head
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.lattice_kinds import LatticeKind, sin_squared
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.bending_angle import bending_angle_deg
@@ -21,7 +22,6 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 from tests.design.kinds import CORNERS, FACES, cross, custom, octet
 
 NODES = [(0.5, 0.5, 0.5), *CORNERS, *FACES]

@@ -6,15 +6,15 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
+from mu_addon.body.frame import joint_factors
+from mu_addon.body.joint_stretch import joint_stretch
+from mu_addon.body.joints import concentration_factors
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.lattice import lattice_of
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.frame import joint_factors
-from mu_addon.resolved.joint_stretch import joint_stretch
-from mu_addon.resolved.joints import concentration_factors
-from mu_addon.resolved.printed_mesh import mesh_printed
 from tests.design import kinds
 
 UNIT = load_preset("mu-1.0x").evolve(count=3)

@@ -1,6 +1,6 @@
 """J of printed waveguides and angles, walls and struts touching, at several scales and on several meshes.
 
-    python -m benchmarks.resolved.scales FOLDER [--presets mu-0.75x mu-1.0x mu-1.5x] [--refine 0.7 1]
+    python -m benchmarks.body.scales FOLDER [--presets mu-0.75x mu-1.0x mu-1.5x] [--refine 0.7 1]
         [--chambers 4] [--pressure -20 -10 20 40] [--without-contact]
 
 Each row is a whole `place` of the resolved unit, every window of anchors a candidate, kept in a folder of its

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from mu_addon.body.printed_mesh import Sizes, wall_mesh
 from mu_addon.design.parameters import Printing, Unit, load_preset
 from mu_addon.design.profile import cavity_radius, cavity_volume, membrane_volume, outer_radius
 from mu_addon.errors import InputError, MeshingError
@@ -15,7 +16,6 @@ from mu_addon.meshing import MeshSettings, mirror
 from mu_addon.meshing.gmsh_model import GmshUnavailable, load_gmsh
 from mu_addon.meshing.mesh import FLIPPED_TET, TET_EDGES, TRIANGLE_EDGES, boundary_faces, edges_of
 from mu_addon.meshing.quality import cavity_enclosed, check_positive, element_volumes
-from mu_addon.resolved.printed_mesh import Sizes, wall_mesh
 
 UNIT = load_preset("mu-1.0x")
 D = UNIT.printed

@@ -1,6 +1,6 @@
 """Verdicts with the printed body as base, on data made by the printed body on another mesh.
 
-    python -m benchmarks.resolved.diagnose_printed FOLDER [--only clean,gravity] [--refine 1.2] [--seed 1]
+    python -m benchmarks.body.diagnose_printed FOLDER [--only clean,gravity] [--refine 1.2] [--seed 1]
         [--low 0]
 
 A unit of three chambers is bent through suction and pressure; each set hides one static effect or a gauge's

@@ -1,6 +1,6 @@
 """The paper's bending ranges by the printed body, for shapes that the paper does not print.
 
-    python -m benchmarks.resolved.paper_bending FOLDER [--shapes "neck 20 mm" ...] [--presets mu-1.0x]
+    python -m benchmarks.body.paper_bending FOLDER [--shapes "neck 20 mm" ...] [--presets mu-1.0x]
         [--refine 0.5] [--pressures -10 20 50]
 
 Each shape changes the preset in what the paper leaves open, within the design's rules; lengths at scale 1.

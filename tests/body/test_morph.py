@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.morph import PrintedMorph
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MeshingError
 from mu_addon.fem.elements import solid_volumes
 from mu_addon.meshing.mesh import LATTICE, MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.morph import PrintedMorph
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 SETTINGS = MeshSettings(refine=0.3)
 

@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mu_addon.body.candidates import PrintedWaveguides
+from mu_addon.body.printed_mesh import mesh_printed
+from mu_addon.body.response import _frame, _natural, _stiffness, bar_response
 from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points
 from mu_addon.fem.equilibrium import Equilibrium
@@ -16,9 +19,6 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.placement.graph import lattice_graph
 from mu_addon.placement.sensitivity_map import loaded
-from mu_addon.resolved.candidates import PrintedWaveguides
-from mu_addon.resolved.printed_mesh import mesh_printed
-from mu_addon.resolved.response import _frame, _natural, _stiffness, bar_response
 
 
 def test_an_even_beam_has_the_stiffness_of_the_textbook():

@@ -1,6 +1,6 @@
 """A resolved unit's displacements by this package and by felupe: same mesh, ties, shares and law.
 
-    python -m benchmarks.resolved.against_felupe [--refine 0.6] [--pressure -5 5] [--chambers 3]
+    python -m benchmarks.body.against_felupe [--refine 0.6] [--pressure -5 5] [--chambers 3]
 
 Elements, law, assembly and the pressure on curved faces are felupe's. Of ours it has the mesh: nodes,
 elements, shares of volume (`filled`, which scale its dV) and ties, u = T q, so that it solves T' K T.
@@ -17,13 +17,13 @@ import numpy as np
 from scipy import sparse
 
 from benchmarks.table import options_of, print_head
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.materials import Materials
 from mu_addon.fem.model import Model
 from mu_addon.meshing.mesh import AXES, Mesh
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 from .tip import cap_angle_deg
 

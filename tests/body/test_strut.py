@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.strut import strut_mesh
 from mu_addon.design import load_preset
 from mu_addon.design.strut_cell import Facets, StrutCell, relative_density
 from mu_addon.errors import InputError
@@ -12,7 +13,6 @@ from mu_addon.homogenize.elasticity import strained
 from mu_addon.meshing.mesh import boundary_faces
 from mu_addon.meshing.quality import dihedral_angles, element_volumes, folded_corners
 from mu_addon.meshing.tiling import tiled
-from mu_addon.resolved.strut import strut_mesh
 
 DIMENSIONS = load_preset("mu-1.0x").dimensions
 

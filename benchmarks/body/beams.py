@@ -1,6 +1,6 @@
 """Struts as beams against struts as solids, in bodies that nothing was fitted to.
 
-    python -m benchmarks.resolved.beams [--body NAME ...] [--refine 1] [--solid-refine 1.4]
+    python -m benchmarks.body.beams [--body NAME ...] [--refine 1] [--solid-refine 1.4]
 
 Each body is three chambers of mu-1.0x changed in one thing, without contact. A row gives its tip's angle and
 how far its tip moves, with beams or with solid struts on a finer mesh, unknowns and processor seconds.
@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 
 from benchmarks.table import circumstances, options_of, print_head, print_row
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import MuError
 from mu_addon.fem.bending_angle import TipSection
@@ -21,7 +22,6 @@ from mu_addon.fem.equilibrium import Equilibrium
 from mu_addon.fem.model import Model
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 PRESSURES_KPA = -10.0, -5.0, 5.0, 10.0, 20.0, 40.0
 

@@ -4,6 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.lattice import clearance
+from mu_addon.body.printed_mesh import mesh_printed
+from mu_addon.body.strut import strut_mesh
 from mu_addon.design import load_preset
 from mu_addon.design.strut_cell import strut_cell
 from mu_addon.fem.equilibrium import Equilibrium
@@ -19,9 +22,6 @@ from mu_addon.homogenize.cell_mesh import cell_materials
 from mu_addon.homogenize.specimen import block_specimen
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.lattice import clearance
-from mu_addon.resolved.printed_mesh import mesh_printed
-from mu_addon.resolved.strut import strut_mesh
 
 SMALL = load_preset("mu-1.0x")
 SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))

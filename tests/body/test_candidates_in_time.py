@@ -4,6 +4,8 @@ import attrs
 import numpy as np
 import pytest
 
+from mu_addon.body.candidates import PrintedWaveguides
+from mu_addon.body.printed_mesh import mesh_printed
 from mu_addon.design import load_preset
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.design.wall_material import Wall
@@ -13,8 +15,6 @@ from mu_addon.fem.obstacle import Obstacle
 from mu_addon.fem.rigid import Plane
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.resolved.candidates import PrintedWaveguides
-from mu_addon.resolved.printed_mesh import mesh_printed
 
 SMALL = load_preset("mu-1.0x")
 SMALL = attrs.evolve(SMALL, chambers=attrs.evolve(SMALL.chambers, count=3))

@@ -9,6 +9,13 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from mu_addon.body.beams import Layers, integrals
+from mu_addon.body.frame import frame_tensor, frame_zones
+from mu_addon.body.graph_beams import graph_layers_of, with_graph_beams
+from mu_addon.body.joints import POISSON, Zones, zones_of
+from mu_addon.body.printed_mesh import mesh_printed
+from mu_addon.body.strut import strut_mesh
+from mu_addon.body.waveguide import bar_of, with_waveguide
 from mu_addon.design.anchors import anchor_points
 from mu_addon.design.grading import Grading
 from mu_addon.design.lattice import filled, lattice_of
@@ -24,13 +31,6 @@ from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.mesh import LATTICE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.meshing.tiling import tiled
-from mu_addon.resolved.beams import Layers, integrals
-from mu_addon.resolved.frame import frame_tensor, frame_zones
-from mu_addon.resolved.graph_beams import graph_layers_of, with_graph_beams
-from mu_addon.resolved.joints import POISSON, Zones, zones_of
-from mu_addon.resolved.printed_mesh import mesh_printed
-from mu_addon.resolved.strut import strut_mesh
-from mu_addon.resolved.waveguide import bar_of, with_waveguide
 from tests.design.kinds import BODY_CENTRED, cross, custom, octet
 
 UPRIGHT = cross()

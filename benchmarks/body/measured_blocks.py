@@ -1,6 +1,6 @@
 """Measured compression of 3 x 3 x 3 body-centred blocks against swept struts of the same resin's coupons.
 
-    python -m benchmarks.resolved.measured_blocks DATA [--rings 2] [--layers 10] [--poisson 0.4]
+    python -m benchmarks.body.measured_blocks DATA [--rings 2] [--layers 10] [--poisson 0.4]
 
 DATA: folder `data/inelastic_beam_lattices` of CPShub/sim-data (CC BY 4.0), of O. Weeger, I. Valizadeh, Y.
 Mistry, D. Bhate, "Inelastic finite deformation beam modeling, simulation, and validation of additively
@@ -18,12 +18,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.table import options_of
+from mu_addon.body.strut import strut_mesh
 from mu_addon.design import lattice_kinds
 from mu_addon.design.parameters import load_preset
 from mu_addon.fem.materials import Layer, Materials
 from mu_addon.homogenize.compression import compress
 from mu_addon.homogenize.specimen import block_specimen
-from mu_addon.resolved.strut import strut_mesh
 
 from .knowles import Knowles, pulled_MPa
 
