@@ -81,12 +81,13 @@ def presets(kind: str = "") -> str:
     return f"{', '.join(first)} or {last}" if first else last
 
 
-def add_unit(command: argparse.ArgumentParser, required: bool = True) -> None:
-    """--preset or --unit, and --out."""
+def add_unit(command: argparse.ArgumentParser, required: bool = True, results: bool = True) -> None:
+    """--preset or --unit, and with `results` --out."""
     which = command.add_mutually_exclusive_group(required=required)
     which.add_argument("--preset", metavar="NAME", help=f"Unit preset: {presets()}.")
     which.add_argument("--unit", metavar="FILE", help="Unit parameters, a TOML file.")
-    add_results(command)
+    if results:
+        add_results(command)
 
 
 def add_scheduler(command: argparse.ArgumentParser) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def _add_unit(command: argparse.ArgumentParser, one: Any) -> None:
-    add_unit(command, one.needed and not one.default)
+    add_unit(command, one.needed and not one.default, results=False)
     if one.needed and not one.default:
         add_model(command)
 
@@ -44,17 +44,28 @@ def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
 
 def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
     add_measured_folder(command)
-    add_results(command)
 
 
 def _measured(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
     from ..measured import read_folder
 
-    require_out(options)
     return read_folder(Path(options.folder))
 
 
-OBJECTS = {"unit": (_add_unit, _unit), "measured": (_add_measured, _measured)}
+def _add_bending(command: argparse.ArgumentParser, one: Any) -> None:
+    words = "Recordings, or folders of measured data of the kind waveguide_bending."
+    command.add_argument("data", nargs="+", metavar="FOLDER", help=words)
+
+
+def _bending(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    return tuple(map(Path, options.data))
+
+
+OBJECTS = {
+    "unit": (_add_unit, _unit),
+    "measured": (_add_measured, _measured),
+    "bending": (_add_bending, _bending),
+}
 """By kind of an input that is no plain value: its options are added, its value made of them."""
 
 
@@ -70,8 +81,9 @@ def _add(commands: Commands[Any], kind: type[Study]) -> None:
     for one in kind.inputs().values():
         if one.descriptions:
             _add_values(command, one)
-        else:
+        elif one.kind in OBJECTS:
             OBJECTS[one.kind][0](command, one)
+    add_results(command)
     add_report(command)
 
 
@@ -96,11 +108,13 @@ def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
 def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) -> None:
     from ..studies.use_case import use_case
 
+    require_out(options)
     values: dict[str, Any] = {}
     for name, one in kind.inputs().items():
         if one.descriptions:
             given = getattr(options, one.option or one.descriptions[0].name)
+            given = one.descriptions[0].default if given is None else given
             values[name] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
-        else:
+        elif one.kind in OBJECTS:
             values[name] = OBJECTS[one.kind][1](options, context, one)
-    use_case(kind.name).start(kind(**values), Path(options.out), context)
+    use_case(kind.name).start(kind(**values).complete(), Path(options.out), context)

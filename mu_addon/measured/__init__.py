@@ -13,5 +13,8 @@ if TYPE_CHECKING:
     from .folder import Measured as Measured
     from .folder import read_folder as read_folder
     from .table import Remark as Remark
+    from .writing import csv_text as csv_text
+    from .writing import file_stem as file_stem
+    from .writing import tried as tried
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -32,8 +32,8 @@ class Execution:
     """
 
     def __init__(self, study: Study, folder: Path, context: RunContext) -> None:
-        self.study, self.folder, self.context = study, folder, context
-        self.results = Results(study, folder, context.progress)
+        self.study, self.folder, self.context = study.complete(), folder, context
+        self.results = Results(self.study, folder, context.progress)
         self.lines: list[str] = []
         self.fault: MuError | None = None
         self.shown: list[tuple[Section, list[Part]]] = []

@@ -77,7 +77,7 @@ class Results:
             several = isinstance(self._wanted(task, name), list)
             for one in self.taken(task, name):
                 digest = self.digest(one)
-                if digest is None and not (several and one in self.failed):
+                if digest is None and not ((several or stage.may_lack(name)) and self.is_out(one)):
                     return None
                 parts += [name, content(one[1]), digest or ""]
         return key(*parts)
@@ -102,11 +102,15 @@ class Results:
 
     def _name(self, task: Task) -> str | None:
         """Key of a task that may have a result, else None."""
-        if task in self.failed or task[0] not in self.members:
+        if self.is_out(task):
             return None
         if task[1] not in self.members[task[0]]:
             raise TypeError(f"stage {task[0]} has no member {task[1]!r}")
         return self.key(task)
+
+    def is_out(self, task: Task) -> bool:
+        """Return True if a task has no result and will have none."""
+        return task in self.failed or task[0] not in self.members
 
     def is_kept(self, task: Task) -> bool:
         """Return True if a result is in the cache."""
@@ -119,7 +123,7 @@ class Results:
             return task in self._values
         if not stage.kept:
             every = [one for name in stage.needs for one in self.taken(task, name)]
-            if not all(one in self.failed or self.is_there(one) for one in every):
+            if not all(self.is_out(one) or self.is_there(one) for one in every):
                 return False
         return self.digest(task) is not None
 
@@ -163,7 +167,7 @@ class Results:
         stage, member = self.stages[task[0]], task[1]
         values = {n: self._of_parameter(task, n) for n in stage.needs} | stage.of_member(member)
         if TELL in parameters_of(stage.method):
-            values[TELL] = Tell(self.progress)
+            values[TELL] = Tell(self.progress, self.folder / "cache")
         # Without the study: what a stage does not name cannot decide its result.
         found = stage.method(None, **values)
         self._values[task], self._digests[task] = found, name
@@ -180,7 +184,10 @@ class Results:
         if name not in self.stages:
             return self.given(name)
         wanted = self._wanted(task, name)
-        return self.several(name, wanted) if isinstance(wanted, list) else self.value((name, wanted))
+        if isinstance(wanted, list):
+            return self.several(name, wanted)
+        lacks = self.is_out((name, wanted)) and self.stages[task[0]].may_lack(name)
+        return None if lacks else self.value((name, wanted))
 
     def forget(self, is_needed: Callable[[Task], bool]) -> None:
         """Release results that are not needed, and that are kept or can be made anew."""

@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import attrs
 
+from ..errors import InputError
 from .folder import RUN, FolderLayout
 from .inputs import FORMAT, read_inputs, structured
 
@@ -58,8 +59,8 @@ class Input:
     descriptions: of the plain values that it is, or is made of (`design.quantity.Description`); none where
     faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
     processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
-    it is not that of the description; metavar: stands for its value there; many: it takes several words. An
-    input of another kind overrides `made`, `write` and `read`.
+    it is not that of the description; metavar: stands for its value there; many: it takes several words;
+    path: "file" or "folder" if it names one. An input of another kind overrides `made`, `write` and `read`.
     """
 
     kind: str
@@ -68,6 +69,7 @@ class Input:
     option: str = ""
     metavar: str | tuple[str, ...] | None = None
     many: bool = False
+    path: str = ""
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
         """The input of its plain values; given: the inputs before it. Raises InputError."""
@@ -87,13 +89,50 @@ class Input:
 
 
 @attrs.frozen
+class ReadInput(Input):
+    """What is read from files that other inputs name; no face asks for it: `Study.complete` reads it.
+
+    of: reads it, of the study with all other inputs; raises InputError. The result's `hash()` is with the
+    inputs, and a folder refuses files of another content, which `what` names. Its field is None by default:
+    inputs written so take what the files hold when they are read, such as a recording in progress.
+    """
+
+    kind: str = "read"
+    of: Callable[[Any], Any] = lambda study: None
+    what: str = "data"
+
+    def write(self, name: str, value: Any) -> Written:
+        """Its hash."""
+        return Written() if value is None else Written({f"{name}_sha256": value.hash()})
+
+    def read(self, name: str, found: Found) -> None:
+        """Nothing: its hash is taken out, and compared by `require` once all else is read."""
+        found.before[name] = found.keys.pop(f"{name}_sha256", None)
+
+    def require(self, name: str, value: Any, found: Found) -> None:
+        """Raise InputError if it is not what it was."""
+        if found.before[name] in (None, value.hash()):
+            return
+        places = [p for named in found.run.values() for p in (named if isinstance(named, list) else [named])]
+        raise InputError(
+            f"the {self.what} changed since the run was made",
+            ", ".join(p for p in places if isinstance(p, str)),
+            "restore what was there, or use a separate folder for this",
+        )
+
+
+@attrs.frozen
 class Found:
-    """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far."""
+    """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far.
+
+    before: hashes of what was read from other files (`ReadInput`).
+    """
 
     path: Path
     keys: dict[str, Any]
     run: dict[str, Any]
-    given: dict[str, Any]
+    given: dict[str, Any] = attrs.field(factory=dict)
+    before: dict[str, Any] = attrs.field(factory=dict)
 
 
 def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
@@ -147,6 +186,10 @@ class Stage:
         """Names of what it takes, without those that a member gives."""
         own = self.over.names if self.over else ()
         return tuple(p for p in parameters_of(self.method) if p not in own and p != TELL)
+
+    def may_lack(self, name: str) -> bool:
+        """Return True if it is made without the result of another stage too: a parameter None by default."""
+        return not parameters_of(self.method)[name]
 
     def of_member(self, member: Any) -> dict[str, Any]:
         """The parameters that a member of its set gives."""
@@ -223,11 +266,7 @@ class Section:
     @property
     def parameters(self) -> dict[str, bool]:
         """Names of what it shows, and whether it cannot do without."""
-        return {
-            name: p.default is inspect.Parameter.empty
-            for name, p in inspect.signature(self.method).parameters.items()
-            if name != "self"
-        }
+        return parameters_of(self.method)
 
 
 def section(key: str = "", title: str = "") -> Callable[[Any], Any]:
@@ -248,7 +287,8 @@ def section(key: str = "", title: str = "") -> Callable[[Any], Any]:
 class Node:
     """The node of a study: menu, text, outputs as (name, type, text); remark: on a finished run's summary.
 
-    label: in menus, if not the name of the class; answers: a verdict in the summary is a result, even if the
+    label: in menus, if not the name of the class; read: its outputs by name, of a finished run (folder and
+    summary), where they are not that run; answers: a verdict in the summary is a result, even if the
     run ends with an error because of it; hidden: inputs that the node leaves at their defaults; no_body:
     names the study in the error of a unit with a body of its own, which it does not take.
     """
@@ -258,6 +298,7 @@ class Node:
     outputs: tuple[tuple[str, str, str], ...]
     remark: Callable[[Mapping[str, Any]], str]
     label: str = ""
+    read: Callable[[Any], Mapping[str, Any]] | None = None
     answers: bool = False
     hidden: tuple[str, ...] = ()
     no_body: str = ""
@@ -265,9 +306,13 @@ class Node:
 
 @attrs.frozen
 class Tell:
-    """How a stage reports its progress: call it with the share done, 0 to 1."""
+    """How a stage reports its progress: call it with the share done, 0 to 1.
+
+    cache: the run's folder for what core functions keep by keys of their own.
+    """
 
     progress: Progress
+    cache: Path
 
     def __call__(self, share: float, detail: str = "") -> None:
         """Report the share done, and a few words on the last step."""
@@ -367,7 +412,7 @@ class Study:
         """The study whose inputs are in a folder; raises InputError."""
         path = folder / cls.layout().inputs
         keys, run = read_inputs(path)
-        found = Found(path, keys, run, {})
+        found = Found(path, keys, run)
         special = {}
         for name, one in cls.inputs().items():
             if one.kind != "setting":
@@ -376,7 +421,19 @@ class Study:
             if not one.decides and name in run:
                 keys[name] = run[name]
             found.given[name] = keys.get(name, one.descriptions[0].default)
-        return structured(cls, keys, str(path), **special)
+        study = structured(cls, keys, str(path), **special).complete()
+        for name in found.before:
+            study._read()[name].require(name, getattr(study, name), found)
+        return study
+
+    def complete(self) -> Self:
+        """The study with what its files hold (`ReadInput`), as a run needs it; raises InputError."""
+        found = {name: one.of(self) for name, one in self._read().items() if getattr(self, name) is None}
+        return attrs.evolve(self, **found) if found else self  # type: ignore[misc]
+
+    @classmethod
+    def _read(cls) -> dict[str, ReadInput]:
+        return {name: one for name, one in cls.inputs().items() if isinstance(one, ReadInput)}
 
 
 def _marked(cls: Any, mark: str, bare: bool = False) -> dict[str, Any]:
@@ -389,6 +446,7 @@ def _marked(cls: Any, mark: str, bare: bool = False) -> dict[str, Any]:
 
 
 @cache
-def parameters_of(method: Any) -> tuple[str, ...]:
-    """Names of a method's parameters."""
-    return tuple(name for name in inspect.signature(method).parameters if name != "self")
+def parameters_of(method: Any) -> dict[str, bool]:
+    """Names of a method's parameters, and whether it cannot do without."""
+    parameters = inspect.signature(method).parameters.items()
+    return {name: p.default is inspect.Parameter.empty for name, p in parameters if name != "self"}

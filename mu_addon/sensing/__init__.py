@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .calibration import Calibration as Calibration
     from .calibration import CalibrationSweep as CalibrationSweep
     from .calibration import calibrate as calibrate
+    from .calibration import light_of as light_of
     from .calibration import read_calibration as read_calibration
     from .calibration import write_calibration as write_calibration
     from .decoder import Decoder as Decoder
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
     from .sources import SerialLine as SerialLine
     from .sources import Simulated as Simulated
     from .sources import ports as ports
+    from .sweeps import Check as Check
+    from .sweeps import Sweeps as Sweeps
+    from .sweeps import read_sweeps as read_sweeps
     from .tracing import Light as Light
     from .tracing import trace as trace
 else:

@@ -109,6 +109,15 @@ class Calibration:
         possible = (voltage >= volts[0] - slack) & (voltage <= volts[-1] + slack)
         return (first + last) / 2, np.minimum(near, far), np.maximum(near, far), possible
 
+    @property
+    def insensitive_deg(self) -> list[float]:
+        """Widest interval in degrees that the band cannot resolve, if it is a fifth of the range or more."""
+        low, high = self.range_deg
+        _, near, far, _ = self.angle_of(self.voltage_of(np.linspace(low, high, 401)))
+        widest = int(np.argmax(far - near))
+        wide = far[widest] - near[widest] > (high - low) / 5
+        return [float(near[widest]), float(far[widest])] if wide else []
+
     def zeroed(self, voltage_V: float, angle_deg: float = 0.0) -> Calibration:
         """The same map with `gain` set from one voltage at a known angle: light became stronger or weaker.
 

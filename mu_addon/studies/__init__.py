@@ -8,12 +8,14 @@ from importlib import import_module
 from ..run.study import Study
 
 STUDIES = {
+    "calibrate": "Calibrate",
     "check": "Check",
     "fit-material": "FitMaterial",
     "homogenize": "Homogenize",
+    "measure": "Measure",
     "specimens": "Specimens",
 }
-"""Class by command; its module has the command's name."""
+"""Class by name: of its command, its node and its module."""
 
 
 @cache

@@ -89,6 +89,38 @@ class MeasuredInput(Input):
 
 
 @attrs.frozen
+class PlaceInput(Input):
+    """A file or folder, read at its place, or several; what of it decides is a `ReadInput`'s.
+
+    what: in errors; needed: there is always one.
+    """
+
+    kind: str = "place"
+    what: str = "file"
+    needed: bool = True
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
+        """The path of a text; None without."""
+        return Path(values[0]) if values[0] else None
+
+    def write(self, name: str, value: Any) -> Written:
+        """Its place."""
+        if value is None:
+            return Written()
+        return Written(run={name: [str(p.resolve()) for p in value] if self.many else str(value.resolve())})
+
+    def read(self, name: str, found: Found) -> Any:
+        """The place; raises InputError where there is nothing."""
+        if not self.needed and name not in found.run:
+            return None
+        places = found.run.get(name)
+        if not self.many:
+            return named_path(found.path, found.run, name, self.what)
+        listed = places if isinstance(places, list) and places else [None]
+        return tuple(named_path(found.path, {name: place}, name, self.what) for place in listed)
+
+
+@attrs.frozen
 class Resin:
     """Resin of the struts: neo-Hookean, Young's modulus in MPa, Poisson's ratio; density in g/ml."""
 

@@ -22,8 +22,20 @@ from mu_addon.run.parts import Fact, Sentence, Warn, csv
 from mu_addon.run.progress import Progress
 from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
-from mu_addon.run.study import Dropped, Over, Study, derived, intermediate, section, setting, stage
+from mu_addon.run.study import (
+    Dropped,
+    Over,
+    ReadInput,
+    Study,
+    derived,
+    given,
+    intermediate,
+    section,
+    setting,
+    stage,
+)
 from mu_addon.studies import STUDIES, study
+from mu_addon.studies.inputs import PlaceInput
 
 CALLS = []
 
@@ -424,6 +436,93 @@ def test_what_was_shown_of_a_part_is_gone_once_all_is_there(tmp_path):
 def test_what_another_process_makes_must_be_kept():
     with pytest.raises(TypeError, match="must be kept"):
         stage("race", parallel=True, kept=False)
+
+
+# What is read from files of others, and results that a stage can do without.
+
+
+@attrs.frozen
+class Weights:
+    text: str
+
+    def hash(self):
+        return content(self.text)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Weighing(Study):
+    """Add up weights that a file of the laboratory lists."""
+
+    name = "weighing"
+    files = MappingProxyType({})
+    notes: Path = given(PlaceInput(kind="notes", what="notes"))
+    tare: float = setting(described("tare", 0.0, "mass of the pan; 0: none", unit="g", low=0.0, high=99.0))
+    weights: Weights | None = given(
+        ReadInput(of=lambda study: Weights(study.notes.read_text()), what="weights"), default=None
+    )
+
+    def title(self):
+        return "Weighing"
+
+    @stage("pan", wanted=lambda study: study.tare > 0.0, failing="The pan is left out")
+    def pan(self, tare: float) -> float:
+        if tare > 50.0:
+            raise ConvergenceError("it never settled")
+        return tare
+
+    @stage("sum")
+    def total(self, weights: Weights, pan: float | None = None) -> float:
+        CALLS.append("total")
+        return sum(map(float, weights.text.split())) - (pan or 0.0)
+
+    @section()
+    def answer(self, total):
+        yield Fact("mass", total, key="mass_g")
+
+
+def weighed(folder, **given):
+    CALLS.clear()
+    context = RunContext(Progress())
+    Execution(Weighing(**given), folder, context).run()
+    return context.summary
+
+
+@pytest.fixture
+def notes(tmp_path):
+    (tmp_path / "notes.txt").write_text("1 2 3")
+    return tmp_path / "notes.txt"
+
+
+def test_a_stage_does_without_a_result_that_is_not_wanted_or_failed(tmp_path, notes):
+    out = tmp_path / "out"
+    assert weighed(out, notes=notes) == {"mass_g": 6.0}
+    assert weighed(out, notes=notes, tare=2.0) == {"mass_g": 4.0}
+    assert CALLS == ["total"], "with the pan it is another result"
+    found = weighed(out, notes=notes, tare=60.0)
+    assert found == {"mass_g": 6.0, "warnings": ["The pan is left out: it never settled."]}
+
+
+def test_files_of_others_are_known_by_what_was_read(tmp_path, notes):
+    out = tmp_path / "out"
+    out.mkdir()
+
+    def write(study):
+        (out / "weighing.toml").write_text(study.texts()["weighing.toml"])
+        return study
+
+    assert weighed(out, notes=notes) == {"mass_g": 6.0}
+    assert write(Weighing(notes=notes).complete()).texts() == Weighing.read(out).texts()
+    notes.write_text("1 2 4")
+    with pytest.raises(InputError, match="the weights changed since the run was made") as caught:
+        Weighing.read(out)
+    assert caught.value.where == str(notes)
+    # Written before they were read, it takes those that are there; a result of others is made again.
+    write(Weighing(notes=notes))
+    assert Weighing.read(out).weights == Weights("1 2 4")
+    assert weighed(out, notes=notes) == {"mass_g": 7.0}
+    notes.unlink()
+    with pytest.raises(InputError, match="the notes is not where it was"):
+        Weighing.read(out)
 
 
 # Results as arrays.

@@ -10,8 +10,8 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.measured.kinds import KINDS
 from mu_addon.measured.table import read_table
+from mu_addon.sensing.sweeps import _joined_angles
 from mu_addon.table_cells.own_tables import own_lines, own_rows, own_text
-from mu_addon.usecases.sensor.calibrate import _joined_angles
 from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 PIXELS = (

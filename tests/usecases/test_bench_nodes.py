@@ -16,9 +16,9 @@ from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.sensing.recording import Recorder
 from mu_addon.sensing.samples import Layout, Samples
+from mu_addon.studies.measure import Measure
 from mu_addon.usecases.graph.definitions import definitions
-from mu_addon.usecases.sensor import measured_motion, record
-from mu_addon.usecases.sensor.measured_motion import Job as Motion
+from mu_addon.usecases.sensor import record
 
 
 def recorded(folder, sweeps=4, seed=0, period_s=10.0):
@@ -98,14 +98,16 @@ def test_what_cannot_be_measured_is_said(bench, tmp_path):
     found = evaluated(NodeTree("b", {k: bench.nodes[k] for k in ("Bending", "Calibrate")}), tmp_path / "out")
     calibration = found.outputs["Calibrate"]["calibration"]
     with pytest.raises(InputError, match="no channel 'pressure_kPa'") as caught:
-        Motion(tmp_path / "unit", calibration, "pressure_kPa")
+        Measure(recording=tmp_path / "unit", calibration=calibration).complete()
     assert "gauge_V" in caught.value.remedy
-    with pytest.raises(InputError, match="not a rate"):
-        Motion(tmp_path / "unit", calibration, "gauge_V", rate_hz=0.0)
+    with pytest.raises(InputError, match="rate_hz = 0 Hz is out of bounds"):
+        Measure(recording=tmp_path / "unit", calibration=calibration, rate_hz=0.0)
     with pytest.raises(InputError, match="cannot read the calibration"):
-        Motion(tmp_path / "unit", tmp_path / "none.toml", "gauge_V")
+        Measure(
+            recording=tmp_path / "unit", calibration=tmp_path / "none.toml", pressure="gauge_V"
+        ).complete()
     with pytest.raises(InputError, match="recording is invalid"):
-        Motion(tmp_path / "none", calibration, "gauge_V")
+        Measure(recording=tmp_path / "none", calibration=calibration).complete()
 
 
 def test_a_motion_of_other_samples_is_not_taken_for_the_same(bench, tmp_path):
@@ -113,8 +115,9 @@ def test_a_motion_of_other_samples_is_not_taken_for_the_same(bench, tmp_path):
     folder = found.states["Motion"].folder
     with (tmp_path / "unit" / "recording-000.csv").open("a") as file:
         file.write("40,40,9999,2.4,0.05,0.5\n")
-    with pytest.raises(InputError, match="has changed since this was made"):
-        measured_motion.read_job(folder)
+    with pytest.raises(InputError, match="recording or its calibration changed") as caught:
+        Measure.read(folder)
+    assert str(tmp_path / "unit") in caught.value.where
 
 
 @pytest.mark.slow

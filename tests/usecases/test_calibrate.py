@@ -11,7 +11,7 @@ import pytest
 from mu_addon.cli.main import main
 from mu_addon.sensing.recording import Recorder, read_recording
 from mu_addon.sensing.samples import Layout, Samples
-from mu_addon.usecases.sensor.calibrate import _marked
+from mu_addon.sensing.sweeps import _marked
 
 
 def volts_of(angle: np.ndarray) -> np.ndarray:

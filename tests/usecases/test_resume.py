@@ -123,7 +123,7 @@ def test_every_job_is_read_back_from_its_folder(tmp_path):
         assert found.layout.is_of(folder)
         seen.add(found.layout.inputs)
     # These two are made from recordings: tests/usecases/test_calibrate.py, test_bench_nodes.py.
-    assert seen == {*MODULES, *(f"{name}.toml" for name in STUDIES)} - {"calibrate.toml", "motion.toml"}
+    assert seen == {*MODULES, *(f"{name}.toml" for name in STUDIES)} - {"calibrate.toml", "measure.toml"}
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in OLD.iterdir()))

@@ -19,6 +19,7 @@ from ...errors import InputError, MuError
 from ...run.child import DONE, FAILED, RUNNING
 from ...run.folder import write_run
 from ...sensing.session import BACK
+from ...studies.calibrate import Calibrate
 from ...usecases.sensor.watch import Watched
 from ..jobs import start_child
 from ..jobs.start_child import JobKind
@@ -165,14 +166,11 @@ CALIBRATION = JobKind("calibrate", lambda root: root.mu_unit.uuid, latest_calibr
 
 def calibrate(root: Any, data: Path) -> None:
     """Calibrate from a folder in a separate process, and then apply the result; raises MuError."""
-    # Imported late: it needs scipy, which a Blender without the wheels lacks.
-    from ...usecases.sensor.calibrate import LAYOUT, input_texts
-
     folder = _unused(studies.assign_folder(root) / CALIBRATIONS)
     light, dark = chosen(root)
     # The calibrating process counts its samples: more may arrive until then.
-    inputs = input_texts([data], light or None, str(dark) if dark else None)
-    CALIBRATION.start(root, folder, lambda folder: write_run(folder, LAYOUT, inputs))
+    inputs = Calibrate(data=(data,), channel=light, dark=str(dark) if dark else "").texts()
+    CALIBRATION.start(root, folder, lambda folder: write_run(folder, Calibrate.layout(), inputs))
     _calibrating[CALIBRATION.key(root)] = folder
     _tick()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...design.gates import GateError
@@ -13,8 +15,17 @@ if TYPE_CHECKING:
     from ...graph.evaluation import Finished, Order
     from ...run.study import Study
 
-SOCKETS = {"unit": Input("unit", ("unit",), "link a unit")}
-"""By kind of an input that is no plain value."""
+SOCKETS: dict[str, tuple[Input, Callable[[Any], Any]]] = {
+    "unit": (Input("unit", ("unit",), "link a unit"), lambda linked: linked.unit),
+    "bending": (
+        Input("bending", ("recording", "data"), "link recordings, or measured data", many=True),
+        lambda linked: tuple(getattr(value, "folder", value) for _, value in linked),
+    ),
+    "recording": (Input("recording", ("recording",), "link a node Record or Recording"), Path),
+    "calibration": (Input("calibration", ("calibration",), "link a node Calibrate or Calibration"), Path),
+}
+"""By kind of an input that is no plain value: its socket, and the value of what is linked there."""
+REMARK = "remark"
 MUTED = "this node and those that need it are not computed"
 
 
@@ -29,20 +40,23 @@ def node_of(name: str) -> Definition:
         if node.answers and done.summary.get("verdict") == "error":
             faults = done.summary.get("faults") or ["see its report"]
             raise GateError(f"not printable: {faults[0]}", str(done.folder), "see report.html in that folder")
-        return {output: done for output, *_ in node.outputs}
+        outputs = node.read(done) if node.read else {output: done for output, *_ in node.outputs}
+        return {**outputs, REMARK: node.remark(done.summary)}
 
     return Definition(
         kind.name,
         node.label or kind.__name__,
         node.category,
         node.text,
-        tuple(SOCKETS[one.kind] for one in inputs.values() if not one.descriptions),
+        tuple(SOCKETS[one.kind][0] for one in inputs.values() if one.kind in SOCKETS),
         tuple(Output(*one) for one in node.outputs),
-        tuple(Setting(d) for one in inputs.values() if one.kind != "window" for d in one.descriptions),
+        tuple(
+            Setting(d, one.path) for one in inputs.values() if one.kind != "window" for d in one.descriptions
+        ),
         order=lambda call: _order(kind, call),
         read=read,
         muting=MUTED,
-        remark=lambda outputs: node.remark(next(iter(outputs.values())).summary),
+        remark=lambda outputs: str(outputs[REMARK]),
     )
 
 
@@ -51,15 +65,15 @@ def _order(kind: type[Study], call: Call) -> Order:
     from ...studies.use_case import use_case
 
     assert kind.node is not None
-    linked: Any = call.inputs.get("unit")
-    if linked is not None and kind.node.no_body:
-        refuse_body(linked, kind.node.no_body)
+    if kind.node.no_body:
+        refuse_body(call.inputs["unit"], kind.node.no_body)
     values: dict[str, Any] = {}
     for name, one in kind.inputs().items():
-        if one.kind == "unit":
-            values[name] = linked.unit
+        if one.kind in SOCKETS:
+            socket, value_of = SOCKETS[one.kind]
+            values[name] = value_of(call.inputs[socket.name])
         elif one.kind == "window":
-            values[name] = one.made((linked.path,), values)
-        elif name not in kind.node.hidden:
+            values[name] = one.made((call.inputs["unit"].path,), values)
+        elif one.descriptions and name not in kind.node.hidden:
             values[name] = one.made(tuple(call.settings[d.name] for d in one.descriptions), values)
-    return Order(use_case(kind.name), kind(**values), answers=kind.node.answers)
+    return Order(use_case(kind.name), kind(**values).complete(), answers=kind.node.answers)
