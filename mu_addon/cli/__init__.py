@@ -44,7 +44,6 @@ NAMES = (
 _MODULES = {
     **dict.fromkeys(("presets", "design", "simulate", "place"), "study"),
     **dict.fromkeys(("ports", "record", "replay"), "stream"),
-    "design_experiments": "diagnose",
 }
 """Modules of commands that share one; each of its functions has its command's name, except a shared `run`."""
 

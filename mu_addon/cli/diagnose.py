@@ -1,4 +1,4 @@
-"""`diagnose` and `design-experiments`: measured data against the model, and planned experiments."""
+"""`diagnose`: measured data against the model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .options import Commands
 
 
-def add_diagnose(commands: Commands[Any]) -> None:
+def add(commands: Commands[Any]) -> None:
     """Add the parser of `diagnose`."""
     command = commands.add_parser(
         "diagnose",
@@ -39,7 +39,7 @@ def add_diagnose(commands: Commands[Any]) -> None:
     add_report(command)
 
 
-def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
+def run(options: argparse.Namespace, context: RunContext) -> None:
     """Diagnose the folder."""
     from ..evidence.extended import load_model
     from ..measured import read_folder
@@ -57,43 +57,4 @@ def run_diagnose(options: argparse.Namespace, context: RunContext) -> None:
 
         unknown = unknown_of(Path(options.unknown), unit or load_preset(PRESET))
     job = Job(measured, unit, known=known, self_contact=options.self_contact, unknown=unknown)
-    USE_CASE.start(job, Path(options.out), context)
-
-
-def add_design_experiments(commands: Commands[Any]) -> None:
-    """Add the parser of `design-experiments`."""
-    from ..measured.kinds import NOISE
-
-    command = commands.add_parser(
-        "design-experiments",
-        help="Design experiments before measuring: compute which effects planned experiments can detect, "
-        "and the smallest detectable size of each.",
-        epilog="example: run.py design-experiments my-protocols --noise angle=0.5 --out out/plan",
-    )
-    add_measured_folder(
-        command,
-        "Folder of planned experiments, in the format of `diagnose`; the measured columns may hold any "
-        "numbers.",
-    )
-    add_unit(command, required=False)
-    add_self_contact(command)
-    add_report(command)
-    usual = " ".join(f"{quantity}={value:g}" for quantity, value in NOISE.items())
-    command.add_argument(
-        "--noise",
-        nargs="+",
-        default=(),
-        metavar="QUANTITY=VALUE",
-        help=f"Standard deviation of a reading, in the unit of its column (default: {usual}).",
-    )
-
-
-def run_design_experiments(options: argparse.Namespace, context: RunContext) -> None:
-    """Plan the folder's experiments."""
-    from ..measured import read_folder
-    from ..usecases.diagnose.design_experiments import USE_CASE, Job, noise_of
-
-    unit = unit_if_named(options)
-    noise = noise_of(options.noise)
-    job = Job(read_folder(Path(options.folder)), unit, noise, self_contact=options.self_contact)
     USE_CASE.start(job, Path(options.out), context)

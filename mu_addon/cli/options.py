@@ -19,7 +19,7 @@ Group = argparse._ArgumentGroup | argparse.ArgumentParser
 
 
 def add_setting(command: Group, d: Description, metavar: Any = None, many: bool = False) -> None:
-    """Add the option of a setting: its type, choices, default and text; --no-NAME of a flag that is set.
+    """Add the option of a setting: its type, choices, default and text; also --no-NAME of a flag that is set.
 
     Its name is the setting's without the unit; many: it takes several words. Bounds are checked by the job. A
     text that is empty by default is None without the option.
@@ -27,7 +27,8 @@ def add_setting(command: Group, d: Description, metavar: Any = None, many: bool 
     unit = d.unit.replace("/", "_per_")
     option = (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
     if d.type is bool and d.default:
-        command.add_argument(f"--no-{option}", dest=d.name, action="store_false", help=f"Do not {d.text}.")
+        both = argparse.BooleanOptionalAction
+        command.add_argument(f"--{option}", dest=d.name, action=both, default=True, help=help_of(d))
     elif d.type is bool:
         words = f"{d.text[:1].upper()}{d.text[1:]}."
         command.add_argument(f"--{option}", dest=d.name, action="store_true", help=words)
@@ -204,12 +205,7 @@ def add_self_contact(command: Group) -> None:
     """--self-contact and --no-self-contact."""
     from ..meshing.settings import SELF_CONTACT
 
-    command.add_argument(
-        "--self-contact",
-        action=argparse.BooleanOptionalAction,
-        default=SELF_CONTACT.default,
-        help=help_of(SELF_CONTACT),
-    )
+    add_setting(command, SELF_CONTACT)
 
 
 def require_out(options: argparse.Namespace) -> None:

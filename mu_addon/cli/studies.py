@@ -43,7 +43,7 @@ def _unit(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
 
 
 def _add_measured(command: argparse.ArgumentParser, one: Any) -> None:
-    add_measured_folder(command)
+    add_measured_folder(command, one.text)
 
 
 def _measured(options: argparse.Namespace, context: RunContext, one: Any) -> Any:

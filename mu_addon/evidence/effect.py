@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import attrs
 
@@ -31,6 +32,8 @@ NUMERICS = "mesh_error"
 EVERY = (-math.inf, math.inf)
 # Between a parameter's key and the specimen or experiment that its effect belongs to.
 OF = " of "
+
+_HYPHENED = re.compile(r"\b(rate|self)_(independent|heating)")
 
 # What each effect is, and the experiment that shows it best.
 LIBRARY = {
@@ -355,3 +358,15 @@ class Effect:
             if shape not in found:
                 found.append(shape)
         return tuple(found)
+
+
+def readable(name: str) -> str:
+    """An effect's or quantity's name for a reader."""
+    return _HYPHENED.sub(r"\1-\2", name).replace("_", " ")
+
+
+def bare(p: Parameter) -> str:
+    """A parameter's name for a reader, without the unit that follows its value."""
+    unit = p.unit.replace("1/", "per_").replace("/h", "_per_hour").replace("/", "_")
+    name, of, whose = p.name.partition(OF)
+    return readable(name.removesuffix(f"_{unit}") if unit else name) + of + whose

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Protocol
 
 import attrs
 import numpy as np
 
+from ..design.parameters import Unit, load_preset
+from ..design.settings import PRESET
 from ..errors import InputError
 from ..measured import Experiment
+from ..measured.kinds import OF_A_UNIT
 from .effect import GEOMETRY, OF, SCALES, THICKNESS, Effect, Parameter
 
 Array = np.ndarray[Any, Any]
@@ -20,6 +23,21 @@ HEIGHT = f"{GEOMETRY}.height"
 
 # Part of the name of every modulus among the nuisances.
 MODULUS = "modulus"
+
+
+def bends(experiments: Sequence[Experiment]) -> bool:
+    """Return True if a unit is simulated for some experiment."""
+    return any(e.kind in OF_A_UNIT for e in experiments)
+
+
+def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
+    """Unit of the experiments, the preset where none is given; None where no experiment needs one.
+
+    A block of lattice is a unit's where its cells are counted.
+    """
+    if bends(experiments) or any(e.cells for e in experiments):
+        return unit or load_preset(PRESET)
+    return None
 
 
 class Simulator(Protocol):

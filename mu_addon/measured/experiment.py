@@ -11,6 +11,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ..run.stored import content
+
 Array = np.ndarray[Any, Any]
 
 
@@ -73,6 +75,10 @@ class Experiment:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def hash(self) -> str:
+        """Hash of all but its place."""
+        return content({f.name: getattr(self, f.name) for f in attrs.fields(Experiment) if f.name != "file"})
 
     def stated_accuracy(self, column: str) -> float:
         """Accuracy stated for the instrument behind a column, in the column's unit; inf where none was."""

@@ -136,3 +136,8 @@ def flat(parts: Sequence[Part]) -> list[Part]:
 def columns(beside: Beside) -> list[Part]:
     """The parts of all columns in order."""
     return [part for one in beside.parts for part in (one if isinstance(one, list) else [one])]
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Names in a row: "a, b and c"."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]

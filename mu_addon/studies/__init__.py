@@ -10,6 +10,7 @@ from ..run.study import Study
 STUDIES = {
     "calibrate": "Calibrate",
     "check": "Check",
+    "design-experiments": "DesignExperiments",
     "fit-material": "FitMaterial",
     "homogenize": "Homogenize",
     "measure": "Measure",

@@ -9,7 +9,7 @@ import attrs
 
 from .. import sensing
 from ..run.parts import Chart, Fact, File, Part, Sentence, Table, csv, recorded
-from ..run.study import Node, ReadInput, Study, given, section, setting, stage
+from ..run.study import Node, ReadInput, Study, given, intermediate, section, setting, stage
 from ..sensing.settings import ANGLES, CHANNEL, DARK
 from .inputs import PlaceInput
 
@@ -55,7 +55,7 @@ class Calibrate(Study):
         """The map, fitted to all sweeps that are not held out."""
         return sensing.calibrate(samples.fitted, samples.channel, samples.dark)
 
-    @stage("", kept=False)
+    @intermediate()
     def checks(self, found: sensing.Calibration, samples: sensing.Sweeps) -> tuple[sensing.Check, ...]:
         """Accuracy on the sweeps that were not fitted."""
         return tuple(sensing.Check.of(name, sweep, found) for name, sweep in samples.held)

@@ -14,7 +14,7 @@ from ..design.declared_laws import form_names
 from ..design.quantity import described
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
-from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, recorded
+from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, listed, recorded
 from ..run.study import Members, Over, Study, derived, given, intermediate, section, setting, stage
 from .inputs import MeasuredInput, WordsInput
 
@@ -174,8 +174,8 @@ class FitMaterial(Study):
         yield from _warnings(fitting)
         kept = [e for e in chosen.errors if e.mode not in chosen.fails] or list(chosen.errors)
         worst = max(kept, key=lambda e: e.share)
-        where = f" in {_listed(_titles(e.mode for e in kept))}" if len(chosen.errors) > 1 else ""
-        but = f", but it does not fit {_listed(_titles(chosen.fails))}" if chosen.fails else ""
+        where = f" in {listed(_titles(e.mode for e in kept))}" if len(chosen.errors) > 1 else ""
+        but = f", but it does not fit {listed(_titles(chosen.fails))}" if chosen.fails else ""
         yield Sentence(
             f"Recommended law: {chosen.form.title}. Its error is {worst.share:.1%} of the measured "
             f"stress{where}{but}.",
@@ -250,7 +250,7 @@ class FitMaterial(Study):
             above, below = _charts(mode, fitted, held, fitting.fits, chosen)
             yield File(f"fit_{mode}.svg", _drawn(above))
             missed = [f.form.title for f in fitting.fits if mode in f.fails]
-            does = f"{_listed(missed)} {'does' if len(missed) == 1 else 'do'} not fit it." if missed else ""
+            does = f"{listed(missed)} {'does' if len(missed) == 1 else 'do'} not fit it." if missed else ""
             alt = f"Nominal stress against stretch, {TITLES[mode]}: tests and {len(fitting.fits)} laws."
             shown.append(
                 [
@@ -285,7 +285,7 @@ class FitMaterial(Study):
                     *(percent(e.share) for e in f.errors),
                     *(percent(fitting.unseen[f.form.name].get(m, nan)) for m in unseen),
                     "unstable" if score is None else _score(score, by),
-                    _listed(_titles(f.fails)) if f.fails else "nothing",
+                    listed(_titles(f.fails)) if f.fails else "nothing",
                 ]
             )
         groups = [("", 2), ("error, relative L2 norm", len(tests))]
@@ -411,7 +411,7 @@ def _warnings(fitting: Fitting) -> Iterator[Part]:
     chosen = fitting.choice.chosen
     if chosen.fails:
         yield Warn(
-            f"{chosen.form.title} has an error on {_listed(_titles(chosen.fails))} of more than "
+            f"{chosen.form.title} has an error on {listed(_titles(chosen.fails))} of more than "
             f"{materials.TOLERANCE:.0%}: do not use it in that mode."
         )
     for mode, (stretch, ratio) in fitting.apart.items():
@@ -456,13 +456,13 @@ def _reason(fitting: Fitting) -> str:
     if choice.tied:
         tied = [f.form.title for f in choice.tied]
         words = (
-            f"{_listed(tied)} {'is' if len(tied) == 1 else 'are'} equally good "
+            f"{listed(tied)} {'is' if len(tied) == 1 else 'are'} equally good "
             f"({'held-out error' if held else 'AICc'}); of these it has the fewest parameters"
         )
     unstable = [f.form.title for f in fitting.fits if not f.stable]
     if unstable:
         one = len(unstable) == 1
-        words += f". {_listed(unstable)} {'is' if one else 'are'} unstable and {'was' if one else 'were'} "
+        words += f". {listed(unstable)} {'is' if one else 'are'} unstable and {'was' if one else 'were'} "
         "not considered"
     return words
 
@@ -522,10 +522,6 @@ _SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def _titles(modes: Any) -> list[str]:
     return list(dict.fromkeys(TITLES[mode] for mode in modes))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
 def _drawn(draw: Callable[[], str]) -> Callable[[Path], str]:

@@ -67,12 +67,16 @@ class WordsInput(Input):
 
 @attrs.frozen
 class MeasuredInput(Input):
-    """A folder of measured data, read at its place. data: what of it decides, by the experiments' names."""
+    """A folder of measured data, read at its place.
+
+    data: what of it decides, by the experiments' names; text: says in a command what folder it is.
+    """
 
     kind: str = "measured"
     data: Callable[[measured.Measured], dict[str, Any]] = lambda found: {
-        e.name: e.sha256 for e in found.experiments
+        e.name: e.hash() for e in found.experiments
     }
+    text: str = ""
 
     def write(self, name: str, value: measured.Measured) -> Written:
         """Its place, and what decides."""

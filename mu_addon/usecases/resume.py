@@ -26,7 +26,6 @@ MODULES = {
     "grip.toml": ".grip.run",
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
-    "protocols.toml": ".diagnose.design_experiments",
     "record.toml": ".sensor.record",
     "sweep.toml": ".parameter_study.run",
     "design.toml": ".optimize.run",

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.evidence.effect import readable
 from mu_addon.evidence.prediction.instruments import as_read, before_the_gauge
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.sensitivity import best_seen
 from mu_addon.evidence.simulator import Composite
-from mu_addon.usecases.diagnose.words import readable, sentence
+from mu_addon.usecases.diagnose.words import sentence
 from tests.evidence import analytic
 
 RANGE_kPa = 40.0

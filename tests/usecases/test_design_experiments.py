@@ -1,23 +1,24 @@
 """What planned experiments would show."""
 
+import warnings
+
 import attrs
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mu_addon.design.assets import asset_root
+from mu_addon.design.parameters import load_preset, read_unit
+from mu_addon.design.settings import PRESET
 from mu_addon.errors import InputError
+from mu_addon.evidence import unit_fem
 from mu_addon.measured import read_folder
+from mu_addon.measured.kinds import NOISE
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.diagnose.design_experiments import (
-    NOISE,
-    USE_CASE,
-    Job,
-    console_summary,
-    noise_of,
-    plan,
-)
+from mu_addon.studies.design_experiments import DesignExperiments, NoiseInput, plan
+from mu_addon.studies.use_case import use_case
 from tests.evidence import analytic
 
 from .diagnosis_data import weighed_blocks
@@ -75,18 +76,41 @@ def test_it_leaves_a_table_and_a_report(tmp_path):
     progress = Progress()
     with run_to_end(progress) as context:
         folder = weighed_blocks(tmp_path / "data", 0.0)
-        USE_CASE.start(Job(read_folder(folder)), tmp_path / "out", context)
+        study = DesignExperiments(data=read_folder(folder))
+        use_case("design-experiments").start(study, tmp_path / "out", context)
     assert context.status == 0
     # Weighed, the two are no longer one.
     assert not {"overcure", "skin_cure"} <= {n for pair in context.summary["alike"] for n in pair[:2]}
-    assert any(
-        line.startswith("overcure: detectable from offset 0.0") for line in console_summary(context.summary)
-    )
+    lines = context.console_summary(context.summary)
+    assert any(line.startswith("overcure: detectable from offset 0.0") for line in lines)
     assert (tmp_path / "out" / "limits.csv").read_text().startswith("effect,parameter,unit,visible_from")
     assert "can detect" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_unit_is_simulated_once_and_what_that_leaves_out_is_noted(tmp_path, monkeypatch):
+    def response(unit, experiments, settings, cache, progress):
+        assert (len(experiments), settings.self_contact, cache) == (2, False, tmp_path / "out" / "cache")
+        warnings.warn(
+            "contact with 2 N is left out\n  where: unit", unit_fem.UnitResponseWarning, stacklevel=1
+        )
+        return [analytic.response()]
+
+    monkeypatch.setattr(unit_fem, "unit_responses", response)
+    messages = []
+    with run_to_end(Progress([messages.append])) as context:
+        measured = read_folder(asset_root() / "examples" / "paper-bending")
+        whole = tuple(e for e in measured.experiments if e.scale == 1.0)
+        study = DesignExperiments(data=attrs.evolve(measured, experiments=whole), self_contact=False)
+        use_case("design-experiments").start(study, tmp_path / "out", context)
+    assert context.status == 0
+    assert [m["what"] for m in messages if m["type"] == "warning"] == ["contact with 2 N is left out"]
+    assert "<p>contact with 2 N is left out</p>" in (tmp_path / "out" / "report.html").read_text()
+    assert list(context.summary["seconds"]) == ["unit", "sensitivities", "report"]
+    # Without a unit of its own, the preset's: it is among the inputs.
+    assert read_unit(tmp_path / "out" / "unit.toml") == load_preset(PRESET)
 
 
 @pytest.mark.parametrize("word", ["angle", "angle=", "angle=-1", "loudness=3", "angle=nan"])
 def test_noise_that_is_none_is_refused(word):
     with pytest.raises(InputError, match="is not a noise level"):
-        noise_of([word])
+        NoiseInput().made(([word],), {})

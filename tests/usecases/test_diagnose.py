@@ -16,24 +16,23 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.evidence import unit_fem
 from mu_addon.evidence.drive import denoised_drives
-from mu_addon.evidence.effect import LIBRARY, Parameter
+from mu_addon.evidence.effect import LIBRARY, Parameter, bare
 from mu_addon.evidence.extended import ExtendedModel, Fitted, load_model
 from mu_addon.evidence.prediction.lattice_compression import LatticeStress
 from mu_addon.evidence.prediction.unit_pressure import UnitPressure
 from mu_addon.evidence.simulator import Composite
+from mu_addon.evidence.simulators import simulations_plan
 from mu_addon.evidence.unit_fem import UnitSettings
 from mu_addon.measured import read_folder
 from mu_addon.run.context import RunContext, run_to_end
 from mu_addon.run.folder import keep_inputs
 from mu_addon.run.progress import Progress
+from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.usecases.diagnose import run as diagnosing
-from mu_addon.usecases.diagnose.design_experiments import USE_CASE as PLANNING
-from mu_addon.usecases.diagnose.design_experiments import Job as Plan
 from mu_addon.usecases.diagnose.job import Job, read_job
 from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
 from mu_addon.usecases.diagnose.run import USE_CASE, console_summary
-from mu_addon.usecases.diagnose.simulators import simulations_plan
-from mu_addon.usecases.diagnose.words import alternatives, bare
+from mu_addon.usecases.diagnose.words import alternatives
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.simulate_and_place.extended_unit import read_extended
 from tests.evidence import analytic
@@ -299,12 +298,12 @@ def test_a_diagnosis_goes_on_with_walls_that_touch_as_it_began(tmp_path):
 
 def test_every_face_keeps_walls_apart(tmp_path, monkeypatch):
     folder = ROOT / "assets" / "examples" / "paper-bending"
-    measured, started = read_folder(folder), [Job(read_folder(folder)), Plan(read_folder(folder))]
-    for use_case in (USE_CASE, PLANNING):
-        monkeypatch.setattr(type(use_case), "start", lambda _, job, *__: started.append(job))
+    measured = read_folder(folder)
+    started = [Job(measured), DesignExperiments(data=measured)]
+    monkeypatch.setattr(type(USE_CASE), "start", lambda _, job, *__: started.append(job))
     for command in ("diagnose", "design-experiments"):
         main([command, str(folder), "--out", str(tmp_path / "out")])
-    assert all(job.unit_settings.self_contact and job.self_contact for job in started)
+    assert all(job.self_contact for job in started)
     assert len(started) == 4
     main(["diagnose", str(folder), "--no-self-contact", "--out", str(tmp_path / "out")])
     assert not started[-1].self_contact

@@ -15,19 +15,20 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
 from mu_addon.measured import read_folder
+from mu_addon.measured.kinds import NOISE
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.studies import STUDIES
 from mu_addon.studies.check import Check, read_part
+from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
 from mu_addon.studies.specimens import Specimens
 from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
-from mu_addon.usecases.diagnose import design_experiments
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.export import job as export
 from mu_addon.usecases.graph import job as graph
@@ -104,7 +105,7 @@ def jobs(folder):
     )
     yield diagnose.Job(paper)
     yield diagnose.Job(paper, load_preset("mu-1.5x"))
-    yield design_experiments.Job(paper, noise={**design_experiments.NOISE, "angle": 1 / 3})
+    yield DesignExperiments(data=paper, noise={**NOISE, "angle": 1 / 3})
     yield FitMaterial(data=measured, laws=("yeoh", "neo-hooke"), hold_out=("uniaxial",), weights="relative")
     yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
     yield chain.read_chain(asset_root() / "examples/trunk/chain.toml")

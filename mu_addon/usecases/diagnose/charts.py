@@ -9,11 +9,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from ...evidence.effect import readable
 from ...evidence.gain_on_unseen import Errors
 from ...evidence.residuals import Dependence
 from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, signed
 from .judged_data import Curve
-from .words import readable
 
 Array = np.ndarray[Any, Any]
 

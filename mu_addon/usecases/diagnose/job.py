@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 
@@ -14,9 +13,9 @@ from ...design.parameters import Unit, load_preset, read_unit, to_toml
 from ...design.settings import PRESET
 from ...errors import InputError
 from ...evidence.extended import ExtendedModel, load_model
-from ...measured import Experiment, Measured, read_folder
+from ...evidence.simulator import bends, unit_behind
+from ...measured import Measured, read_folder
 from ...measured.folder import FILE, described, experiments_digest, require_same_data
-from ...measured.kinds import OF_A_UNIT
 from ...meshing.settings import SELF_CONTACT
 from ...run.folder import FolderLayout
 from ...run.inputs import FORMAT, named_path, read_inputs
@@ -84,7 +83,9 @@ class Job:
     @property
     def unit_settings(self) -> UnitSettings:
         """Settings of the unit's simulation."""
-        settings, subject = unit_settings_of(self), self.subject
+        from ...evidence.unit_fem import UnitSettings
+
+        settings, subject = self.settings or UnitSettings(self_contact=self.self_contact), self.subject
         if self.unknown is None or subject is None or settings.designs:
             return settings
         return attrs.evolve(settings, designs=self.unknown.designs(subject))
@@ -96,7 +97,7 @@ class Job:
             "experiments_sha256": experiments_digest(self.measured),
             "program_sha256": _program(),
             "settings": None if self.settings is None else repr(self.settings),
-            **self_contact_of(self),
+            "self_contact": self.self_contact if bends(self.measured.experiments) else None,
             "data": described(self.measured),
             "run": {"data": str(self.measured.folder.resolve())},
         }
@@ -123,43 +124,10 @@ def read_job(folder: Path) -> Job:
     return Job(
         measured,
         unit,
-        **self_contact_in(values),
+        self_contact=values.get("self_contact", SELF_CONTACT.default) is True,
         known=load_model(known) if known.is_file() else None,
         unknown=unknown_of(unknown, unit or load_preset(PRESET)) if unknown.is_file() else None,
     )
-
-
-def unit_settings_of(job: Any) -> UnitSettings:
-    """Settings of the simulation of a job's unit: its own, or those of the printed body."""
-    from ...evidence.unit_fem import UnitSettings
-
-    own: UnitSettings | None = job.settings
-    return own or UnitSettings(self_contact=job.self_contact)
-
-
-def self_contact_of(job: Any) -> dict[str, Any]:
-    """Self-contact as an entry of a job's file of inputs; none where no unit is simulated."""
-    return {"self_contact": job.self_contact} if bends(job.measured.experiments) else {}
-
-
-def self_contact_in(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Self-contact of a file of inputs."""
-    return {"self_contact": values.get("self_contact", SELF_CONTACT.default) is True}
-
-
-def bends(experiments: Sequence[Experiment]) -> bool:
-    """Return True if a unit is simulated for some experiment."""
-    return any(e.kind in OF_A_UNIT for e in experiments)
-
-
-def unit_behind(experiments: Sequence[Experiment], unit: Unit | None = None) -> Unit | None:
-    """Unit of the experiments, the preset where none is given; None where no experiment needs one.
-
-    A block of lattice is a unit's where its cells are counted.
-    """
-    if bends(experiments) or any(e.cells for e in experiments):
-        return unit or load_preset(PRESET)
-    return None
 
 
 @cache

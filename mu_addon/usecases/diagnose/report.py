@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...evidence.effect import Parameter
+from ...evidence.effect import Parameter, bare, readable
 from ...evidence.fit import Fit
 from ...evidence.found_causes import RIVAL_DELTA_CHI2
 from ...evidence.record import KNOWN, repeats
@@ -21,10 +21,11 @@ from ...files import write_text
 from ...report.html import cards, facts_table, figure, note, page, table
 from ...report.plots import CHOSEN, INK, signed
 from ...run.context import RunContext
+from ...run.parts import listed
 from ...run.versions import package_versions
 from . import charts as pictures
 from .judged_data import Curve, JudgedData, curves
-from .words import advice, alternatives, bare, between, called, in_a_table, listed, readable, sentence, to_do
+from .words import advice, alternatives, between, called, in_a_table, sentence, to_do
 
 FILES = {
     "diagnose.toml": "inputs of this run",

@@ -16,11 +16,13 @@ from ...design.parameters import Unit
 from ...errors import InputError
 from ...evidence.diagnosis import diagnose
 from ...evidence.drive import reading_noise
+from ...evidence.effect import readable
 from ...evidence.extended import ExtendedModel, Fitted, extended_model, stacked
 from ...evidence.prediction import lattice_compression, unit_pressure
 from ...evidence.prediction.effective_pressure import REFERENCE
 from ...evidence.readings import STAYS, dwell, quantum
-from ...evidence.simulator import Composite, Simulator
+from ...evidence.simulator import Composite, Simulator, bends
+from ...evidence.simulators import BASE, DESIGNS, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
 from ...evidence.verdict import Verdict
 from ...files import write_csv, write_json
 from ...measured import Measured
@@ -31,12 +33,11 @@ from ...run.folder import begin, same_inputs
 from ...run.progress import Progress
 from ...run.progress_estimate import Plan
 from ...run.usecase import UseCase
-from .job import LAYOUT, SHAPES, UNKNOWN, Job, bends, read_job
+from .job import LAYOUT, SHAPES, UNKNOWN, Job, read_job
 from .judged_data import JudgedData, curves
 from .report import write_report
-from .simulators import BASE, DESIGNS, EFFECTS, SHARES, SIZES, simulations_plan, simulators_of
 from .unknown import ROUNDS, Shapes, Unknown, leading, shapes
-from .words import advice, readable, sentence, to_do, warm
+from .words import advice, sentence, to_do, warm
 
 if TYPE_CHECKING:
     from ...evidence.unit_fem import UnitSettings

@@ -9,7 +9,17 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ...evidence.acceptance import BOUND
-from ...evidence.effect import BATCH, FORCE_SCALE, OF, SLIP, STEP, THICKNESS, Effect, Parameter
+from ...evidence.effect import (
+    BATCH,
+    FORCE_SCALE,
+    OF,
+    SLIP,
+    STEP,
+    THICKNESS,
+    Effect,
+    bare,
+    readable,
+)
 from ...evidence.found_causes import Cause
 from ...evidence.pooled import sizes_of
 from ...evidence.prediction.marker_slip import Recordings
@@ -19,6 +29,7 @@ from ...evidence.scatter import STATED, noise_limit
 from ...evidence.sensitivity import best_seen
 from ...evidence.verdict import Verdict
 from ...measured import Experiment
+from ...run.parts import listed
 from .remedies import in_the_simulation, what_to_do
 
 # Of the table of dependences: the size of what is left against the data's own spread.
@@ -29,7 +40,6 @@ _INSTEAD = {
     "the same hold with a plug of metal in the unit's place": "the same hold with soapy water on its joints",
     "a longer hold, and the same in a rigid chamber of that volume": "a hold ten times as long",
 }
-_HYPHENED = re.compile(r"\b(rate|self)_(independent|heating)")
 _LATER = re.compile(r"^of tests from (.*) on$")
 _ALONE = re.compile(r": (\d+) of (\d+) readings stand alone")
 # Most names of a set in its headline.
@@ -64,11 +74,6 @@ MOST_LIMITS = 5
 MOST_SHOWN = 3
 
 
-def readable(name: str) -> str:
-    """An effect's or quantity's name for a reader."""
-    return _HYPHENED.sub(r"\1-\2", name).replace("_", " ")
-
-
 def called(effect: Effect) -> str:
     """An effect's title for a reader; a scale of force with its possible causes."""
     return " ".join(_parts(effect))
@@ -93,18 +98,6 @@ def alternatives(effects: Sequence[Effect | str]) -> str:
     if len(choices) in (1, len(effects)):
         return listed(choices, "or")
     return f"{'; '.join(choices[:-1])}; or {choices[-1]}"
-
-
-def listed(names: Sequence[str], last: str = "and") -> str:
-    """Names in a row: "a, b and c"."""
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" {last} " + names[-1]
-
-
-def bare(p: Parameter) -> str:
-    """A parameter's name for a reader, without the unit that follows its value."""
-    unit = p.unit.replace("1/", "per_").replace("/h", "_per_hour").replace("/", "_")
-    name, of, whose = p.name.partition(OF)
-    return readable(name.removesuffix(f"_{unit}") if unit else name) + of + whose
 
 
 def between(low: float, high: float) -> str:

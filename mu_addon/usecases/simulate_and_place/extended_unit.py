@@ -10,11 +10,13 @@ import attrs
 
 from ...design.parameters import Unit
 from ...errors import InputError
+from ...evidence.effect import readable
 from ...evidence.extended import ExtendedModel, Fitted, load_model
 from ...evidence.lattice_fem import printed
 from ...evidence.prediction.lattice_compression import SLENDER, ComputedCell
 from ...evidence.unit_effects import EFFECTS, Body
-from ..diagnose.words import alternatives, listed, readable
+from ...run.parts import listed
+from ..diagnose.words import alternatives
 from .named_effects import NAMES, NamedEffects, law_within
 
 Values = Mapping[str, Fitted]

@@ -8,25 +8,28 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...design.parameters import Unit
-from ...errors import InputError
-from ...evidence.prediction import blocked_force, lattice_compression, pressure_step, unit_pose, unit_pressure
-from ...evidence.prediction.bench import bench_simulators
-from ...evidence.simulator import Simulator
-from ...measured import Experiment
-from ...measured.kinds import OF_A_UNIT
-from ...run.progress import Progress
-from ...run.progress_estimate import Plan
+from ..design.parameters import Unit
+from ..errors import InputError
+from ..measured import Experiment
+from ..measured.kinds import OF_A_UNIT
+from ..run.progress import Progress
+from ..run.progress_estimate import Plan
+from .prediction import blocked_force, lattice_compression, pressure_step, unit_pose, unit_pressure
+from .prediction.bench import bench_simulators
+from .simulator import Simulator
 
 if TYPE_CHECKING:
-    from ...evidence.unit_fem import UnitSettings
+    from .unit_fem import UnitSettings
 
+LATTICE = "lattice"
 LATTICE_S, UNIT_S = 90.0, 24.0
 """Seconds of the simulation of a block, and of a unit of one chamber."""
 BY_CHAMBERS = 1.6
 """Power of their number by which a unit's seconds grow: measured with three and six."""
 BASE, EFFECTS, SIZES = ("unit", "unit with each effect", "unit at every size in question")
 """Stages of a unit's simulation: without effects, at each effect's first sizes, at the others."""
+HELD = "unit with its tip held"
+"""Stage of a unit on a load cell."""
 DESIGNS, DESIGN_S = "unit of every design", 50.0
 """Stage of units with other values of unknown parameters, and the seconds of one of them."""
 SHARES = {BASE: 0.29, EFFECTS: 0.49, SIZES: 0.22}
@@ -49,15 +52,15 @@ def simulations_plan(experiments: Sequence[Experiment], behind: Unit | None, set
     unit = UNIT_S * chambers**BY_CHAMBERS * (TOUCHING if lowest < TOUCHING_KPA else 1.0)
     lattice = []
     if any(e.cells for e in experiments) and behind is not None:
-        from ...evidence.lattice_fem import to_compute
+        from .lattice_fem import to_compute
 
         # What is wrong with a block is told by the stage itself.
         with suppress(InputError):
-            lattice = [("lattice", 0.2 + LATTICE_S * to_compute(experiments, behind))]
+            lattice = [(LATTICE, 0.2 + LATTICE_S * to_compute(experiments, behind))]
     free = [(BASE, unit)] if kinds & set(FREE) else []
     if settings.designs:
         free.append((DESIGNS, DESIGN_S * len(settings.designs.units)))
-    return [*lattice, *free, *([("unit with its tip held", unit)] if blocked_force.KIND in kinds else [])]
+    return [*lattice, *free, *([(HELD, unit)] if blocked_force.KIND in kinds else [])]
 
 
 def simulators_of(
@@ -77,9 +80,9 @@ def simulators_of(
     scalings: Mapping[str, lattice_compression.Scaling] = {}
     if any(e.cells for e in experiments):
         assert unit is not None
-        from ...evidence.lattice_fem import scalings as computed
+        from .lattice_fem import scalings as computed
 
-        with progress.stage("lattice"):
+        with progress.stage(LATTICE):
             scalings, remarks = computed(experiments, unit, cache, lambda _, share: progress.update(share))
     found = bench_simulators(experiments, scalings)
     if any(e.kind in OF_A_UNIT for e in experiments):
@@ -99,26 +102,48 @@ def _of_a_unit(
     stage: str,
 ) -> tuple[dict[str, Simulator], list[str]]:
     """Simulators of the kinds in `OF_A_UNIT`, and the reasons why others could not be simulated."""
-    from ...evidence.unit_fem import blocked_responses, unit_responses
-
     kinds = {e.kind for e in experiments}
     found: dict[str, Simulator] = {}
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        if kinds & set(FREE):
-            with progress.stage(stage):
-                free = unit_responses(
-                    unit, experiments, settings, cache, lambda _, share: progress.update(share)
+    left_out: list[str] = []
+    for title, wanted in ((stage, kinds & set(FREE)), (HELD, kinds & {blocked_force.KIND})):
+        if wanted:
+            with progress.stage(title):
+                simulated, reasons = of_a_unit(
+                    experiments, unit, cache, progress.update, settings, held=title == HELD
                 )
-            found |= {kind: FREE[kind](free, experiments) for kind in FREE if kind in kinds}
-        if blocked_force.KIND in kinds:
-            with progress.stage("unit with its tip held"):
-                held = blocked_responses(
-                    unit, experiments, settings, cache, lambda _, share: progress.update(share)
-                )
-            found[blocked_force.KIND] = blocked_force.BlockedForce(held, experiments)
-    # Location and remedy on further lines belong to a simulation that nobody asked for.
-    left_out = [str(warning.message).partition("\n")[0] for warning in caught]
+            found |= simulated
+            left_out += reasons
     for words in left_out:
         progress.warning(words, "unit")
     return found, left_out
+
+
+def of_a_unit(
+    experiments: Sequence[Experiment],
+    unit: Unit,
+    cache: Path,
+    progress: Callable[[float], None],
+    settings: UnitSettings | None = None,
+    held: bool = False,
+) -> tuple[dict[str, Simulator], list[str]]:
+    """Simulators of experiments on a unit that bends freely, or with its tip held, by kind.
+
+    Also the reasons why effects could not be simulated. progress: called with the share done.
+    """
+    from .unit_fem import blocked_responses, unit_responses
+
+    def share(_: str, done: float) -> None:
+        progress(done)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found: dict[str, Simulator]
+        if held:
+            forces = blocked_responses(unit, experiments, settings, cache, share)
+            found = {blocked_force.KIND: blocked_force.BlockedForce(forces, experiments)}
+        else:
+            free = unit_responses(unit, experiments, settings, cache, share)
+            kinds = {e.kind for e in experiments}
+            found = {kind: FREE[kind](free, experiments) for kind in FREE if kind in kinds}
+    # Location and remedy on further lines belong to a simulation that nobody asked for.
+    return found, [str(warning.message).partition("\n")[0] for warning in caught]
