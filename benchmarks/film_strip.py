@@ -22,10 +22,10 @@ from mu_addon.design.anchors import anchor_points, window
 from mu_addon.design.parameters import read_unit
 from mu_addon.design.surface import stl_surface
 from mu_addon.fem.bending_angle import bending_angle_deg
+from mu_addon.report.motion_files import FOLDER, MODEL_A, read_motion
 from mu_addon.report.render import Cut, Part, fit, render
 from mu_addon.report.shapes import tube
 from mu_addon.report.unit_pictures import MIRROR_PLANE, PATH_COLOR, unit_parts
-from mu_addon.usecases.simulate_and_place.motion_files import FOLDER, MODEL_A, read_motion
 
 PRESSURES_kPa = (-20, -10, 0, 20, 40)
 FRAME = (340, 480)  # pixels

@@ -23,12 +23,12 @@ from ..design.stl_and_nodes import write_stl
 from ..errors import InputError
 from ..files import read_npz, write_npz
 from ..reading import parse_json
+from ..report.motion_files import REGIONS, read_motion
 from ..run.context import RunContext
 from ..run.folder import FolderLayout
 from ..run.inputs import FORMAT, read_inputs
 from ..run.usecase import UseCase
 from ..toml_writer import toml_text
-from .simulate_and_place.motion_files import REGIONS, read_motion
 from .simulate_and_place.run_difference import difference
 
 RESULT, POINTS = "prepared.npz", "points.npz"

@@ -13,9 +13,9 @@ from mu_addon.fem.state import State
 from mu_addon.fem.trajectory import Trajectory
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.motion_files import write_model_a
 from mu_addon.usecases.simulate_and_place import unit_runs
 from mu_addon.usecases.simulate_and_place.job import Job, grasp, write_study
-from mu_addon.usecases.simulate_and_place.motion_files import write_model_a
 
 from .made_up import bent
 

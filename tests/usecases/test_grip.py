@@ -19,13 +19,13 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.motion_files import read_motion
 from mu_addon.report.pc2 import read_pc2
 from mu_addon.usecases.grip.grasp import grasp
 from mu_addon.usecases.grip.motion_files import even, write_halves
 from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
 from mu_addon.usecases.grip.run import Job
 from mu_addon.usecases.grip.settings import Cube, Grip
-from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 
 COARSE = MeshSettings(refine=0.35)
 

@@ -19,12 +19,7 @@ from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import mirror
 from mu_addon.meshing.quality import element_volumes
 from mu_addon.placement.candidates import Candidate, candidate_paths
-from mu_addon.report.pc2 import read_pc2, write_pc2
-from mu_addon.run.cache import Cache
-from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
-from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
-from mu_addon.usecases.simulate_and_place.job import Job
-from mu_addon.usecases.simulate_and_place.motion_files import (
+from mu_addon.report.motion_files import (
     FIELDS,
     MODEL_A,
     REGIONS,
@@ -35,6 +30,11 @@ from mu_addon.usecases.simulate_and_place.motion_files import (
     write_model_a,
     write_sensitivity,
 )
+from mu_addon.report.pc2 import read_pc2, write_pc2
+from mu_addon.run.cache import Cache
+from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
+from mu_addon.usecases.simulate_and_place.charts import ANGLE, delta_name, write_angle, write_delta
+from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.simulate_and_place.path_motion import keep_motion
 
 from . import made_up

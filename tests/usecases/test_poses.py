@@ -6,7 +6,7 @@ import pytest
 
 from mu_addon.errors import InputError
 from mu_addon.fem.bending_angle import bending_angle_deg
-from mu_addon.usecases.simulate_and_place.motion_files import read_motion
+from mu_addon.report.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.poses import poses
 
 from .bent_motion import ANGLES, PRESSURES, write_bent_motion

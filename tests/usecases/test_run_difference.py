@@ -6,7 +6,7 @@ import pytest
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
-from mu_addon.usecases.simulate_and_place.motion_files import MODEL_A, read_motion
+from mu_addon.report.motion_files import MODEL_A, read_motion
 from mu_addon.usecases.simulate_and_place.run_difference import difference
 
 from .bent_motion import ANGLES, PRESSURES, bent, write_bent_motion

@@ -15,11 +15,11 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.files import write_npz
 from mu_addon.meshing.mesh import MEMBRANE
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.expected import BYTES, BYTES_A_NODE, expected_nodes
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.run import USE_CASE, console_summary, run_stages
 from mu_addon.usecases.simulate_and_place.study import Study
 from tests.design.kinds import custom, octet

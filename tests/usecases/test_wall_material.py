@@ -30,10 +30,10 @@ from mu_addon.materials.law_forms import FORMS
 from mu_addon.materials.library import load_material, material_text, parse_material
 from mu_addon.measured import read_folder
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.motion_files import read_motion
 from mu_addon.run.context import RunContext
 from mu_addon.run.progress import Progress
 from mu_addon.usecases.simulate_and_place.job import Job, read_job
-from mu_addon.usecases.simulate_and_place.motion_files import read_motion
 from mu_addon.usecases.simulate_and_place.motion_tables import MOTION_COLUMNS
 from mu_addon.usecases.simulate_and_place.study import Study
 

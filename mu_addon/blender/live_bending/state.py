@@ -20,9 +20,9 @@ from bpy.app.handlers import persistent
 from ...errors import InputError, MuError
 from ...placement.sampling import polynomials
 from ...reading import file_bytes, parse_json
+from ...report.motion_files import REGIONS, Motion, read_motion
 from ...run.child import RUNNING, Child
 from ...run.folder import write_run
-from ...usecases.simulate_and_place.motion_files import REGIONS, Motion, read_motion
 from ..jobs import start_child
 from ..preview import skeletons
 from ..shared import displays, viewports

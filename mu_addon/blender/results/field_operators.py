@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty
 from mathutils import Quaternion, Vector
 
 from ...errors import InputError
-from ...usecases.simulate_and_place.motion_files import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
+from ...report.motion_files import CONTACT_PRESSURE, MODEL_A, REGIONS, SENSITIVITY
 from ..shared import updates, viewports
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object

@@ -17,8 +17,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...errors import InputError, MuError
-from ...report.pc2 import read_pc2, write_pc2
-from ...usecases.simulate_and_place.motion_files import (
+from ...report.motion_files import (
     MODEL_A,
     PLAYED,
     REGIONS,
@@ -26,6 +25,7 @@ from ...usecases.simulate_and_place.motion_files import (
     Motion,
     Skin,
 )
+from ...report.pc2 import read_pc2, write_pc2
 from ..jobs.prepared import NotPrepared
 from ..jobs.start_child import JOB_ENDED
 from ..preview import skeletons

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ...errors import InputError
-from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
+from ...report.motion_files import FOLDER, MODEL_A
 from ..shared import viewports
 from ..simulate import study_folder as studies
 from ..unit import object as unit_object

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import bpy
 
+from ...report.motion_files import FOLDER, MODEL_A
 from ...usecases.simulate_and_place.charts import ANGLE, delta_name
-from ...usecases.simulate_and_place.motion_files import FOLDER, MODEL_A
 from ..shared.file_cache import icon_of
 from ..shared.panels import alert, wrapped
 from ..shared.wording import path_symbol, sentence

@@ -15,7 +15,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...errors import InputError
-from ...usecases.simulate_and_place.motion_files import REGIONS, Motion
+from ...report.motion_files import REGIONS, Motion
 from ...usecases.simulate_and_place.poses import Poses, poses
 from ..preview import materials, skeletons
 from ..results import motion as motion_parts

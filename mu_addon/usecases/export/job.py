@@ -154,7 +154,7 @@ def read_job(folder: Path) -> Job:
 
 def deformed_in(run: Path, unit: Unit, kPa: float) -> Deformed:
     """A state of a unit's motion in the folder of a run; raises InputError if it is not there."""
-    from ..simulate_and_place.motion_files import FOLDER, MODEL_A, read_motion
+    from ...report.motion_files import FOLDER, MODEL_A, read_motion
 
     motion = read_motion(run)
     if read_unit(run / UNIT) != unit:

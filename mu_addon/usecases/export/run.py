@@ -139,7 +139,7 @@ class Export:
 
     def _deformed(self, solid: Solid, state: Deformed) -> None:
         """Write the solid as it is in a state of the simulated motion: its surface follows the mesh."""
-        from ..simulate_and_place.motion_files import MODEL_A, read_motion
+        from ...report.motion_files import MODEL_A, read_motion
 
         motion = read_motion(state.run)
         number = int(np.abs(motion.state_kPa - state.kPa).argmin())

@@ -24,9 +24,9 @@ from ...fem.state import State
 from ...fem.trajectory import Trajectory
 from ...files import make_folder, read_npz, write_npz
 from ...meshing.mesh import Mesh
+from ...report.motion_files import read_motion, write_model_a
 from ...report.pc2 import write_pc2
 from ...report.vtk import write_trajectory
-from ..simulate_and_place.motion_files import read_motion, write_model_a
 from .grasp import Grasp
 
 Array = np.ndarray[Any, Any]

@@ -32,11 +32,11 @@ from ...fem.trajectory import Trajectory
 from ...files import write_json
 from ...meshing.mesh import Mesh
 from ...reading import file_bytes, parse_json
+from ...report.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
 from ...run.context import RunContext
 from ...run.usecase import UseCase
 from ..simulate_and_place.job import Job as Study
 from ..simulate_and_place.job import read_job as read_study
-from ..simulate_and_place.motion_files import Surface, SurfaceFields, surfaces_of, write_model_a
 from .requests import ASKED, BENT, CELLS, LAYOUT, LEVELS, REQUEST, Job, read_job
 
 Array = np.ndarray[Any, Any]

@@ -12,9 +12,9 @@ import numpy as np
 
 from ...files import write_bytes
 from ...report.heatmaps import draw_deviation
+from ...report.motion_files import FOLDER
 from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, WIDTH, canvas, label, signed, styled
 from ...report.results import Floats, Signals
-from .motion_files import FOLDER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -32,9 +32,9 @@ from ...placement.sensitivity_map import (
     shares_of_time,
     stable_part,
 )
+from ...report.motion_files import write_sensitivity
 from ...report.results import LatticePath, LatticeSearch
 from ...report.vtk import write_fields
-from .motion_files import write_sensitivity
 
 if TYPE_CHECKING:
     from .job import Job

@@ -10,7 +10,7 @@ import numpy as np
 from ...fem.kinematics import MIRROR
 from ...meshing.mesh import Mesh, images
 from ...placement.candidates import Candidate
-from .motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
+from ...report.motion_files import IMAGE, REGIONS, SurfaceFields, surface_of, write_path
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...fem.bending_angle import TipSection
-from .motion_files import Motion
+from ...report.motion_files import Motion
 
 Array = np.ndarray[Any, Any]
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...design.parameters import assumed, stated
 from ...errors import InputError
 from ...files import plain, write_bytes, write_text
+from ...report.motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from ...report.results import (
     Gate,
     PaintedStates,
@@ -23,7 +24,6 @@ from ...report.results import (
 )
 from ...run.cache import key
 from ...run.versions import package_versions
-from .motion_files import CONTACT_PRESSURE, REGIONS, read_motion
 from .named_effects import parameters_of
 
 if TYPE_CHECKING:

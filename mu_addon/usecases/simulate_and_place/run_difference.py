@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from ...errors import InputError
-from .motion_files import Motion, Skin
+from ...report.motion_files import Motion, Skin
 
 Array = np.ndarray[Any, Any]
 

@@ -26,6 +26,7 @@ from ...meshing.mesh import Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
 from ...reading import file_bytes, parse_json
+from ...report.motion_files import write_model_a
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
 from ...report.vtk import write_mesh, write_trajectory
 from ...run.cache import Cache
@@ -39,7 +40,6 @@ from .expected import SOLVING, expected_bytes, expected_nodes
 from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
-from .motion_files import write_model_a
 from .motion_tables import Row, in_order, instants, write_motion, write_self_contact, write_stretch
 from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES

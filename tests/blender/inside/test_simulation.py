@@ -24,7 +24,7 @@ from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.base_classes import parameters
 from mu_addon.errors import InputError
 from mu_addon.meshing.settings import MeshSettings
-from mu_addon.usecases.simulate_and_place.motion_files import read_motion
+from mu_addon.report.motion_files import read_motion
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by

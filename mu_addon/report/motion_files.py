@@ -22,17 +22,17 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from ...design.quantity import in_kPa
-from ...errors import InputError
-from ...fem.embedding import Embedding, embed
-from ...files import read_npz, write_npz
-from ...meshing.mesh import LATTICE, MEMBRANE, Mesh
-from ...placement.sampling import polynomials
-from ...run.cache import key
+from ..design.quantity import in_kPa
+from ..errors import InputError
+from ..fem.embedding import Embedding, embed
+from ..files import read_npz, write_npz
+from ..meshing.mesh import LATTICE, MEMBRANE, Mesh
+from ..placement.sampling import polynomials
+from ..run.cache import key
 
 if TYPE_CHECKING:
-    from ...fem.materials import Materials
-    from ...fem.trajectory import Trajectory
+    from ..fem.materials import Materials
+    from ..fem.trajectory import Trajectory
 
 Array = np.ndarray[Any, Any]
 
@@ -263,8 +263,8 @@ class SurfaceFields:
     """Stress and stretch of a mesh's states at some nodes (v,) of each region, given by its name."""
 
     def __init__(self, mesh: Mesh, nodes: dict[str, Array]) -> None:
-        from ...fem.elements import reference_gradients
-        from ...fem.stress import NodalMean
+        from ..fem.elements import reference_gradients
+        from ..fem.stress import NodalMean
 
         self._mesh = mesh
         self._reference = known = reference_gradients(mesh.nodes, mesh.tets)
@@ -282,7 +282,7 @@ class SurfaceFields:
 
         of_elements: gets the fields (m,) of every state's elements, of the means over their points.
         """
-        from ...fem.stress import cauchy
+        from ..fem.stress import cauchy
 
         found: dict[str, list[Array]] = {f"{r}_{field}": [] for r in self._means for field in FIELDS}
         for number, u in enumerate(displacements):
@@ -298,8 +298,8 @@ class SurfaceFields:
 
 def _fields_of(sigma: Array, F: Array) -> dict[str, Array]:
     """`FIELDS` (v,) of Cauchy stresses (v, 3, 3) in MPa and deformation gradients (v, 3, 3)."""
-    from ...fem.lattice_law import stretches
-    from ...fem.stress import von_mises
+    from ..fem.lattice_law import stretches
+    from ..fem.stress import von_mises
 
     stress_kPa, stretch = in_kPa(sigma), stretches(F)
     values = von_mises(stress_kPa), np.linalg.eigvalsh(stress_kPa)[:, 2], stretch[:, 2], stretch[:, 0]
@@ -313,7 +313,7 @@ def surfaces_of(mesh: Mesh) -> dict[str, Surface]:
 
 def surface_of(mesh: Mesh, region: int) -> Surface:
     """Surface of a region of a mesh."""
-    from ...report.unit_pictures import region_skin
+    from .unit_pictures import region_skin
 
     triangles = region_skin(mesh, region)
     node, numbered = np.unique(triangles, return_inverse=True)
@@ -335,7 +335,7 @@ def write_path(folder: Path, name: str, state_kPa: Array, difference_mm: Array, 
 
 def write_sensitivity(folder: Path, mesh: Mesh, by_modulus: Array) -> None:
     """Write dJ/dE (m,) in mm/MPa of every element, averaged at the surfaces' nodes. Raises OutputError."""
-    from ...fem.stress import NodalMean
+    from ..fem.stress import NodalMean
 
     points = 1 if mesh.order == 1 else 4
     arrays = {}
