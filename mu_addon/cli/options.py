@@ -18,11 +18,14 @@ Commands = argparse._SubParsersAction
 Group = argparse._ArgumentGroup | argparse.ArgumentParser
 
 
-def add_setting(command: Group, d: Description, metavar: Any = None, many: bool = False) -> None:
+def add_setting(
+    command: Group, d: Description, metavar: Any = None, many: bool | int = False, alone: str = ""
+) -> None:
     """Add the option of a setting: its type, choices, default and text; also --no-NAME of a flag that is set.
 
-    Its name is the setting's without the unit; many: it takes several words. Bounds are checked by the job. A
-    text that is empty by default is None without the option.
+    Its name is the setting's without the unit; many: it takes several words, or so many; alone: its value
+    where it stands without one. Bounds are checked by the job. A text that is empty by default is None
+    without the option.
     """
     unit = d.unit.replace("/", "_per_")
     option = (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
@@ -40,7 +43,8 @@ def add_setting(command: Group, d: Description, metavar: Any = None, many: bool 
             choices=d.choices or None,
             default=d.default if d.default != "" else None,
             metavar=metavar,
-            nargs="+" if many else None,
+            nargs="+" if many is True else many or ("?" if alone else None),
+            const=alone or None,
             help=help_of(d),
         )
 

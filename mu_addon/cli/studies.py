@@ -91,7 +91,7 @@ def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
     """The option of an input's plain values."""
     first = one.descriptions[0]
     if len(one.descriptions) == 1:
-        add_setting(command, first, one.metavar, one.many)
+        add_setting(command, first, one.metavar, one.many, one.alone)
         return
     defaults = [d.default for d in one.descriptions]
     shown = " ".join(f"{value:g}" for value in defaults)

@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from .printing.repair import repaired as repaired
     from .printing.slices import even_heights as even_heights
     from .printing.slices import slices as slices
+    from .printing.vents import Vented as Vented
+    from .printing.vents import vented as vented
     from .profile import cavity_radius as cavity_radius
     from .profile import cavity_volume as cavity_volume
     from .profile import membrane_volume as membrane_volume

@@ -12,6 +12,8 @@ UP = (0.0, 0.0, 1.0)
 QUALITY = described(
     "quality", "interactive", "facet resolution of the printable surface", choices=("interactive", "export")
 )
+FINE = QUALITY._replace(default="export")
+"""The quality of what is to be printed."""
 PRINTER = described(
     "printer", "form-4-elastic-50a", "limits of the printer and its resin: a shipped name or a TOML file"
 )

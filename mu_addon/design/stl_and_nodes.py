@@ -20,10 +20,15 @@ def write_stl(solid: Solid, path: str | Path) -> None:
 
 
 def write_nodes(unit: Unit, path: str | Path) -> None:
-    """Write every lattice node as text: `#` header lines, then id, kind and x, y, z in mm, split by spaces.
+    """Write `nodes_text`. Raises OutputError."""
+    write_bytes(Path(path), nodes_text(unit).encode())
+
+
+def nodes_text(unit: Unit) -> str:
+    """Every lattice node as text: `#` header lines, then id, kind and x, y, z in mm, split by spaces.
 
     The id counts from 0; kind is `centre` or `corner` of a cell, `node` for another, or `P1`, `P2`, ... for
-    those that are anchors. Raises OutputError.
+    those that are anchors.
     """
     lattice = lattice_of(unit.dimensions)
     kinds = np.select([lattice.is_centre, lattice.is_corner], ["centre", "corner"], "node").tolist()
@@ -39,4 +44,4 @@ def write_nodes(unit: Unit, path: str | Path) -> None:
     ]
     for index, (kind, (x, y, z)) in enumerate(zip(kinds, lattice.nodes, strict=True)):
         lines.append(f"{index} {kind} {x:.6f} {y:.6f} {z:.6f}")
-    write_bytes(Path(path), ("\n".join(lines) + "\n").encode())
+    return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -21,7 +22,8 @@ from ..design.dimensions import Dimensions
 from ..design.profile import cavity_arcs, cavity_volume, outer_arcs, outer_volume
 from ..design.waveguide import Bar
 from ..errors import InputError, MeshingError
-from ..files import replacing
+from ..files import output_error, replacing
+from ..reading import file_bytes
 from .gmsh_model import gmsh_model, load_gmsh
 
 Array = np.ndarray[Any, Any]
@@ -103,6 +105,17 @@ def step_volume(path: Path) -> tuple[int, float]:
             raise MeshingError(
                 f"gmsh could not read the STEP file back: {error}", str(path), "leave STEP out"
             ) from error
+
+
+def step_bytes(name: str, d: Dimensions, bar: Bar | None = None) -> tuple[bytes, int, float]:
+    """One body's STEP file as of `write_step`, and what `step_volume` finds in it. Raises their errors."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="mu-step-") as folder:
+            path = Path(folder) / f"{name}.step"
+            write_step(name, d, path, bar)
+            return file_bytes(path), *step_volume(path)
+    except OSError as error:
+        raise output_error(error, Path(tempfile.gettempdir())) from error
 
 
 def _enclosed(gmsh: Any, solid: tuple[int, int]) -> float:

@@ -15,6 +15,7 @@ from ..errors import InputError, MuError, OutputError
 from ..files import write_bytes
 from .cache import key
 from .context import KEEP_EVERY_S, RunContext
+from .inputs import digest
 from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
 from .pool import Pool, WorkerDiedError
 from .progress import Progress
@@ -42,6 +43,8 @@ class Execution:
         self._parts: dict[str, tuple[str, list[Part]]] = {}
         self._recorded: list[list[str]] = []
         self._told: set[str] = set()
+        # Digest of what each file holds: one that is shown again is not written again.
+        self._written: dict[str, str] = {}
         self._shown_s = 0.0
 
     @property
@@ -60,7 +63,7 @@ class Execution:
         """Stages with the seconds that are left of each, by what the cache holds."""
         found = []
         for title, tasks in self._titled():
-            seconds = self._stages[tasks[0][0]].seconds(self.study)
+            seconds = self._stages[tasks[0][0]].seconds(self.study, title)
             missing = sum(not self.results.is_kept(task) for task in tasks) / len(tasks)
             found.append((title, max(missing * seconds, min(LOADED * seconds, LOADED_S))))
         return found
@@ -249,8 +252,9 @@ class Execution:
 
     def _write(self, file: File) -> None:
         made = file.make(self.folder / file.name)
-        if made is not None:
+        if made is not None and self._written.get(file.name) != digest(made):
             write_bytes(self.folder / file.name, made.encode() if isinstance(made, str) else made)
+            self._written[file.name] = digest(made)
 
 
 # The study of a process of the pool, which remembers what it made.

@@ -59,8 +59,9 @@ class Input:
     descriptions: of the plain values that it is, or is made of (`design.quantity.Description`); none where
     faces ask for it in their own way. decides: False for one that decides no figure, such as a number of
     processes: it is in no key, and in the table [run] of the inputs' file. option: its name in a command, if
-    it is not that of the description; metavar: stands for its value there; many: it takes several words;
-    path: "file" or "folder" if it names one. An input of another kind overrides `made`, `write` and `read`.
+    it is not that of the description; metavar: stands for its value there; many: it takes several words, or
+    so many; alone: its value where the option stands without one; path: "file" or "folder" if it names one.
+    An input of another kind overrides `made`, `write` and `read`.
     """
 
     kind: str
@@ -68,7 +69,8 @@ class Input:
     decides: bool = True
     option: str = ""
     metavar: str | tuple[str, ...] | None = None
-    many: bool = False
+    many: bool | int = False
+    alone: str = ""
     path: str = ""
 
     def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> Any:
@@ -173,7 +175,7 @@ class Stage:
     name: str
     method: Callable[..., Any]
     title: str
-    seconds: Callable[[Any], float]
+    seconds: Callable[[Any, str], float]
     revision: int
     over: Over | None
     wanted: Callable[[Any], bool]
@@ -209,7 +211,7 @@ class Stage:
 
 def stage(
     title: str,
-    seconds: float | Callable[[Any], float] = 0.1,
+    seconds: float | Mapping[str, float] | Callable[[Any], float] = 0.1,
     *,
     over: Over | None = None,
     wanted: Callable[[Any], bool] = lambda study: True,
@@ -221,19 +223,23 @@ def stage(
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
     title: of its progress, with a set's names in braces; members of one title are one stage to a user.
-    seconds: expected on two cores, of the study; of a set, for all members of one title. wanted: False of a
-    study that does without it. kept: in the cache, which needs a result of the type that the method declares,
-    of arrays, numbers, texts and attrs classes of these; else it is made in each run. failing: words for a
-    warning; an error of the stage then does not end the run, and what needs it is left out. revision: raise
-    it when a change of the code changes the result. parallel: members may be made in processes of their own,
-    the study's `workers`, side by side with other parallel stages of the same title.
+    seconds: expected on two cores, of the study or by title; of a set, for all members of one title.
+    wanted: False of a study that does without it. kept: in the cache, which needs a result of the type
+    that the method declares, of arrays, numbers, texts and attrs classes of these; else it is made in
+    each run. failing: words for a warning; an error of the stage then does not end the run, and what
+    needs it is left out. revision: raise it when a change of the code changes the result. parallel:
+    members may be made in processes of their own, the study's `workers`, side by side with other parallel
+    stages of the same title.
     """
 
     if parallel and not kept:
         raise TypeError(f"stage {title!r}: what another process makes must be kept")
 
     def mark(method: Any) -> Any:
-        in_time = seconds if callable(seconds) else lambda study: seconds
+        def in_time(study: Any, of: str) -> float:
+            known = seconds[of] if isinstance(seconds, Mapping) else seconds
+            return known(study) if callable(known) else known
+
         setattr(
             method,
             _STAGE,

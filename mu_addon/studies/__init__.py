@@ -11,6 +11,7 @@ STUDIES = {
     "calibrate": "Calibrate",
     "check": "Check",
     "design-experiments": "DesignExperiments",
+    "export": "Export",
     "fit-material": "FitMaterial",
     "homogenize": "Homogenize",
     "measure": "Measure",

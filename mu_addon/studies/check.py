@@ -17,7 +17,7 @@ from ..files import json_text
 from ..run.inputs import digest, named_path, require_digest
 from ..run.parts import Beside, Chart, Fact, Fault, File, Part, Pictures, Sentence, Table, Warn, recorded
 from ..run.study import Found, Input, Node, Study, Tell, Written, given, intermediate, section, setting, stage
-from .inputs import NumbersInput, OnceInput, PrinterInput, UnitInput, WindowInput
+from .inputs import NumbersInput, OnceInput, PrinterInput, UnitInput, WindowInput, asked
 
 MOST_TRIANGLES = 1_000_000
 """Largest number of triangles of a file (nine units in one piece: 620 000); each takes 4 kB."""
@@ -147,19 +147,12 @@ class Check(Study):
     )
 
     unit: design.Unit | None = given(UnitInput(needed=False), default=None)
-    stl: PartFile | None = given(
-        PartInput(
-            descriptions=(
-                described(
-                    "stl",
-                    "",
-                    "STL file to check; if a unit is given too, the file is compared with the unit's nominal "
-                    "geometry; empty: none",
-                ),
-            ),
-            metavar="FILE",
-        ),
-        default=None,
+    stl: PartFile | None = asked(
+        PartInput,
+        "stl",
+        "STL file to check; if a unit is given too, the file is compared with the unit's nominal "
+        "geometry; empty: none",
+        metavar="FILE",
     )
     repair: bool = setting(
         described(
@@ -169,28 +162,19 @@ class Check(Study):
             "a fault with more than one remedy is refused",
         )
     )
-    path: design.Window | None = given(
-        WindowInput(
-            descriptions=(
-                described("path", "", "path of the unit's waveguide: alpha1, alpha2, ...; empty: none"),
-            ),
-            metavar="NAME",
-        ),
-        default=None,
+    path: design.Window | None = asked(
+        WindowInput,
+        "path",
+        "path of the unit's waveguide: alpha1, alpha2, ...; empty: none",
+        metavar="NAME",
     )
-    limits: str = given(
-        OnceInput(
-            descriptions=(
-                described(
-                    "limits",
-                    "",
-                    "filled-in limits.csv of `specimens`: measured limits, which replace those of the "
-                    "printer; empty: none",
-                ),
-            ),
-            metavar="FILE",
-        ),
-        default="",
+    limits: str = asked(
+        OnceInput,
+        "limits",
+        "filled-in limits.csv of `specimens`: measured limits, which replace those of the "
+        "printer; empty: none",
+        empty="",
+        metavar="FILE",
     )
     printer: design.Printer = given(PrinterInput(descriptions=(PRINTER,), metavar="NAME|FILE"))
     direction: tuple[float, ...] = given(
@@ -204,20 +188,13 @@ class Check(Study):
         ),
         default=UP,
     )
-    layers: tuple[float, ...] = given(
-        NumbersInput(
-            descriptions=(
-                described(
-                    "layers",
-                    "",
-                    "heights of the layers to draw, in mm above the part's lowest point; empty: 12, evenly "
-                    "spaced",
-                ),
-            ),
-            metavar="MM",
-            many=True,
-        ),
-        default=(),
+    layers: tuple[float, ...] = asked(
+        NumbersInput,
+        "layers",
+        "heights of the layers to draw, in mm above the part's lowest point; empty: 12, evenly spaced",
+        empty=(),
+        metavar="MM",
+        many=True,
     )
     quality: str = setting(QUALITY)
 

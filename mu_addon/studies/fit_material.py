@@ -11,12 +11,11 @@ import attrs
 
 from .. import materials, measured
 from ..design.declared_laws import form_names
-from ..design.quantity import described
 from ..errors import InputError
 from ..materials.settings import WEIGHTS
 from ..run.parts import Beside, Chart, Fact, File, Part, Sentence, Table, Warn, csv, listed, recorded
 from ..run.study import Members, Over, Study, derived, given, intermediate, section, setting, stage
-from .inputs import MeasuredInput, WordsInput
+from .inputs import MeasuredInput, WordsInput, asked
 
 TITLES = {"uniaxial": "uniaxial", "equibiaxial": "equibiaxial", "pure_shear": "pure shear"}
 Coupons = tuple["materials.Coupon", ...]
@@ -63,26 +62,15 @@ class FitMaterial(Study):
     }
 
     data: measured.Measured = given(MeasuredInput(data=_identity))
-    laws: tuple[str, ...] = given(
-        WordsInput(
-            descriptions=(described("laws", "", f"laws to fit: {', '.join(form_names())}; empty: all"),),
-            metavar="LAW",
-        ),
-        default=(),
+    laws: tuple[str, ...] = asked(
+        WordsInput, "laws", f"laws to fit: {', '.join(form_names())}; empty: all", empty=(), metavar="LAW"
     )
-    hold_out: tuple[str, ...] = given(
-        WordsInput(
-            descriptions=(
-                described(
-                    "hold_out",
-                    "",
-                    "test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear; "
-                    "empty: none",
-                ),
-            ),
-            metavar="MODE",
-        ),
-        default=(),
+    hold_out: tuple[str, ...] = asked(
+        WordsInput,
+        "hold_out",
+        "test modes held out of the fit for validation: uniaxial, equibiaxial, pure_shear; empty: none",
+        empty=(),
+        metavar="MODE",
     )
     weights: str = setting(WEIGHTS)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,13 +11,23 @@ from typing import Any
 import attrs
 
 from .. import design, materials, measured
-from ..design.quantity import in_kPa, in_MPa
+from ..design.quantity import described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
+from ..reading import file_text, unreadable
 from ..run.inputs import named_path, structured
-from ..run.study import Found, Input, Written
+from ..run.study import Found, Input, Written, given
 
 UNIT = "unit.toml"
+# Characters of a path's points: some ten thousand of them.
+_LONGEST_PATH = 1 << 18
+
+
+def asked(
+    kind: type[Input], name: str, text: str, default: str = "", *, empty: Any = None, **more: Any
+) -> Any:
+    """attrs field of an input that is made of one text; empty: its value without it; more: of the input."""
+    return given(kind(descriptions=(described(name, default, text),), **more), default=empty)
 
 
 @attrs.frozen
@@ -222,6 +234,72 @@ class WindowInput(Input):
     def read(self, name: str, found: Found) -> design.Window | None:
         """The path that the file names."""
         return self.made((found.keys.pop(name, ""),), found.given)
+
+
+@attrs.frozen
+class NodePath:
+    """A path along nodes of the lattice, with its points in mm."""
+
+    name: str
+    points: tuple[tuple[float, float, float], ...]
+
+
+@attrs.frozen
+class PathInput(Input):
+    """The path of the unit's waveguide: a window by its name, or one of a paths.csv, by `path_row`."""
+
+    kind: str = "window"
+
+    def made(self, values: tuple[Any, ...], given: Mapping[str, Any]) -> design.Window | NodePath | None:
+        """The path of a name or of a table; raises InputError."""
+        return path_of(given["unit"], values[0] or "", given.get("path_row") or "")
+
+    def write(self, name: str, value: design.Window | NodePath | None) -> Written:
+        """Its name, and the points of one along nodes."""
+        points = {"points_mm": value.points} if isinstance(value, NodePath) else {}
+        return Written({name: value.name if value else "", **points})
+
+    def read(self, name: str, found: Found) -> design.Window | NodePath | None:
+        """The path of the file; raises InputError."""
+        of = {"name": found.keys.pop(name, ""), "points": found.keys.pop("points_mm", [])}
+        known = structured(NodePath, of, str(found.path))
+        return known if known.points else self.made((known.name,), found.given)
+
+
+def path_of(unit: design.Unit, name: str, row: str = "") -> design.Window | NodePath | None:
+    """A path: a window, alpha1 .., or one of a paths.csv of `place`, its first by default; "" for none."""
+    if row and not name.endswith(".csv"):
+        raise InputError(
+            f"--path-row {row} names a row of a paths.csv, but --path does not give that file",
+            "--path-row",
+            "give the paths.csv of `place --paths graph` with --path, or leave --path-row out",
+        )
+    if not name.endswith(".csv"):
+        return design.window(unit, name) if name else None
+    try:
+        rows = csv.DictReader(io.StringIO(file_text(name)))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"cannot read the paths: {unreadable(error)}", name, "give paths.csv of `place --paths graph`"
+        ) from error
+    named = next((r for r in rows if not row or r.get("path") == row), None)
+    if named is None:
+        raise InputError(
+            f"there is no path {row!r}" if row else "there is no path", name, "see its first column"
+        )
+    try:
+        return NodePath(named["path"], _points(named.get("points_mm") or ""))
+    except (KeyError, ValueError) as error:
+        raise InputError(
+            "its column points_mm is not a list of points", name, "write it again by `place`"
+        ) from error
+
+
+def _points(text: str) -> tuple[tuple[float, float, float], ...]:
+    """Points in mm of a cell of paths.csv; raises ValueError."""
+    if len(text) > _LONGEST_PATH:
+        raise ValueError("no path of a lattice is that long")
+    return tuple((float(x), float(y), float(z)) for x, y, z in (p.split() for p in text.split(";")))
 
 
 @attrs.frozen

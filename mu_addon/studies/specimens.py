@@ -10,14 +10,13 @@ from typing import Any
 import attrs
 
 from .. import design, materials
-from ..design.quantity import described
 from ..design.settings import PRESET, PRINTER, USUAL_RESIN
 from ..errors import OutputError
 from ..files import json_text
 from ..run.inputs import digest
 from ..run.parts import File, Part, Sentence, Table, recorded
 from ..run.study import Members, Over, Study, derived, given, section, stage
-from .inputs import MaterialInput, PrinterInput, UnitInput
+from .inputs import MaterialInput, PrinterInput, UnitInput, asked
 
 SCALES = (0.75, 1.0, 1.5)
 CELLS = 3
@@ -74,17 +73,11 @@ class Specimens(Study):
     to_fill = ("gauge.csv", "limits.csv", TEMPLATE)
 
     unit: design.Unit = given(UnitInput(default=PRESET))
-    resin: materials.Material | None = given(
-        MaterialInput(
-            descriptions=(
-                described(
-                    "resin",
-                    "",
-                    "resin for masses, a name of the library or a TOML file; empty: Elastic 50A, V1",
-                ),
-            ),
-            metavar="NAME|FILE",
-        )
+    resin: materials.Material | None = asked(
+        MaterialInput,
+        "resin",
+        "resin for masses, a name of the library or a TOML file; empty: Elastic 50A, V1",
+        metavar="NAME|FILE",
     )
     # The parts named limit-... show its limits.
     printer: design.Printer = given(PrinterInput(descriptions=(PRINTER,), metavar="NAME|FILE"))

@@ -22,7 +22,6 @@ MODULES = {
     "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
-    "export.toml": ".export.run",
     "grip.toml": ".grip.run",
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",

@@ -30,7 +30,6 @@ UNLIMITED = {
     "mu_addon/sensing/text_lines.py": "a line, see its limit",
     "mu_addon/sensing/recording.py": "a line of a file read within its limit",
     "mu_addon/usecases/diagnose/job.py": "the program itself",
-    "mu_addon/usecases/export/run.py": "written the moment before",
     "mu_addon/usecases/parameter_study/run.py": "an entry of the cache, sealed and within its limit",
     "mu_addon/usecases/sensor/watch.py": "a status read within the limit of a text",
 }

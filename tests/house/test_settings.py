@@ -18,7 +18,6 @@ from mu_addon.fem import device
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
 from mu_addon.placement import settings as path
-from mu_addon.usecases.export import settings as export
 from mu_addon.usecases.graph.chain_nodes import chain_nodes
 from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
 from mu_addon.usecases.graph.study_nodes import study_nodes
@@ -142,7 +141,7 @@ def options(command):
         *(("sweep", d) for d in (sweep.WORKERS, sweep.ADD)),
         ("optimize", search.WORKERS),
         *(("grip", d) for d in (grip.DENSITY, design.FRICTION, grip.BEYOND, design.QUALITY)),
-        ("export", export.QUALITY),
+        ("export", design.FINE),
     ],
 )
 def test_an_option_has_default_and_text_of_its_setting(command, d):
@@ -161,7 +160,7 @@ def test_nodes_have_the_settings_themselves():
         ("place", study.MESH_CHECK),
         ("sweep", sweep.POINTS),
         ("grip", grip.DENSITY),
-        ("export", export.QUALITY),
+        ("export", design.FINE),
         ("chain", chain.TIP_MASS),
         ("sweep", sweep.MEMORY),
         ("optimize", search.WORKERS),

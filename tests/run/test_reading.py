@@ -37,8 +37,8 @@ from mu_addon.reading import MOST_ROWS, file_bytes, file_text, parse_json, parse
 from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
+from mu_addon.studies.inputs import path_of
 from mu_addon.usecases.chain.job import read_chain, read_pressures
-from mu_addon.usecases.export.job import path_of
 from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
 from mu_addon.usecases.track_video.run import read_bench, read_pressure

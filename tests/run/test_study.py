@@ -1,5 +1,6 @@
 """The base of all studies: what a result depends on, what a killed or failed run keeps, what is shown."""
 
+import argparse
 import json
 import os
 import subprocess
@@ -14,11 +15,12 @@ from hypothesis import given as for_all
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from mu_addon.cli.options import add_setting
 from mu_addon.design.quantity import described
 from mu_addon.errors import ConvergenceError, InputError, OutputError
 from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
-from mu_addon.run.parts import Fact, Sentence, Warn, csv
+from mu_addon.run.parts import Fact, File, Sentence, Warn, csv
 from mu_addon.run.progress import Progress
 from mu_addon.run.results import Results
 from mu_addon.run.stored import content, packed, unpacked
@@ -229,6 +231,45 @@ def test_inputs_go_through_their_files(tmp_path):
     (tmp_path / "spring.toml").write_text(text)
     with pytest.raises(InputError, match="loads = 50 is out of bounds"):
         Spring.read(tmp_path)
+
+
+@attrs.frozen(kw_only=True)
+class Letters(Study):
+    """Write letters, each into its file."""
+
+    name = "letters"
+    files = MappingProxyType({"*.txt": "a letter"})
+
+    @stage(
+        "{letter}", MappingProxyType({"a": 1.0, "b": 5.0}), kept=False, over=Over(("letter",), lambda s: "ab")
+    )
+    def made(self, letter: str) -> str:
+        return letter
+
+    @section()
+    def answer(self, made):
+        yield from (File(f"{letter}.txt", lambda path, text=text: text) for letter, text in made.items())
+
+
+def test_members_have_their_own_seconds_and_a_file_is_written_once(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("mu_addon.run.execution.write_bytes", lambda path, text: written.append(path.name))
+    work = Execution(Letters(), tmp_path, RunContext(Progress()))
+    assert work.plan() == [("a", 1.0), ("b", 5.0)]
+    work.run()
+    assert written == ["a.txt", "b.txt"]
+
+
+def test_an_option_takes_so_many_words_or_stands_alone(capsys):
+    parser = argparse.ArgumentParser()
+    add_setting(parser, described("at", "", "a place; empty: none"), ("X", "Y"), 2)
+    add_setting(parser, described("sheet", "", "a file; empty: none"), "CSV", alone="unit")
+    assert vars(parser.parse_args([])) == {"at": None, "sheet": None}
+    assert vars(parser.parse_args(["--sheet", "--at", "1", "-2"])) == {"at": ["1", "-2"], "sheet": "unit"}
+    assert parser.parse_args(["--sheet", "a.csv"]).sheet == "a.csv"
+    with pytest.raises(SystemExit):
+        parser.parse_args(["--at", "1"])
+    assert "expected 2 arguments" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", STUDIES)

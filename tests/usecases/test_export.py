@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from mu_addon.design import surface
 from mu_addon.design.anchors import window
 from mu_addon.design.beams import lattice_beams
 from mu_addon.design.lattice import lattice_of
@@ -29,12 +30,10 @@ from mu_addon.measured.folder import read_folder
 from mu_addon.meshing import gmsh_model
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
+from mu_addon.studies.export import Export, deformed_in
+from mu_addon.studies.inputs import NodePath, path_of
 from mu_addon.studies.specimens import Specimens
 from mu_addon.studies.use_case import use_case
-from mu_addon.usecases.export import run as exporting
-from mu_addon.usecases.export.job import Job, deformed_in, path_of
-from mu_addon.usecases.export.job import read_job as read_export
-from mu_addon.usecases.export.run import USE_CASE as EXPORT
 
 from .bent_motion import ANGLES, PRESSURES, bent, write_bent_motion
 
@@ -42,18 +41,21 @@ SMALL = Unit(name="three", chambers=Chambers(count=3))
 RESIN = load_material("elastic-50a-v1")
 
 
-def run(use_case, job, folder):
+def run(job, folder):
     messages = []
     with run_to_end(Progress([messages.append])) as context:
-        use_case.start(job, folder, context)
+        use_case(job.name).start(job, folder, context)
     return context, messages
+
+
+def coarse(**inputs):
+    return Export(unit=SMALL, quality="interactive", **inputs)
 
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("export")
-    job = Job(SMALL, RESIN, window(SMALL, "alpha1"), "alpha1", quality="interactive")
-    context, _ = run(EXPORT, job, folder)
+    context, _ = run(coarse(path=window(SMALL, "alpha1")), folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -63,10 +65,10 @@ def test_the_unit_is_written_as_a_run_bent_it(tmp_path):
     run_of = tmp_path / "run"
     mesh = write_bent_motion(run_of, unit=SMALL)
     (run_of / "unit.toml").write_text(to_toml(SMALL))
-    job = Job(SMALL, RESIN, formats=(), quality="interactive", deformed=deformed_in(run_of, SMALL, 20.0))
-    context, _ = run(EXPORT, job, tmp_path / "out")
+    job = coarse(formats=(), deformed=deformed_in(run_of, SMALL, 20.0))
+    context, _ = run(job, tmp_path / "out")
     assert context.status == 0
-    assert read_export(tmp_path / "out").texts() == job.texts()
+    assert Export.read(tmp_path / "out").texts() == job.texts()
     vertices, triangles = stl_surface((tmp_path / "out" / "unit_at_20_kPa.stl").read_bytes())
     drawn = build_solid(SMALL, quality="interactive")
     corners = drawn.vertices[drawn.triangles].reshape(-1, 3)
@@ -243,8 +245,7 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
         raise gmsh_model.GmshUnavailable("gmsh cannot load libGLU.so.1", remedy="install libglu1-mesa")
 
     monkeypatch.setattr("mu_addon.meshing.step_file.load_gmsh", missing)
-    job = Job(SMALL, RESIN, formats=("stl", "step", "txt"), quality="interactive")
-    context, messages = run(EXPORT, job, tmp_path)
+    context, messages = run(coarse(formats=("stl", "step", "txt")), tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert [f["file"] for f in manifest["files"]] == ["unit.stl", "nodes.txt"]
@@ -256,21 +257,21 @@ def test_without_gmsh_the_rest_is_written(tmp_path, monkeypatch):
 
 
 def test_a_file_that_is_not_what_was_built_is_an_error(tmp_path, monkeypatch):
-    real = exporting.stl_bytes
-    monkeypatch.setattr(exporting, "stl_bytes", lambda v, t: real(v * 1.001, t))
-    context, _ = run(EXPORT, Job(SMALL, RESIN, formats=("stl",), quality="interactive"), tmp_path)
+    real = surface.stl_bytes
+    monkeypatch.setattr(surface, "stl_bytes", lambda v, t: real(v * 1.001, t))
+    context, _ = run(coarse(formats=("stl",)), tmp_path)
     assert context.status == 5
+    assert not (tmp_path / "unit.stl").exists()
     assert "read back, encloses" in json.loads((tmp_path / "summary.json").read_text())["reason"]["what"]
 
 
 def test_a_path_is_a_window_or_a_row_of_the_search(tmp_path):
-    assert path_of(SMALL, None) == (None, "")
-    assert path_of(SMALL, "alpha1")[0].name == "alpha1"
+    assert path_of(SMALL, "") is None
+    assert path_of(SMALL, "alpha1").name == "alpha1"
     table = tmp_path / "paths.csv"
     table.write_text("path,points_mm\npath7,0 25 6.25; 0 25 18.75\npath9,0 25 6.25; 6.25 18.75 12.5\n")
-    points, name = path_of(SMALL, str(table))
-    assert (name, points.tolist()) == ("path7", [[0, 25, 6.25], [0, 25, 18.75]])
-    assert path_of(SMALL, str(table), "path9")[1] == "path9"
+    assert path_of(SMALL, str(table)) == NodePath("path7", ((0, 25, 6.25), (0, 25, 18.75)))
+    assert path_of(SMALL, str(table), "path9").name == "path9"
     for text, words in (("path,points_mm\n", "there is no path"), ("path\npath7\n", "points_mm")):
         table.write_text(text)
         with pytest.raises(InputError, match=words):
@@ -303,9 +304,7 @@ def test_calliper_sheets_become_offsets(tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("specimens")
-    context, _ = run(
-        use_case("specimens"), Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), folder
-    )
+    context, _ = run(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), folder)
     assert context.status == 0
     return folder, json.loads((folder / "manifest.json").read_text())
 
@@ -402,11 +401,11 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
     assert (printed[0] / "report.html").read_text().count("<tr") > 20
     # What is filled in stays when the specimens are written again.
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    run(use_case("specimens"), Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
+    run(Specimens(unit=Unit(), resin=RESIN, printer=load_printer()), printed[0])
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     for scale in (0.75, 1.5):
         unit = attrs.evolve(Unit(), scale=scale)
-        run(use_case("specimens"), Specimens(unit=unit, resin=None, printer=load_printer()), printed[0])
+        run(Specimens(unit=unit, resin=None, printer=load_printer()), printed[0])
     now = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert {name: now[name] for name in before} == before
     # The resin of the first run is not that of the last.
@@ -414,8 +413,7 @@ def test_the_template_is_a_folder_of_measured_data_but_for_its_rows(printed):
 
 
 def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
-    job = Job(SMALL, RESIN, formats=("stl", "step"), quality="interactive", vent_along=(0.0, 0.0, -1.0))
-    context, messages = run(EXPORT, job, tmp_path)
+    context, messages = run(coarse(formats=("stl", "step"), vent_along=(0.0, 0.0, -1.0)), tmp_path)
     assert context.status == 0
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert "plug-1.stl" in [f["file"] for f in manifest["files"]]
@@ -435,18 +433,20 @@ def test_vents_for_a_build_direction_are_cut_and_their_plugs_written(tmp_path):
         1 - part.euler_number // 2,
     )
     assert any("step has no vents" in m.get("what", "") for m in messages)
-    assert read_export(tmp_path).vent_along == (0.0, 0.0, -1.0)
+    assert Export.read(tmp_path).vent_along == (0.0, 0.0, -1.0)
 
 
 def test_no_vent_where_nothing_is_trapped_and_a_reason_where_none_can_be(tmp_path):
-    job = Job(SMALL, RESIN, formats=("stl",), quality="interactive", vent_along=(0.0, 0.0, 1.0))
-    context, messages = run(EXPORT, job, tmp_path / "up")
+    job = coarse(formats=("stl",), vent_along=(0.0, 0.0, 1.0))
+    context, messages = run(job, tmp_path / "up")
     assert context.status == 0
     assert any("no vent is needed" in m.get("what", "") for m in messages)
     assert not list((tmp_path / "up").glob("plug*"))
-    context, messages = run(EXPORT, attrs.evolve(job, vent_along=(1.0, 0.0, 0.0)), tmp_path / "side")
+    context, messages = run(attrs.evolve(job, vent_along=(1.0, 0.0, 0.0)), tmp_path / "side")
     assert context.status == 6
     assert "can have no vent" in messages[-1]["what"]
     assert not (tmp_path / "side" / "unit.stl").exists()
     with pytest.raises(InputError, match="not a direction"):
-        Job(SMALL, RESIN, vent_along=(0.0, 0.0, 0.0))
+        coarse(vent_along=(1e-9, 0.0, 0.0))
+    with pytest.raises(InputError, match="no format 'stp'; did you mean 'step'"):
+        coarse(formats=("stp",))

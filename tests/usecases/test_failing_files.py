@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
+from mu_addon.design import solid
 from mu_addon.errors import MuError
-from mu_addon.materials.library import load_material
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
-from mu_addon.usecases.export import run as exporting
-from mu_addon.usecases.export.job import Job as ExportJob
+from mu_addon.studies.export import Export
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.parameter_study import run as sweeping
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.parameter_study.point import Task, run_point, version
@@ -72,13 +72,11 @@ def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any,
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_export"))])
 def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    monkeypatch.setattr(exporting, "build_solid", functools.cache(exporting.build_solid))
-    job = ExportJob(
-        STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
-    )
+    monkeypatch.setattr(solid, "build_solid", functools.cache(solid.build_solid))
+    job = Export(unit=STUDY.unit, formats=("stl", "txt"), quality="interactive")
 
     def run(folder: Path, context: RunContext) -> None:
-        exporting.USE_CASE.start(job, folder, context)
+        use_case("export").start(job, folder, context)
 
     assert inject_each(run, tmp_path, failing, 5, step=step) == []
 

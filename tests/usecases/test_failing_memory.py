@@ -14,13 +14,11 @@ from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.solid import printable
 from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import MuError
-from mu_addon.materials.library import load_material
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.studies.check import Check, PartFile
+from mu_addon.studies.export import Export
 from mu_addon.studies.use_case import use_case
-from mu_addon.usecases.export import run as exporting
-from mu_addon.usecases.export.job import Job as ExportJob
 from mu_addon.usecases.parameter_study import run as sweeping
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.sensor.stream import stream
@@ -77,12 +75,10 @@ def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any,
 
 @pytest.mark.parametrize("step", [211, pytest.param(31, marks=pytest.mark.nightly("test_export"))])
 def test_export(tmp_path: Path, step: int) -> None:
-    job = ExportJob(
-        STUDY.unit, load_material("elastic-50a-v1"), formats=("stl", "txt"), quality="interactive"
-    )
+    job = Export(unit=STUDY.unit, formats=("stl", "txt"), quality="interactive")
 
     def run(folder: Path, context: RunContext) -> None:
-        exporting.USE_CASE.start(job, folder, context)
+        use_case("export").start(job, folder, context)
 
     assert inject_each(run, tmp_path, layer, MuError.status, step=step) == []
 

@@ -23,14 +23,14 @@ from mu_addon.run.progress import Progress
 from mu_addon.studies import STUDIES
 from mu_addon.studies.check import Check, read_part
 from mu_addon.studies.design_experiments import DesignExperiments
+from mu_addon.studies.export import Export, TakeOff
 from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.homogenize import Homogenize
-from mu_addon.studies.inputs import ResinInput
+from mu_addon.studies.inputs import NodePath, ResinInput
 from mu_addon.studies.specimens import Specimens
 from mu_addon.usecases import prepare
 from mu_addon.usecases.chain import job as chain
 from mu_addon.usecases.diagnose import job as diagnose
-from mu_addon.usecases.export import job as export
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.grip import job as grip
@@ -87,10 +87,16 @@ def jobs(folder):
         direction=(0.1, 0.0, 1 / 3),
     )
     yield Check(printer=load_printer(), stl=read_part(part), layers=(1.0,), repair=True)
-    yield export.Job(
-        UNIT, resin, window(UNIT, "alpha2"), "alpha2", ("stl", "txt"), "interactive", (0.1, 1 / 3), "calipers"
+    yield Export(
+        unit=UNIT,
+        resin=resin,
+        path=window(UNIT, "alpha2"),
+        formats=("stl", "txt"),
+        quality="interactive",
+        take_off=TakeOff((0.1, 1 / 3), "calipers"),
     )
-    yield export.Job(UNIT, resin, ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)), "bent-7")
+    bent = NodePath("bent-7", ((0.0, 0.0, 6.25), (0.0, 0.0, 1 / 3)))
+    yield Export(unit=UNIT, path=bent, vent_along=(0.0, 0.1, -1.0))
     yield Specimens(unit=UNIT, resin=resin, printer=load_printer())
     yield Specimens(unit=UNIT, resin=None, printer=load_printer())
     yield prepare.Job("solid", {"path": "alpha1", "quality": "export", "stl": ""}, UNIT)

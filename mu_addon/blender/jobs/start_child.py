@@ -47,6 +47,7 @@ WRITERS = (
     "mu_addon.usecases.grip.job",
     "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",
+    "mu_addon.studies.export",
     "mu_addon.studies.specimens",
     "mu_addon.studies.check",
     "pyparsing",

@@ -13,8 +13,7 @@ from bpy.props import (
 )
 
 from ...design.assets import asset_names
-from ...design.settings import PRINTER, UP
-from ...usecases.export.settings import QUALITY
+from ...design.settings import FINE, PRINTER, UP
 from ..shared.blender_property import blender_property
 from ..shared.registration import property_group_factory
 from ..unit.properties import BESIDE_BLEND_FILE
@@ -77,7 +76,7 @@ class MU_PG_print(bpy.types.PropertyGroup):
         default={"stl", "3mf"},
     )
     quality: blender_property(
-        QUALITY,
+        FINE,
         name="Facets",
         items=[
             ("export", "Fine", "The quality to print"),

@@ -8,10 +8,9 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...design.settings import QUALITY
+from ...design.settings import FINE, QUALITY
 from ...design.solid import QUALITY as FACETS
 from ...design.stl_and_nodes import write_nodes, write_stl
-from ...usecases.export.settings import QUALITY as EXPORTED
 from ..shared.blender_property import blender_property
 from ..unit import object as unit_object
 from ..unit.base_classes import ValidUnitOperator
@@ -53,7 +52,7 @@ class MU_OT_export_stl(ValidUnitOperator, bpy.types.Operator, ExportHelper):
 
     filename_ext = ".stl"
     filter_glob: StringProperty(default="*.stl", options={"HIDDEN"})
-    quality: blender_property(EXPORTED, items=_ITEMS)
+    quality: blender_property(FINE, items=_ITEMS)
     nodes: BoolProperty(
         name="Lattice Nodes as Text",
         description="Also write the nodes' coordinates into the same folder",

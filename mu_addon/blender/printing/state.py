@@ -220,21 +220,17 @@ def _check_file(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]
 
 def _export(root: Any, unit: Unit, folder: Path) -> tuple[FolderLayout, Any]:
     from ...design.printing.sheets import compensation_offsets
-    from ...usecases.export.job import LAYOUT, Job
+    from ...studies.export import Export, TakeOff
 
     settings, path = root.mu_print, path_of(root, unit)
     source = {"none": None, "unit": "unit", "gauge": bpy.path.abspath(settings.gauge)}[settings.compensate]
-    offsets, origin = compensation_offsets(unit, source)
-    return LAYOUT, Job(
+    return Export.layout(), Export(
         unit=unit,
-        resin=None,
         path=window(unit, path) if path else None,
-        path_name=path,
         formats=tuple(name for name, _, _ in FORMATS if name in settings.formats),
         quality=settings.quality,
-        take_off=offsets,
-        offset_source=origin,
-        vent_along=tuple(exact(x) for x in settings.up) if settings.vents else None,
+        take_off=TakeOff(*compensation_offsets(unit, source)),
+        vent_along=tuple(exact(x) for x in settings.up) if settings.vents else (),
     )
 
 

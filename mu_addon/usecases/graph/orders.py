@@ -8,7 +8,6 @@ from typing import Any
 
 import attrs
 
-from ...design.anchors import window
 from ...design.rigid_body import require_beside
 from ...errors import InputError
 from ...graph.definition import Call, Outputs
@@ -17,9 +16,6 @@ from ...measured import Measured
 from ...meshing.settings import MeshSettings
 from ..diagnose.job import Job as DiagnoseJob
 from ..diagnose.run import USE_CASE as DIAGNOSE
-from ..export.job import Job as ExportJob
-from ..export.job import resin_of as export_resin
-from ..export.run import USE_CASE as EXPORT
 from ..grip.job import Job as GripJob
 from ..grip.job import detailed
 from ..grip.run import USE_CASE as GRIP
@@ -28,7 +24,7 @@ from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
 from ..simulate_and_place.run import USE_CASE as STUDY
-from .parts import Design, refuse_body, solid_of
+from .parts import solid_of
 
 
 @attrs.frozen(eq=False)
@@ -127,26 +123,6 @@ def figure_of(call: Call) -> Outputs:
     if found is None:
         raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
     return {"number": float(found)}
-
-
-def _window(design: Design) -> Any:
-    return window(design.unit, design.path) if design.path else None
-
-
-def export_order(call: Call) -> Order:
-    """Run that exports a unit's files."""
-    s, design = call.settings, call.inputs["unit"]
-    refuse_body(design, "the export")
-    formats = tuple(s["formats"].split())
-    job = ExportJob(
-        unit=design.unit,
-        resin=export_resin(s["resin"] or None),
-        path=_window(design),
-        path_name=design.path,
-        formats=formats,
-        quality=s["quality"],
-    )
-    return Order(EXPORT, job)
 
 
 def grip_order(call: Call) -> Order:

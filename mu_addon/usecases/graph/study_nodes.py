@@ -9,7 +9,6 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ..export import settings as export
 from ..grip.settings import COARSE, CUBES, DENSITY
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .parts import refuse_body
@@ -153,23 +152,7 @@ def study_nodes() -> tuple[Definition, ...]:
         ),
         node_of("homogenize"),
         node_of("check"),
-        Definition(
-            "export",
-            "Export",
-            PRINT,
-            "files for printer and CAD",
-            (_TAKES_UNIT,),
-            (Output("files", "file", "the files"),),
-            (
-                setting("formats", " ".join(export.FORMATS), f"some of {', '.join(export.FORMATS)}"),
-                Setting(export.QUALITY),
-                Setting(export.RESIN),
-            ),
-            order=of_orders("export_order"),
-            read=lambda call, done: {"files": done},
-            muting=MUTED,
-            remark=lambda outputs: outputs["files"].folder.name,
-        ),
+        node_of("export"),
         Definition(
             "gripper",
             "Gripper",

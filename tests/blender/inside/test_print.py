@@ -25,7 +25,7 @@ from mu_addon.design.printing.printer import printer_text
 from mu_addon.design.printing.slices import signed_area
 from mu_addon.design.profile import cavity_polygon
 from mu_addon.design.surface import bad_edges, stl_bytes, stl_surface
-from mu_addon.usecases.export.job import FORMATS, MANIFEST
+from mu_addon.studies.export import FORMATS, MANIFEST
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
