@@ -194,7 +194,7 @@ def sentence(verdict: Verdict) -> tuple[str, str]:
         struts, more = _struts(verdict), [_unit_slip(verdict), _left_out(verdict)]
         if sum(1 + len(c.rivals) for c in found.causes) > MOST_NAMES:
             # Numbers first: what all these names have in common.
-            first = found.causes[0]
+            first = max(found.causes, key=lambda c: len(c.rivals))
             one = f"{called(first.effect)} or one of {len(first.rivals)} effects that act alike"
             message = f"It may be {head}. {message}"
             head = struts.rstrip(".") if struts and struts != ASK_STRUTS else one
