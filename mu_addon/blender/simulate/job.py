@@ -46,7 +46,7 @@ def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
         value = taken.get(name)
         if isinstance(value, int | float) and value >= 0.0:
             return float(value)
-        return seconds_of(name, True, of_mesh(refine, True))
+        return seconds_of(name, of_mesh(refine))
 
     return [(name, seconds(name)) for name in names], all(name in taken for name in names if name in SOLVED)
 
