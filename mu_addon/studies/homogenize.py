@@ -374,7 +374,8 @@ class Homogenize(Study):
         measured = unit.material.lattice_modulus_kPa
         ratio = measured / (1e3 * e.E100)
         words.append(
-            f"The unit's parameters say {kPa(measured)}, {ratio:.2g} times the prediction: "
+            f"A measured block has {kPa(measured)} by the unit's parameters, {ratio:.2g} times the "
+            "prediction: "
             + (
                 "they agree within 10 %."
                 if 0.9 < ratio < 1.1
