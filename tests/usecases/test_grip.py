@@ -33,7 +33,7 @@ COARSE = MeshSettings(refine=0.35)
 @pytest.fixture(scope="module")
 def finger():
     gripper = load_gripper("gripper")
-    gripper = attrs.evolve(gripper, unit=gripper.unit.evolve(count=3))
+    gripper = attrs.evolve(gripper, unit=gripper.unit.evolve(count=3), path="alpha1")
     mesh = mesh_printed(gripper.unit, COARSE)
     return gripper, mesh, materials_of(gripper.unit, mesh)
 
@@ -99,14 +99,15 @@ def smooth(finger):
     grip = Grip(friction=0.0, step_s=1.0, halvings=1)
     corners = np.array([0.0, 1.0, 6.0, 6.5, 7.0, 11.0]), np.array([0.0, -10.0, 40.0, 40.0, 40.0, 0.0])
     short = Phases(Protocol(*corners), ("i", *NAMES))
-    return {side: grasp(gripper, Cube(side), short, mesh, materials, grip) for side in (12.5, 25.0)}
+    return {side: grasp(gripper, Cube(side), short, mesh, materials, grip) for side in (25.0, 29.0)}
 
 
 def test_without_friction_a_cycle_gives_all_work_back_and_lifts_nothing(smooth):
     """Pressure and contact are then a potential: what closing took, opening returns."""
-    found = smooth[25.0]
+    found = smooth[29.0]
     hold = found.end("iii")
-    assert found.normal_N[hold] > 0.2
+    # Of a finger of three chambers, which reaches 1 mm into the cube's place.
+    assert found.normal_N[hold] > 0.02
     rise = np.diff(found.volume_mm3)
     works = (found.pressure_kPa[1:] + found.pressure_kPa[:-1]) / 2e3 * rise
     assert abs(found.pressure_work_mJ) < 1e-4 * np.abs(works).sum()
@@ -119,9 +120,9 @@ def test_without_friction_a_cycle_gives_all_work_back_and_lifts_nothing(smooth):
 
 
 def test_the_smaller_cube_bends_a_finger_more_and_is_pressed_less(smooth):
-    small, large = smooth[12.5], smooth[25.0]
+    small, large = smooth[25.0], smooth[29.0]
     hold = small.end("iii")
-    assert small.angle_deg[hold] > large.angle_deg[hold] + 3.0
+    assert small.angle_deg[hold] > large.angle_deg[hold] + 0.5
     assert 0 < small.normal_N[hold] < large.normal_N[hold]
     # Before either is touched they are one.
     assert small.angle_deg[small.end("i")] == pytest.approx(large.angle_deg[large.end("i")], abs=1e-6)

@@ -117,7 +117,7 @@ COSTS = pytest.mark.nightly("test_a_change_costs_only_what_depends_on_it")
         (lambda job: job, 1, 2),
         pytest.param(lambda job: attrs.evolve(job, stations=12), 1, 2, marks=COSTS),
         # Other pressures: a state's last digits depend on those before it.
-        (lambda job: attrs.evolve(job, protocol=Protocol(np.arange(2.0), np.array([0.0, 1.5]))), 1, 3),
+        (lambda job: attrs.evolve(job, protocol=Protocol(np.arange(2.0), np.array([0.0, 1.5]))), 1, 4),
         pytest.param(lambda job: with_resin(job, membrane_modulus_kPa=2000.0), 1, 4, marks=COSTS),
         # A wall that remembers has no beams.
         pytest.param(lambda job: with_resin(job, law="prony", prony_g1=0.2), 2, 2, marks=COSTS),
