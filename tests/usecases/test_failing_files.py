@@ -63,7 +63,8 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [251, pytest.param(9, marks=pytest.mark.nightly("test_place"))])
+@pytest.mark.nightly("test_simulate")
+@pytest.mark.parametrize("step", [251, 9])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
     """Each 251st call, to be quick; `python -m benchmarks.faults calls` has every one fail."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))
