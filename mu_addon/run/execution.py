@@ -42,7 +42,7 @@ class Execution:
         self._done: set[Task] = set()
         self._parts: dict[str, tuple[str, list[Part]]] = {}
         self._recorded: list[list[str]] = []
-        self._told: set[str] = set()
+        self._warned: set[str] = set()
         # Digest of what each file holds: one that is shown again is not written again.
         self._written: dict[str, str] = {}
         self._shown_s = 0.0
@@ -189,8 +189,8 @@ class Execution:
 
     def _tell(self, text: str, where: str = "", remedy: str = "") -> None:
         """Warn the user, once."""
-        if text not in self._told:
-            self._told.add(text)
+        if text not in self._warned:
+            self._warned.add(text)
             self.context.progress.warning(text, where, remedy)
 
     def show(self) -> None:
