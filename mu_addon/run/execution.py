@@ -271,7 +271,7 @@ def _in_process(task: Task, failed: dict[Task, str], members: dict[str, list[Any
     failed, members: those of the process that submits it.
     """
     (results,) = _HERE
-    results.failed, results.members = failed, members
+    results.catch_up(failed, members)
     results.value(task)
 
 

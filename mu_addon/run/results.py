@@ -196,6 +196,11 @@ class Results:
             if not is_needed(task) and (stage.kept or not stage.title):
                 del self._values[task]
 
+    def catch_up(self, failed: dict[Task, str], members: dict[str, list[Any]]) -> None:
+        """Take over what another process knows; what was missing may be in the cache by now."""
+        self.failed, self.members = failed, members
+        self._missing.clear()
+
     def grow(self, name: str, members: Sequence[Any]) -> None:
         """Add members to a stage's set; what was made in memory of the smaller set is forgotten."""
         self.members[name] = [*self.members[name], *members]
