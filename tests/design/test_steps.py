@@ -132,7 +132,7 @@ def test_a_step_reads_nothing_that_is_not_in_its_key(monkeypatch):
         elif d.type is int:
             other = value + 2
         elif d.type is str and not d.choices:
-            other = {"cells": "0 1 1: 0.9", "wall_factors": "1: 0.9"}[name]
+            other = {"cells": "0 1 1: 0.9", "wall_factors": "1: 0.9", "struts": "0 0 0 to 1 1 1"}[name]
         elif d.type is str:
             other = next(c for c in d.choices if c != value)
         bare = attrs.evolve(getattr(UNIT, section), **{name: other})

@@ -46,7 +46,7 @@ QUICK = UnitSettings(
     workers=1,
 )
 # On the side, off its middle plane; and on the tip.
-MARKERS = {1: (12.5, 5.0, 40.0), 2: (0.0, 10.0, 75.0)}
+MARKERS = {1: (7.5, 3.0, 40.0), 2: (0.0, 6.0, 75.0)}
 TIME, PRESSURE = analytic.triangle(0.5, 10.0, 1, -10.0, 20.0)
 
 
@@ -238,7 +238,7 @@ def test_an_effect_grows_from_nothing_and_the_right_way(name, angle):
     sizes = [s for s in (e.parameter.null + 1e-4, e.parameter.null - 1e-4) if s >= e.sizes[0]]
     for size in sizes:
         near = run(Run(body, AT, (), name, size)).values[0] - angle
-        assert 0 < np.abs(near).max() < 1e-3
+        assert 0 < np.abs(near).max() < 1e-3 * np.abs(angle).max()
         assert np.sign(near[3]) == -np.sign(size - e.parameter.null)
 
 
@@ -304,11 +304,11 @@ def test_bad_orders_are_refused():
 
 
 def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
-    places = {1: (12.5 + 1.0, 5.0, 40.0), 2: (-10.0, 12.5 + 0.5, 30.0), 3: (2.0, 11.0, 50.0)}
+    places = {1: (7.5 + 1.0, 3.0, 40.0), 2: (-5.0, 7.5 + 0.5, 30.0), 3: (2.0, 6.0, 50.0)}
     found = {m.number: m for m in attached(mesh, [bench(markers=places)], 4.0)}
-    np.testing.assert_allclose(found[1].point, [12.5, 5.0, 40.0], atol=1e-9)
+    np.testing.assert_allclose(found[1].point, [7.5, 3.0, 40.0], atol=1e-9)
     assert found[1].distance_mm == pytest.approx(1.0)
-    np.testing.assert_allclose(found[2].point, [-10.0, 12.5, 30.0], atol=1e-9)
+    np.testing.assert_allclose(found[2].point, [-5.0, 7.5, 30.0], atol=1e-9)
     # Inside the body it is where it is.
     np.testing.assert_array_equal(found[3].point, places[3])
     assert found[3].distance_mm == 0.0
@@ -320,16 +320,16 @@ def test_a_marker_sits_on_the_nearest_point_of_the_unit(mesh):
 
 def test_a_marker_across_the_mirror_moves_like_its_image(mesh):
     u = np.random.default_rng(0).standard_normal(mesh.nodes.shape)
-    one, other = material_points(mesh, np.array([[5.0, 11.0, 40.0], [-5.0, 11.0, 40.0]])).at(u)
+    one, other = material_points(mesh, np.array([[5.0, 6.0, 40.0], [-5.0, 6.0, 40.0]])).at(u)
     np.testing.assert_allclose(other, one * [-1, 1, 1])
 
 
 def test_without_x_a_marker_lies_in_the_mirror_plane(mesh):
-    (m,) = attached(mesh, [bench(markers={4: (9.0, 11.0, 40.0)}, axes="yz")], 4.0)
-    np.testing.assert_array_equal(m.point, [0.0, 11.0, 40.0])
+    (m,) = attached(mesh, [bench(markers={4: (5.0, 6.0, 40.0)}, axes="yz")], 4.0)
+    np.testing.assert_array_equal(m.point, [0.0, 6.0, 40.0])
     assert m.axes == "yz"
     with pytest.raises(InputError, match="marker 4 lacks its y or z"):
-        attached(mesh, [bench(markers={4: (9.0, 11.0, 40.0)}, axes="xy")], 4.0)
+        attached(mesh, [bench(markers={4: (5.0, 6.0, 40.0)}, axes="xy")], 4.0)
 
 
 def markers_of(experiment):
@@ -339,13 +339,13 @@ def markers_of(experiment):
 
 def test_a_marker_off_the_unit_is_named():
     with pytest.raises(InputError, match=r"marker 3 lies 11\.2 mm from the unit") as error:
-        markers_of(bench("bad camera", {1: MARKERS[1], 3: (23.7, 5.0, 40.0)}))
+        markers_of(bench("bad camera", {1: MARKERS[1], 3: (18.7, 3.0, 40.0)}))
     assert error.value.where == "bad camera"
     assert [m.number for m in markers_of(bench())] == [1, 2]
 
 
 def test_a_marker_on_two_places_is_named(mesh):
-    moved = bench("second", {1: (12.5, 5.0, 50.0)})
+    moved = bench("second", {1: (7.5, 3.0, 50.0)})
     with pytest.raises(InputError, match=r"marker 1 sits 10\.0 mm from where one has it"):
         attached(mesh, [bench(), moved], 4.0)
 

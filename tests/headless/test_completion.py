@@ -27,7 +27,7 @@ def completed(*words):
     [
         (["run.py", "fit"], ["fit-material"]),
         (["python", "headless/run.py", "pl"], ["place"]),
-        (["./headless/run.py", "simulate", "--sol"], ["--solid-struts"]),
+        (["./headless/run.py", "simulate", "--prot"], ["--protocol"]),
         (["run.py", "place", "--paths", "gr"], ["graph"]),
         (["python3", "headless/run.py", "place", "--preset", "mu-1.5"], ["mu-1.5x"]),
         (["run.py", "grip", "--preset", ""], ["gripper"]),

@@ -14,7 +14,7 @@ from mu_addon.run.progress import Progress
 # its watcher is less patient.
 HELD = """
 import ctypes, sys
-from mu_addon.cli import check, main
+from mu_addon.cli import main, study
 from mu_addon.cli.watched import run_watched
 from mu_addon.run import heartbeat
 
@@ -29,7 +29,7 @@ def run(options, context):
         ctypes.PyDLL(None).sleep(5)
 
 
-check.run = run
+study.run = run
 words = sys.argv[1:]
 sys.exit(run_watched(words, lambda: main.main(words)))
 """
@@ -106,7 +106,7 @@ def test_words_come_in_pieces_of_any_size_and_nonsense_is_left_out(clock):
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are watched where they can fork")
 def test_a_library_that_holds_the_interpreter_does_not_silence_a_command(tmp_path):
-    words = [sys.executable, "-c", HELD, "check", "--preset", "mu-1.0x", "--out", str(tmp_path)]
+    words = [sys.executable, "-c", HELD, "design", "--preset", "mu-1.0x", "--out", str(tmp_path)]
     ran = subprocess.run(words, capture_output=True, text=True, timeout=600)
     assert ran.returncode == 0, ran.stderr
     lines = ran.stderr.splitlines()

@@ -21,13 +21,19 @@ import numpy as np
 import pytest
 
 from mu_addon.design.body import read_body
+from mu_addon.design.parameters import load_preset
+from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.surface import stl_bytes, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
 from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.measured.folder import read_folder
+from mu_addon.run.folder import keep_inputs
 from mu_addon.sensing.recording import read_recording
+from mu_addon.studies.check import Check
+from mu_addon.studies.homogenize import Homogenize
+from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases.grip.phases import read_phases, shipped_phases
 from mu_addon.usecases.resume import use_case_of
 from mu_addon.usecases.track_video.tracked_table import read_pixels
@@ -227,15 +233,25 @@ FOLDERS: dict[str, tuple[Callable[[Path], Any], Path]] = {
     "measured": (read_folder, DATA / "measured"),
     **{
         kind: (lambda folder: use_case_of(folder).read(folder), DATA / "folders" / kind)
-        for kind in ("check", "grip", "homogenize", "place")
+        for kind in ("grip", "place")
     },
+}
+STUDIES = {
+    "check": Check(printer=load_printer(), unit=load_preset("mu-1.0x")),
+    "homogenize": Homogenize(unit=load_preset("mu-1.0x"), resin=ResinInput().made(("flexible-80a",), {})),
 }
 
 
-@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize("name", [*FOLDERS, *STUDIES])
 def test_a_folder_with_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
-    reader, source = FOLDERS[name]
-    folder = shutil.copytree(source, tmp_path / "folder")
+    folder = tmp_path / "folder"
+    reader: Callable[[Path], Any]
+    if name in STUDIES:
+        reader = STUDIES[name].read
+        keep_inputs(folder, STUDIES[name].texts())
+    else:
+        reader, source = FOLDERS[name]
+        shutil.copytree(source, folder)
     files = sorted(p for p in folder.iterdir() if p.suffix in (".toml", ".csv"))
     for path in files:
         content = path.read_bytes()

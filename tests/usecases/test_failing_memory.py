@@ -53,8 +53,8 @@ def any_array(folder: Path, at: int, for_good: bool) -> AbstractContextManager[F
     return short_of_memory(at, for_good, least=1)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("step", [43, pytest.param(7, marks=pytest.mark.nightly("test_simulate"))])
+@pytest.mark.nightly("test_export")
+@pytest.mark.parametrize("step", [43, 7])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """From the solid on; all is solved anew, each time."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
@@ -66,7 +66,8 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, layer, MuError.status, PARTIAL, step=step) == []
 
 
-@pytest.mark.parametrize("step", [307, pytest.param(41, marks=pytest.mark.nightly("test_place"))])
+@pytest.mark.nightly("test_export")
+@pytest.mark.parametrize("step", [307, 41])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
     """What follows from the states of the unit and of its candidates; all of it by `benchmarks.faults`."""
     run = placement(monkeypatch, Cache(with_light(tmp_path / "known") / "cache"))

@@ -56,7 +56,7 @@ def _expected(root: Any) -> tuple[Plan, bool]:
     grasped = [seconds for name, seconds in taken.items() if name.startswith(GRASP_OF)]
     if grasped:
         taken = {**{stage_of(side): grasped[-1] for side in sides}, **taken}
-    plan = [(name, taken.get(name, s)) for name, s in expected_plan(sides, refine, step_s, True)]
+    plan = [(name, taken.get(name, s)) for name, s in expected_plan(sides, refine, step_s)]
     return plan, "solid" in taken and (not sides or bool(grasped))
 
 
