@@ -132,11 +132,10 @@ class _Boundary:
 
     def _near(self, corners: Array) -> Array:
         """Pairs (p, 2) of facets with overlapping boxes and no common node, not both of them images."""
-        from scipy.spatial import cKDTree
-
         low, high = corners.min(axis=1), corners.max(axis=1)
-        radius = np.linalg.norm(high - low, axis=1).max() / 2
-        pairs = cKDTree((low + high) / 2).query_pairs(2 * radius, output_type="ndarray")
+        radii = np.linalg.norm(high - low, axis=1) / 2
+        radius = radii.max()
+        pairs = _within_reach((low + high) / 2, radii)
         a, b = pairs.T
         keep = (
             (self._own[a] | self._own[b]) & (low[a] <= high[b]).all(axis=1) & (low[b] <= high[a]).all(axis=1)
@@ -174,6 +173,27 @@ class _Boundary:
         walls = self._rest[self.facets[nearest]].mean(axis=1)
         one, other = self._inner[nearest]
         return Crossing(place, walls, (bool(one), bool(other)), len(pairs))
+
+
+def _within_reach(centres: Array, radii: Array) -> Array:
+    """Pairs (p, 2), ascending, of spheres (f, 3) with radii (f,) that may overlap, each once.
+
+    By octaves of the radii: the reach of the largest spheres is that of few.
+    """
+    from scipy.spatial import cKDTree
+
+    octave = np.floor(np.log2(np.maximum(radii / radii.max(), 1e-6))).astype(int)
+    sets = [np.flatnonzero(octave == o) for o in np.unique(octave)]
+    trees = [cKDTree(centres[own]) for own in sets]
+    found = [np.zeros((0, 2), int)]
+    for i, (own, tree) in enumerate(zip(sets, trees, strict=True)):
+        most = radii[own].max()
+        found.append(own[tree.query_pairs(2 * most, output_type="ndarray")])
+        for other, more in zip(sets[:i], trees[:i], strict=True):
+            near = tree.sparse_distance_matrix(more, most + radii[other].max(), output_type="ndarray")
+            found.append(np.stack([own[near["i"]], other[near["j"]]], axis=1))
+    pairs = np.sort(np.concatenate(found), axis=1)
+    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def with_middles(faces: Array, tets: Array) -> Array:

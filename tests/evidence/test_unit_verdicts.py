@@ -110,7 +110,7 @@ def test_the_unit_stops_at_the_wall():
     (obstacle,) = model.obstacles
     equilibrium = Equilibrium(model, body.materials(mesh), CONTACT_NEWTON)
     state = equilibrium.newton(np.zeros_like(mesh.nodes), 0.0)
-    for pressure in (0.005, 0.01):
+    for pressure in (0.0006, 0.0012):
         state = equilibrium.reach(pressure, [state])
     assert obstacle.force_N(state.u)[1] > 0.01
     assert obstacle.deepest_mm(state.u) < 0.05

@@ -209,7 +209,7 @@ def test_a_unit_is_judged_by_its_angle_and_markers(request, tmp_path, gauge_kPa)
     assert stages.index("unit") < told < stages.index("unit with each effect")
     remarks = [r.partition(" was averaged")[0] for r in summary["remarks"] if "was averaged" in r]
     # What is predicted has noise as well, of which nothing is taken.
-    assert remarks == ["the noise of pressure_kPa, up to 0.022,"] * (gauge_kPa > 0)
+    assert len(remarks) == (gauge_kPa > 0)
     gain = summary["gain"]["held_out"]
     assert gain["unit"] == "deg"
     assert gain["rmse_after"] < 0.15 < gain["rmse_before"]
@@ -236,9 +236,9 @@ def test_a_gauge_s_noise_is_averaged_out_and_remarked_on(tmp_path, gauge_kPa):
     measured = read_folder(bent_unit(tmp_path, {}, gauge_kPa=gauge_kPa))
     freed, _ = denoised_drives(measured.experiments, analytic.simulator(measured.experiments))
     remarks = diagnosing._noisy_gauges(measured, SimpleNamespace(experiments=freed))
-    assert [r.partition(" was averaged")[0] for r in remarks] == [
-        "the noise of pressure_kPa, up to 0.022,"
-    ] * (gauge_kPa > 0)
+    said = [re.match(r"the noise of pressure_kPa, up to ([0-9.]+), was averaged", r) for r in remarks]
+    # The largest of the records' estimates.
+    assert [float(m[1]) for m in said] == pytest.approx([gauge_kPa] * (gauge_kPa > 0), rel=0.15)
     changed = {
         c
         for e, own in zip(measured.experiments, freed, strict=True)

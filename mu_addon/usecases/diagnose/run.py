@@ -163,7 +163,9 @@ def _first_look(
     with _stages(progress) as on_model:
         verdict = diagnose(experiments, simulator, on_model)
     headline, words = sentence(verdict)
-    look = f"first look, without weight, walls and print: {verdict.kind}, {headline}"
+    # What nothing explains says so itself.
+    kind = "" if headline.startswith(verdict.kind) else f"{verdict.kind}, "
+    look = f"first look, without weight, walls and print: {kind}{headline}"
     # With share and seconds a line of at most 100 columns.
     with progress.stage(shorten(look, 76, placeholder=" ...")):
         pass
