@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .printing.repair import Repair as Repair
     from .printing.repair import repaired as repaired
     from .printing.slices import even_heights as even_heights
+    from .printing.slices import has_volume as has_volume
     from .printing.slices import slices as slices
     from .printing.vents import Vented as Vented
     from .printing.vents import vented as vented

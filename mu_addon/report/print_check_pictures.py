@@ -28,7 +28,8 @@ def layer_pictures(found: Sequence[Slice]) -> str:
 
     across = 4
     rows = -(-len(found) // across)
-    points = np.concatenate([ring for s in found for ring in s.outlines])
+    # Above the part there is nothing: an empty field of 1 mm.
+    points = np.concatenate([ring for s in found for ring in s.outlines] or [np.eye(2)])
     low, high = points.min(axis=0), points.max(axis=0)
     wide = plots.WIDTH * 1.6
     tall = (0.4 + wide / across * float((high - low)[1] / (high - low)[0])) * rows

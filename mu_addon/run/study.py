@@ -89,6 +89,10 @@ class Input:
         """Names of the further files that it may have."""
         return ()
 
+    def same(self, value: Any, other: Any) -> bool:
+        """Return True if two values give the same results."""
+        return bool(value == other)
+
 
 @attrs.frozen
 class ReadInput(Input):
@@ -395,6 +399,27 @@ class Study:
         optional = tuple(file for name, one in cls.inputs().items() for file in one.file_names(name))
         results = (*cls.files, "report.html")
         return FolderLayout(f"{cls.name}.toml", f"# Inputs of `{cls.name}`.", results, optional, cls.to_fill)
+
+    # What its inputs decide, before a run.
+
+    def expected(self) -> dict[str, float]:
+        """Seconds of each stage on two cores by the title of its progress, in order."""
+        found = {}
+        for one in self.stages().values():
+            for member in (one.over.members(self) if one.over else [None]) * bool(one.title):
+                if one.wanted(self) and (title := one.title_of(member)) not in found:
+                    found[title] = one.seconds(self, title)
+        return found
+
+    def detail(self) -> str:
+        """Its name and its choices, which decide how long its stages take."""
+        chosen = (n for n, one in self.inputs().items() if one.descriptions and one.descriptions[0].choices)
+        return " ".join([self.name, *(str(getattr(self, name)) for name in chosen)])
+
+    def changed(self, before: Study) -> list[str]:
+        """Names of the inputs that make its results others than those of the study before."""
+        every = self.inputs().items()
+        return [n for n, one in every if one.decides and not one.same(getattr(self, n), getattr(before, n))]
 
     # Inputs as files.
 

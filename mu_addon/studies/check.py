@@ -435,9 +435,9 @@ class Check(Study):
             yield Table("Locations in mm, worst first", [("check", ""), ("places", "text")], places)
 
     @section("layers", "Layers")
-    def drawn(self, part: Surface, found: design.PrintCheck, direction: Sequence[float]) -> Iterator[Part]:
+    def drawn(self, part: Surface, direction: Sequence[float]) -> Iterator[Part]:
         """The layers that are asked for, or some evenly spaced."""
-        if "mass_g" not in found.figures:
+        if not design.has_volume(part.vertices, part.triangles):
             yield Sentence("The surface encloses no volume: it has no layers.")
             return
 

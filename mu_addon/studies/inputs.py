@@ -54,6 +54,10 @@ class UnitInput(Input):
         """Its file."""
         return (UNIT,)
 
+    def same(self, value: design.Unit | None, other: design.Unit | None) -> bool:
+        """Return True if they differ in name alone."""
+        return value == (other and value and attrs.evolve(other, name=value.name))
+
 
 @attrs.frozen
 class WordsInput(Input):

@@ -52,14 +52,14 @@ assert bpy.ops.mu.print_check() == {"FINISHED"}
 child = printing.PRINTING.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
-assert printing.checked(root).stale == ""
+assert printing.CHECK.found(root).stale == ""
 assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 root.mu_print.formats, root.mu_print.quality = {name for name, *_ in printing.FORMATS}, "interactive"
 assert bpy.ops.mu.print_export() == {"FINISHED"}
 child = printing.PRINTING.child(root)
 watch(child)
 assert child.state == child_module.DONE, child.error
-names = {entry["file"] for entry in printing.exported(root).manifest["files"]}
+names = {entry["file"] for entry in printing.EXPORT.found(root).content["files"]}
 assert {"unit.stl", "unit.3mf", "unit-beams.3mf", "waveguide.step", "nodes.txt"} <= names, names
 
 assert jobs.missing() == []

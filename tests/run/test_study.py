@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from mu_addon.cli.options import add_setting
+from mu_addon.design.parameters import load_preset
 from mu_addon.design.quantity import described
 from mu_addon.errors import ConvergenceError, InputError, OutputError
 from mu_addon.run.context import RunContext
@@ -211,6 +212,18 @@ def test_the_plan_leaves_out_what_is_there(tmp_path):
     after = dict(Execution(Spring(), tmp_path, context).plan())
     assert after["rest"] < before["rest"]
     assert after["loads"] == pytest.approx(before["loads"] / 3)
+
+
+def test_what_its_inputs_decide_is_known_before_a_run():
+    export, unit = study("export"), load_preset("mu-1.0x")
+    asked = export(unit=unit, formats=("stl", "txt"), vent_along=(0.0, 0.0, 1.0))
+    assert list(asked.expected()) == ["solid", "vents", "stl", "txt"]
+    assert asked.detail() == "export export"
+    assert list(Spring().expected()) == ["rest", "loads", "energy"]
+    assert export(unit=attrs.evolve(unit, name="mine")).changed(export(unit=unit)) == [], "only its name"
+    thicker = export(unit=unit.evolve(wall_mm=1.0), formats=("stl",))
+    assert thicker.changed(export(unit=unit)) == ["unit", "formats"]
+    assert Spring(loads=2, workers=2).changed(Spring()) == ["loads"], "workers decide nothing"
 
 
 def test_a_damaged_result_is_made_again(tmp_path):

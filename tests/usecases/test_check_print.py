@@ -82,19 +82,24 @@ def test_the_report_draws_the_layers_that_are_asked_for(tmp_path):
     assert "1.0 mm, 13 mm²" in words
     assert "7.0 mm, 100 mm²" in words
     assert main(["resume", str(out)]) == 0
+    assert run(tmp_path, bottle(4.0), "--layers", "99")[0] == 0, "above the part"
     status, _ = run(tmp_path / "out", bottle(4.0), "--layers", "-1")
     assert status == 2
 
 
-def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path):
+@pytest.mark.parametrize(("how", "fault"), [("open", "open edges"), ("flipped", "1 triangle is flipped")])
+def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path, how, fault):
     vertices, triangles = bottle(4.0)
-    status, out = run(tmp_path, (vertices, triangles[5:]))
+    triangles = triangles[5:] if how == "open" else np.vstack([triangles[:1, ::-1], triangles[1:]])
+    status, out = run(tmp_path, (vertices, triangles))
     assert status == 6
     summary = json.loads((out / "summary.json").read_text())
     assert summary["verdict"] == "error"
-    assert "open edges" in summary["reason"]["what"]
+    assert fault in summary["reason"]["what"]
     # What was found is told all the same.
-    assert "Not printable" in (out / "report.html").read_text()
+    report = (out / "report.html").read_text()
+    assert "Not printable" in report
+    assert "it has no layers" in report
 
 
 @pytest.mark.parametrize(

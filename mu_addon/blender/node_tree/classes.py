@@ -158,7 +158,7 @@ class _CoreNode(_Node):
             for s in self.definition.settings:
                 if s.shown and not s.is_number:
                     self._draw_setting(layout, s)
-        if hasattr(self, "follower"):
+        if hasattr(self, "follower") and not getattr(self, "source", None):
             layout.prop(self, "follower", text="", placeholder="Show On")
         draw_state(self, layout)
 
@@ -270,7 +270,7 @@ def _annotations(definition: Definition) -> dict:
             poll=_is_unit,
             update=_changed,
         )
-    elif any(o.type == "unit" for o in definition.outputs):
+    if any(o.type == "unit" for o in definition.outputs):
         found["follower"] = PointerProperty(
             name="Show On",
             description="Unit in the scene that takes on every change of this node's unit",

@@ -1,7 +1,8 @@
 """A unit that follows a node of a tree: one set of values, edited in the tree or the sidebar.
 
-Changes in the sidebar are written into the fields of the tree's nodes. A value set by a link or a driver is
-restored after a change in the sidebar, which shows its source.
+Changes in the sidebar are written into the fields of the tree's nodes; a node *Unit* then takes the scene's
+unit in place of its preset. A value set by a link or a driver is restored after a change in the sidebar,
+which shows its source.
 """
 
 from __future__ import annotations
@@ -60,6 +61,10 @@ def give_back(root: Any) -> bool:
     changed = {path: value for path, value in _values(root.mu_unit).items() if value != before[path]}
     if not changed:
         return False
+    if hasattr(node, "source"):
+        # A preset or a file is not changed: from now on the node's unit is that of the scene.
+        node.source, node.follower = root, None
+        return True
     # Tied parameters change together: the second is then already set.
     with updates.paused():
         refused = [path for path, value in changed.items() if not _write(node, path, value)]

@@ -146,7 +146,8 @@ def show_units(context: Any, tree: Any) -> list[Any]:
     designs, made = _designs.get(tree.session_uid, {}), []
     for node in list(tree.nodes):
         design = designs.get(node.name)
-        if design is None or not hasattr(node, "follower") or node.follower is not None:
+        shown = getattr(node, "source", None) or getattr(node, "follower", None)
+        if design is None or not hasattr(node, "follower") or shown is not None:
             continue
         after = (link.to_node for out in node.outputs for link in out.links)
         if any(hasattr(other, "follower") and other.name in designs for other in after):

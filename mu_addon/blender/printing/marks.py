@@ -44,7 +44,7 @@ def clear(root: Any) -> None:
 def mark(root: Any, found: Any) -> None:
     """Put a ball at every location of every error and warning, replacing earlier ones."""
     clear(root)
-    for number, finding in enumerate(found.findings):
+    for number, finding in enumerate(found.content["findings"]):
         if finding["severity"] not in FAULTS or not len(finding["places"]):
             continue
         name = f"{finding['check'].capitalize()} ({finding['severity']})"
@@ -61,7 +61,7 @@ def mark(root: Any, found: Any) -> None:
     arrow.empty_display_size = 2.0 * unit.cell
     arrow.location = (0.0, unit.bounds[1][0] - unit.cell, 0.0)
     arrow.rotation_mode = "QUATERNION"
-    arrow.rotation_quaternion = Vector(found.found["direction"]).to_track_quat("Z", "Y")
+    arrow.rotation_quaternion = Vector(found.content["direction"]).to_track_quat("Z", "Y")
 
 
 def _mark_object(root: Any, name: str, data: Any, value: str) -> Any:

@@ -7,8 +7,7 @@ from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 
 from ...design.settings import UP
 from ..jobs.operators import FILES, RUN_FILES, job_operators
-from ..shared import viewports
-from ..simulate import study_folder as studies
+from ..simulate.study_job import StudyOperator
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator, ValidUnitOperator
 from ..unit.properties import to_unit
@@ -18,28 +17,7 @@ from . import state as printing
 NOT_CHECKED = "Check the print first"
 
 
-class _Job(ValidUnitOperator):
-    """An operator that starts a job for the printer; greyed out, with the reason, where it cannot."""
-
-    job = ""
-
-    @classmethod
-    def trouble(cls, root):
-        running = printing.PRINTING.is_running(root)
-        why = "A job for the printer is running" if running else printing.trouble(root, cls.job)
-        return super().trouble(root) or why
-
-    def act(self, context, root):
-        studies.assign_folder(root)
-        printing.PRINTING.start(
-            root,
-            printing.folder_of(root, self.job),
-            lambda folder: printing.write_inputs(root, self.job, folder),
-        )
-        viewports.redraw()
-
-
-class MU_OT_print_check(_Job, bpy.types.Operator):
+class MU_OT_print_check(StudyOperator, ValidUnitOperator, bpy.types.Operator):
     """Check the printability and rank the build directions, in a child process"""
 
     bl_idname = "mu.print_check"
@@ -48,7 +26,7 @@ class MU_OT_print_check(_Job, bpy.types.Operator):
     job = printing.CHECK
 
 
-class MU_OT_print_check_file(_Job, bpy.types.Operator):
+class MU_OT_print_check_file(StudyOperator, ValidUnitOperator, bpy.types.Operator):
     """Check the printability of an STL file, repaired first if asked"""
 
     bl_idname = "mu.print_check_file"
@@ -57,7 +35,7 @@ class MU_OT_print_check_file(_Job, bpy.types.Operator):
     job = printing.FILE_CHECK
 
 
-class MU_OT_print_export(_Job, bpy.types.Operator):
+class MU_OT_print_export(StudyOperator, ValidUnitOperator, bpy.types.Operator):
     """Write the chosen files of the unit with its path; asks first if the check found errors"""
 
     bl_idname = "mu.print_export"
@@ -66,10 +44,11 @@ class MU_OT_print_export(_Job, bpy.types.Operator):
     job = printing.EXPORT
 
     def invoke(self, context, event):
-        found = printing.checked(unit_object.active_root(context))
-        if found is None or found.stale or not found.errors:
+        found = printing.CHECK.found(unit_object.active_root(context))
+        errors = [] if found is None or found.stale else printing.errors(found)
+        if not errors:
             return self.execute(context)
-        names = ", ".join(error["check"] for error in found.errors)
+        names = ", ".join(error["check"] for error in errors)
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -80,7 +59,7 @@ class MU_OT_print_export(_Job, bpy.types.Operator):
         )
 
 
-class MU_OT_print_specimens(_Job, bpy.types.Operator):
+class MU_OT_print_specimens(StudyOperator, ValidUnitOperator, bpy.types.Operator):
     """Write lattice cubes, coupons and a gauge to print, a sheet of measurements, a folder for the data"""
 
     bl_idname = "mu.print_specimens"
@@ -91,12 +70,20 @@ class MU_OT_print_specimens(_Job, bpy.types.Operator):
 
 def _path_of(root, what):
     """File or folder by its name `what`; log and errors are of the latest job."""
-    if what in (printing.EXPORT, printing.SPECIMENS, printing.FILE_CHECK):
-        return printing.folder_of(root, what)
-    if what == "file_report":
-        return printing.folder_of(root, printing.FILE_CHECK) / FILES["report"]
-    folder = printing.folder_of(root, printing.CHECK) if what == "report" else printing.latest_folder(root)
-    return folder / FILES[what]
+    if what in FOLDERS:
+        return FOLDERS[what].folder_of(root)
+    if what.endswith("report"):
+        job = printing.CHECK if what == "report" else printing.FILE_CHECK
+        return job.folder_of(root) / FILES["report"]
+    return printing.latest_folder(root) / FILES[what]
+
+
+FOLDERS = {
+    "check-file": printing.FILE_CHECK,
+    "export": printing.EXPORT,
+    "specimens": printing.SPECIMENS,
+}
+"""Jobs whose folders can be opened."""
 
 
 class _OfCheck(UnitOperator):
@@ -104,7 +91,7 @@ class _OfCheck(UnitOperator):
 
     @classmethod
     def trouble(cls, root):
-        found = printing.checked(root)
+        found = printing.CHECK.found(root)
         if found is None:
             return NOT_CHECKED
         return f"The check is stale: {found.stale}" if found.stale else ""
@@ -118,7 +105,7 @@ class MU_OT_print_marks(_OfCheck, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context, root):
-        marks.mark(root, printing.checked(root))
+        marks.mark(root, printing.CHECK.found(root))
 
 
 class MU_OT_print_clear(UnitOperator, bpy.types.Operator):
@@ -159,11 +146,11 @@ class MU_OT_print_show(_OfCheck, bpy.types.Operator):
     )
 
     def act(self, context, root):
-        found, settings = printing.checked(root), root.mu_print
-        if self.finding >= len(found.findings):
-            self.report({"ERROR"}, f"There are {len(found.findings)} findings")
+        found, settings = printing.CHECK.found(root), root.mu_print
+        if self.finding >= len(found.content["findings"]):
+            self.report({"ERROR"}, f"There are {len(found.content['findings'])} findings")
             return {"CANCELLED"}
-        chosen = found.findings[self.finding]
+        chosen = found.content["findings"][self.finding]
         places = chosen["places"]
         if self.place >= max(len(places), 1):
             self.report({"ERROR"}, f"{chosen['check']}: it has {len(places)} places")
@@ -250,7 +237,7 @@ CLASSES = (
         items=[
             ("report", "Report", "Every finding with pictures, and the build directions, in the browser"),
             ("file_report", "Report of the File", "Every finding in the STL file, in the browser"),
-            (printing.FILE_CHECK, "Checked File", "Folder of the file's check, with part.stl"),
+            ("check-file", "Checked File", "Folder of the file's check, with part.stl"),
             ("export", "Files", "Folder of the exported files"),
             ("specimens", "Specimens", "Folder of the specimens, their sheet and the folder for the data"),
             *RUN_FILES[1:3],

@@ -9,7 +9,6 @@ import bpy
 
 from ...design.printing.finding import counted
 from ...run.child import FAILED
-from ..jobs.panel import job_state, timed_if_measured
 from ..shared.panels import alert, fold, large_button, wrapped
 from ..shared.wording import in_panel, path_symbol
 from ..unit import object as unit_object
@@ -39,7 +38,7 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
     def mark(cls, root):
         if printing.PRINTING.is_running(root):
             return "TIME"
-        files = printing.exported(root)
+        files = printing.EXPORT.found(root)
         return "" if files is None else OUTDATED if files.stale else DONE
 
     def show(self, layout, context, root):
@@ -51,17 +50,15 @@ class MU_PT_print(UnitPanel, bpy.types.Panel):
             _gates(layout, root, solid)
 
 
-def _state(layout, root, *commands: str) -> None:
-    """Draw the progress and the end of a job for the printer below the button of its command."""
-    child = printing.PRINTING.child(root)
-    if child is None or child.folder.parent.name not in commands:
-        return
-    if child.state == FAILED and (child.error or {}).get("status") == NOT_PRINTABLE:
-        of_file = printing.FILE_CHECK in commands
+def _state(layout, root, job) -> None:
+    """Draw the progress and the end of a job for the printer below its button."""
+    child = job.child(root)
+    if child is not None and child.state == FAILED and (child.error or {}).get("status") == NOT_PRINTABLE:
+        of_file = job is printing.FILE_CHECK
         words = in_panel(str(child.error["what"])) if of_file else "Checked: not printable, as found below"
         alert(layout, words).operator("mu.print_dismiss")
     else:
-        job_state(layout, child, "see below", JOB)
+        job.draw_state(layout, root, JOB)
 
 
 def _gates(layout, root, solid) -> None:
@@ -78,11 +75,6 @@ def _gates(layout, root, solid) -> None:
         column.label(text=text, icon="CHECKMARK")
     if solid["mu_path"]:
         column.label(text=f"Waveguide along {path_symbol(solid['mu_path'])}", icon="CHECKMARK")
-
-
-def start_words(root, name: str, command: str) -> str:
-    """Label of the button of a job for the printer, with what it takes once measured on this machine."""
-    return timed_if_measured(name, printing.announced(root, command))
 
 
 class _OfPrint(UnitPanel):
@@ -103,10 +95,10 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
             layout.prop(settings, "printer_file")
         layout.prop(settings, "limits_file")
         layout.prop(settings, "up")
-        words = start_words(root, "Check Print", printing.CHECK)
+        words = printing.CHECK.label(root, "Check Print")
         large_button(layout, "mu.print_check", "VIEWZOOM", root=root, text=words)
         _state(layout, root, printing.CHECK)
-        found = printing.checked(root)
+        found = printing.CHECK.found(root)
         if found is None:
             wrapped(layout, "Not checked yet", "INFO")
             return
@@ -130,7 +122,7 @@ class MU_PT_print_check(_OfPrint, bpy.types.Panel):
 def _findings(layout, settings, found) -> None:
     """Draw a line for every error and warning, the chosen one in full; then how many passed."""
     passed = []
-    for number, finding in enumerate(found.findings):
+    for number, finding in enumerate(found.content["findings"]):
         if finding["severity"] == "pass":
             passed.append(finding)
             continue
@@ -180,7 +172,7 @@ def _measure(finding) -> str:
 
 def _directions(layout, settings, found) -> None:
     """Draw the best build directions of the check and the chosen one, with their costs and a button."""
-    builds = found.found["orientation"]
+    builds = found.content["orientation"]
     if not builds:
         return
     body = fold(layout, "MU_directions", "Build Directions", False)
@@ -243,10 +235,10 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
         layout.prop(settings, "against_unit")
         large_button(layout, "mu.print_check_file", "VIEWZOOM")
         _state(layout, root, printing.FILE_CHECK)
-        found = printing.checked_file(root)
-        if found is None:
+        shown = printing.FILE_CHECK.found(root)
+        if shown is None or shown.stale:
             return
-        box = layout.box()
+        box, found = layout.box(), shown.content
         for finding in found["findings"]:
             if finding["severity"] in marks.FAULTS:
                 wrapped(
@@ -260,7 +252,7 @@ class MU_PT_print_file(_OfPrint, bpy.types.Panel):
             wrapped(box, f"Repaired: {done or 'nothing was changed'}", "TOOL_SETTINGS")
         row = layout.row(align=True)
         row.operator("mu.print_open", text="Report", icon="URL").what = "file_report"
-        row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.FILE_CHECK
+        row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "check-file"
 
 
 class MU_PT_print_layers(_OfPrint, bpy.types.Panel):
@@ -299,7 +291,7 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
     place = ("print",)
 
     def show(self, layout, context, root):
-        settings, found = root.mu_print, printing.checked(root)
+        settings, found = root.mu_print, printing.CHECK.found(root)
         row = layout.row(align=True)
         row.use_property_split = False
         row.prop(settings, "formats")
@@ -321,16 +313,16 @@ class MU_PT_print_files(_OfPrint, bpy.types.Panel):
             "INFO",
         )
         _check_state(layout, found)
-        words = start_words(root, "Export", printing.EXPORT)
+        words = printing.EXPORT.label(root, "Export")
         large_button(layout, "mu.print_export", "EXPORT", root=root, text=words)
         _state(layout, root, printing.EXPORT)
-        _written(layout, printing.exported(root))
+        _written(layout, printing.EXPORT.found(root))
         layout.operator("mu.export_stl", text="Export STL As ...", icon="FILE_FOLDER")
         body = fold(layout, "MU_specimens", "Specimens", False)
         if body:
             row = body.row(align=True)
             row.operator("mu.print_specimens", icon="OUTLINER_OB_LATTICE")
-            row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.SPECIMENS
+            row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "specimens"
             _state(body, root, printing.SPECIMENS)
         folded_place(layout, root, "print", "Print Offsets")
 
@@ -345,7 +337,7 @@ def _check_state(layout, found) -> None:
 
 def _verdict(layout, found, then: str) -> None:
     """Draw what a check found, in a line; then: what follows from errors."""
-    count = {s: sum(f["severity"] == s for f in found.findings) for s in marks.FAULTS}
+    count = {s: sum(f["severity"] == s for f in found.content["findings"]) for s in marks.FAULTS}
     if count["error"]:
         alert(layout, f"The check found {counted(count['error'], 'error', 'errors')}: {then}", "CANCEL")
     else:
@@ -361,16 +353,16 @@ def _written(layout, found) -> None:
         return
     box = layout.box()
     row = box.row()
-    resin = found.manifest["resin"]
+    resin = found.content["resin"]
     row.label(text=f"{resin['ml']:.2f} ml, {resin['g']:.1f} g")
-    row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = printing.EXPORT
+    row.operator("mu.print_open", text="", icon="FILE_FOLDER").what = "export"
     if found.stale:
         wrapped(box, f"Stale: {found.stale}", "ERROR")
     column = box.column(align=True)
     column.active = not found.stale
-    for entry in found.manifest["files"]:
+    for entry in found.content["files"]:
         column.label(text=f"{entry['file']}, {entry['bytes'] / 1e6:.2f} MB", icon="CHECKMARK")
-    if vented := found.manifest["vents"]:
+    if vented := found.content["vents"]:
         count, before, after = (
             len(vented["vents"]),
             vented["trapped_before_ml"],
@@ -378,7 +370,7 @@ def _written(layout, found) -> None:
         )
         words = f"{counted(count, 'vent', 'vents')}: {_ml(before)} trapped before, {_ml(after)} after"
         wrapped(column, words if count else f"No vent is needed: {_ml(before)} trapped at most", "INFO")
-    for entry in found.manifest["refused"]:
+    for entry in found.content["refused"]:
         wrapped(column, f"Not written: {entry['format']}: {entry['why']}", "ERROR")
 
 

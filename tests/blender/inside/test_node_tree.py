@@ -108,6 +108,25 @@ def test_a_trees_units_are_in_the_scene_follow_it_and_are_those_of_the_sidebar()
     assert again.mu_unit.chambers.wall_mm == pytest.approx(1.1)
 
 
+def test_a_preset_in_a_node_has_its_object_too():
+    tree = bpy.data.node_groups.new("t", classes.TREE)
+    node = tree.nodes.new(classes.node_class("unit"))
+    node.preset = "mu-0.75x"
+    state.refresh(tree)
+    (root,) = state.show_units(bpy.context, tree)
+    assert (root.mu_unit.scale, node.follower, node.source) == (0.75, root, None)
+    node.preset = "mu-1.0x"
+    state.refresh(tree)
+    assert root.mu_unit.scale == 1.0
+    assert "parameters" not in conversion.to_tree(tree).nodes["Unit"].settings, "still the preset"
+    # Changed in the sidebar it is no preset any more: the tree takes what the sidebar has.
+    root.mu_unit.chambers.wall_mm = 1.2
+    assert (node.source, node.follower) == (root, None)
+    state.refresh(tree)
+    assert state._designs[tree.session_uid]["Unit"].unit.chambers.wall_mm == 1.2
+    assert state.show_units(bpy.context, tree) == [], "once"
+
+
 def test_links_of_every_type_are_valid_where_the_core_takes_them_and_red_with_a_reason_elsewhere():
     kinds = definitions()
     for into in kinds.values():
