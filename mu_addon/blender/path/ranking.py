@@ -64,7 +64,7 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 
 
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
-    """Colour and label candidate tubes, objects by path; the chosen one keeps its colour.
+    """Colour and label candidate tubes, objects by path.
 
     Stale ones are grey, their rank with a question mark.
     """
@@ -76,7 +76,7 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
         modifier = tube.modifiers[0]
         # Below the name: the tubes are too close for more beside it.
         set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
-        if name != root.mu_unit.path and not found.stale:
+        if not found.stale:
             j_colour = field_colours.of_map(found.share(name))
             colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
             tube.data.materials[0] = colour
