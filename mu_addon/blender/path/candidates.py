@@ -50,6 +50,8 @@ def _draw(root: Any) -> None:
     tubes = {name.removeprefix(CANDIDATE): drawing.beside(root, name) for name in drawn if name != FREE}
     if tubes:
         ranking.colour_and_label(root, tubes)
+    if FREE in drawn:
+        ranking.colour_free(root, drawing.beside(root, FREE), *found[:2])
     if new and not bpy.app.background:
         # Not in a handler of an update, where nothing may be evaluated.
         uuid = root.mu_unit.uuid

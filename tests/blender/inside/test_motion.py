@@ -299,6 +299,7 @@ def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
     assert 0 < j < 1
     root.mu_unit.candidates = True
     tube = drawing.beside(root, "free")
+    assert tube.data.materials[0].name.startswith("MU J"), "in the colours of the candidates"
     assert np.allclose(motion_parts.vertices_of(tube.data), points, atol=1e-4)
     show(name=name)
     show(name=name, what="print")
