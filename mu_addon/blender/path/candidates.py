@@ -18,6 +18,8 @@ from ..unit.properties import to_unit
 from . import ranking
 
 CANDIDATE = "candidate:"
+THICKER = 1.7
+"""Factor on the width of the chosen path's bar: its colour is that of its J, as of every bar."""
 FREE = "free"
 """The whole lattice's best path, if a study has searched it."""
 
@@ -40,12 +42,16 @@ def _draw(root: Any) -> None:
     new = bool(drawn) and not any(drawing.beside(root, name) for name in drawn)
     for name, path in drawn.items():
         chosen = name in (FREE, CANDIDATE + root.mu_unit.path)
+        if chosen and name != FREE:
+            path.attributes["radius"] *= THICKER
         colour = "MU Waveguide" if chosen else "MU Candidate"
         title = name.removeprefix(CANDIDATE) if name != FREE else ""
         drawing.put_beside(root, name, path, colour, "MU Labelled Tube", title)
     tubes = {name.removeprefix(CANDIDATE): drawing.beside(root, name) for name in drawn if name != FREE}
     if tubes:
         ranking.colour_and_label(root, tubes)
+    if FREE in drawn:
+        ranking.colour_free(root, drawing.beside(root, FREE), *found[:2])
     if new and not bpy.app.background:
         # Not in a handler of an update, where nothing may be evaluated.
         uuid = root.mu_unit.uuid

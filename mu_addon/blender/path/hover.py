@@ -1,7 +1,8 @@
-"""The candidate path under the mouse, drawn where it truly runs in the lattice, in its own colour.
+"""The chosen candidate path and the one under the mouse, drawn where they truly run, in the colour of J.
 
 The bars of all candidates stand side by side beside the lattice, since in their true place they would cover
-each other. A click on one chooses it.
+each other. A click on one chooses it. In the sidebar's list Blender tells what the mouse is over only when it
+shows a tooltip.
 """
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
@@ -19,6 +20,7 @@ from mathutils import Vector
 from ...design.anchors import anchor_points, window
 from ...errors import InputError
 from ..results import legend
+from ..shared import viewports
 from ..shared.wording import path_symbol
 from ..unit import object as unit_object
 from ..unit.properties import to_unit
@@ -29,6 +31,28 @@ REACH = 7.0
 """Distance in pixels of the mouse from the middle of a bar, at a scale of 1."""
 WIDTH, EDGE = 5.0, 3.0
 """Width in pixels of the drawn path, and of the white edge around it."""
+
+
+SHOWN_S = 4.0
+"""Seconds for which a path is drawn that the list's tooltip is shown of."""
+
+_listed = ""
+
+
+def point_out(name: str) -> None:
+    """Draw a path in its true place for some seconds, as if the mouse were over its bar."""
+    global _listed
+    _listed = name
+    if bpy.app.timers.is_registered(_let_go):
+        bpy.app.timers.unregister(_let_go)
+    bpy.app.timers.register(_let_go, first_interval=SHOWN_S)
+    viewports.redraw_views(panels=False)
+
+
+def _let_go() -> None:
+    global _listed
+    _listed = ""
+    viewports.redraw_views(panels=False)
 
 
 def nearest(mouse: Any, bars: dict[str, Any], reach: float) -> str:
@@ -86,32 +110,40 @@ class MU_GT_candidate(bpy.types.Gizmo):
 
     def draw(self, context):
         root = unit_object.active_root(context)
-        if not self.is_highlight or not self.path or root is None:
-            return
-        line = None
-        with suppress(InputError):
-            line = _on_screen(context, true_place(root, self.path))
-        tube = candidates.candidate(root, self.path)
-        if line is None or tube is None:
-            return
-        scale = context.preferences.system.ui_scale
-        pairs = np.repeat(line, 2, axis=0)[1:-1].tolist()
-        shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-        batch = batch_for_shader(shader, "LINES", {"pos": [(x, y, 0.0) for x, y in pairs]})
-        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-        for width, colour in (
-            (WIDTH + 2.0 * EDGE, legend.TEXT),
-            (WIDTH, tuple(legend.display(np.array([tube.data.materials[0].diffuse_color]))[0])),
-        ):
-            shader.uniform_float("lineWidth", width * scale)
-            shader.uniform_float("color", colour)
-            batch.draw(shader)
-        size, known = round(13 * scale), ranking.known(root)
-        words = path_symbol(self.path)
-        if self.path in known.j:
-            words += f": {known.j[self.path]:.3f} mm{', stale' if known.stale else ''}"
-        x, y = line[-1]
-        legend.write(words, x + 1.2 * size, y, size)
+        pointed = (self.path if self.is_highlight else "") or _listed
+        for name in dict.fromkeys([root.mu_unit.path if root is not None else "", pointed]):
+            if name:
+                _draw_path(context, root, name, named=name == pointed)
+
+
+def _draw_path(context: Any, root: Any, name: str, named: bool) -> None:
+    """Draw a path where it runs, in the colour of its bar; named: with its name and J."""
+    line = None
+    with suppress(InputError):
+        line = _on_screen(context, true_place(root, name))
+    tube = candidates.candidate(root, name)
+    if line is None or tube is None:
+        return
+    scale = context.preferences.system.ui_scale
+    pairs = np.repeat(line, 2, axis=0)[1:-1].tolist()
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    batch = batch_for_shader(shader, "LINES", {"pos": [(x, y, 0.0) for x, y in pairs]})
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    for width, colour in (
+        (WIDTH + 2.0 * EDGE, legend.TEXT),
+        (WIDTH, tuple(legend.display(np.array([tube.data.materials[0].diffuse_color]))[0])),
+    ):
+        shader.uniform_float("lineWidth", width * scale)
+        shader.uniform_float("color", colour)
+        batch.draw(shader)
+    if not named:
+        return
+    size, known = round(13 * scale), ranking.known(root)
+    words = path_symbol(name)
+    if name in known.j:
+        words += f": {known.j[name]:.3f} mm{', stale' if known.stale else ''}"
+    x, y = line[-1]
+    legend.write(words, x + 1.2 * size, y, size)
 
 
 class MU_GGT_candidates(bpy.types.GizmoGroup):
@@ -131,4 +163,11 @@ class MU_GGT_candidates(bpy.types.GizmoGroup):
         self.gizmos.new(MU_GT_candidate.bl_idname)
 
 
-register, unregister = bpy.utils.register_classes_factory((MU_GT_candidate, MU_GGT_candidates))
+register, _remove_classes = bpy.utils.register_classes_factory((MU_GT_candidate, MU_GGT_candidates))
+
+
+def unregister() -> None:
+    """Unregister the gizmos, and the timer."""
+    if bpy.app.timers.is_registered(_let_go):
+        bpy.app.timers.unregister(_let_go)
+    _remove_classes()

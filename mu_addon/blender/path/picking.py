@@ -19,6 +19,7 @@ from ..shared.registration import add_handlers, remove_handlers
 from ..unit import object as unit_object
 from ..unit.base_classes import UnitOperator
 from ..unit.properties import to_unit
+from . import hover
 from .candidates import CANDIDATE
 
 
@@ -34,6 +35,14 @@ class MU_OT_path(UnitOperator, bpy.types.Operator):
         description="Name of a path, alpha1 ..; `none` removes the waveguide, "
         "nothing takes the candidate that is selected in the viewport",
     )
+
+    @classmethod
+    def description(cls, context, properties):
+        """Text of the tooltip, which also shows the path in its true place."""
+        root = unit_object.active_root(context)
+        if root is not None and root.mu_unit.candidates:
+            hover.point_out(root.mu_unit.path if properties.name == "none" else properties.name)
+        return cls.__doc__ if properties.name != "none" else "Remove the waveguide along this path"
 
     def act(self, context, root):
         name = self.name or selected_candidate(context)

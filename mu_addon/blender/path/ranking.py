@@ -38,7 +38,7 @@ class Known:
     def share_of(self, j: float) -> float:
         """Position of a J in mm, as `share`. Its root, which separates the best paths most."""
         low, high = min(self.j.values()), max(self.j.values())
-        return float(np.sqrt((j - low) / (high - low))) if high > low else 0.0
+        return float(np.sqrt(max(j - low, 0.0) / (high - low))) if high > low else 0.0
 
 
 def known(root: Any) -> Known:
@@ -64,7 +64,7 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 
 
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
-    """Colour and label candidate tubes, objects by path; the chosen one keeps its colour.
+    """Colour and label candidate tubes, objects by path.
 
     Stale ones are grey, their rank with a question mark.
     """
@@ -76,12 +76,23 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
         modifier = tube.modifiers[0]
         # Below the name: the tubes are too close for more beside it.
         set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
-        if name != root.mu_unit.path and not found.stale:
-            j_colour = field_colours.of_map(found.share(name))
-            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
-            tube.data.materials[0] = colour
-            set_modifier_input(modifier, "Material", colour)
+        if not found.stale:
+            _colour(root, found, name, tube, found.j[name])
         write_colour(tube)
+
+
+def colour_free(root: Any, tube: Any, name: str, j: float) -> None:
+    """Colour the whole lattice's best path, of J in mm, as the candidates."""
+    found = known(root)
+    if found.j:
+        _colour(root, found, name, tube, j)
+    write_colour(tube)
+
+
+def _colour(root: Any, found: Known, name: str, tube: Any, j: float) -> None:
+    colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", field_colours.of_map(found.share_of(j)))
+    tube.data.materials[0] = colour
+    set_modifier_input(tube.modifiers[0], "Material", colour)
 
 
 def write_colour(tube: Any) -> None:

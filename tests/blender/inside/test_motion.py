@@ -1,9 +1,11 @@
 """Results on the model: objects, attributes, timeline and panels, from a study that was run by the core."""
 
 import json
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
+import pytest
 from PIL import Image
 
 from mu_addon.blender.path import candidates, hover, picking, ranking
@@ -297,6 +299,7 @@ def test_a_path_of_the_whole_lattice_moves_and_is_shown_where_it_lies(study):
     assert 0 < j < 1
     root.mu_unit.candidates = True
     tube = drawing.beside(root, "free")
+    assert tube.data.materials[0].name.startswith("MU J"), "in the colours of the candidates"
     assert np.allclose(motion_parts.vertices_of(tube.data), points, atol=1e-4)
     show(name=name)
     show(name=name, what="print")
@@ -405,7 +408,9 @@ def test_candidates_say_their_rank(study):
         label = modifier_input(tube.modifiers[0], "Label")
         assert label.startswith("α"), label
         assert label.endswith(f"#{known[name][1]}"), label
-    assert tubes["alpha4"].data.materials[0].name == "MU Waveguide"
+    # The chosen one is thicker; its colour is that of its J, as of every other.
+    width = {name: values(tube.data, "radius").max() for name, tube in tubes.items()}
+    assert width["alpha4"] == pytest.approx(candidates.THICKER * width["alpha1"])
     # The list of the panel is sorted either way, and says what its numbers are.
     by_rank = sorted(known, key=lambda name: known[name][1])
     assert [w.name for w in path_panel.in_order(root, known, "deviation")] == by_rank
@@ -413,8 +418,13 @@ def test_candidates_say_their_rank(study):
     words = drawn([path_panel.MU_PT_path])
     assert "Mean deviation [mm], smaller is better" in words.replace("  ", " ")
     assert f"{known['alpha4'][0]:.3f}  #{known['alpha4'][1]}" in words
-    colours = {tuple(t.data.materials[0].diffuse_color) for n, t in tubes.items() if n != "alpha4"}
-    assert len(colours) == 9
+    assert len({tuple(t.data.materials[0].diffuse_color) for t in tubes.values()}) == 10
+    # The tooltip of a row in the list shows its path in the lattice; of the chosen one's, too.
+    for asked, shown in (("alpha2", "alpha2"), ("none", "alpha4")):
+        picking.MU_OT_path.description(bpy.context, SimpleNamespace(name=asked))
+        assert hover._listed == shown
+    hover._let_go()
+    assert hover._listed == ""
     assert not unit_object.behind(root)
     # They stand beside the lattice in the order of their names, whatever the ranking; each at its own height.
     order = [name for name, _ in sorted(known.items(), key=lambda item: item[1][1])]
