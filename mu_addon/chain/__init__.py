@@ -24,5 +24,10 @@ if TYPE_CHECKING:
     from .joint_learning import Learned as Learned
     from .joint_learning import Sampling as Sampling
     from .joint_learning import learn as learn
+    from .motion import Motion as Motion
+    from .motion import move as move
+    from .pressures import Pressures as Pressures
+    from .pressures import read_pressures as read_pressures
+    from .shape import Shape as Shape
 else:
     __getattr__, __dir__, __all__ = public_face(__name__)

@@ -85,6 +85,20 @@ class Learned:
     free_u: Array
     missed: tuple[str, ...] = ()
 
+    @property
+    def error_deg(self) -> float:
+        """Root mean square of the held-out states' errors of rotation."""
+        return _rms([row["angle_error_deg"] for row in self.held_out])
+
+    @property
+    def error_mm(self) -> float:
+        """Root mean square of the held-out states' errors of place."""
+        return _rms([row["place_error_mm"] for row in self.held_out])
+
+
+def _rms(values: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values else float("nan")
+
 
 Kept = Callable[[str], dict[str, Array] | None]
 Keep = Callable[[str, dict[str, Array]], None]

@@ -19,16 +19,21 @@ Group = argparse._ArgumentGroup | argparse.ArgumentParser
 
 
 def add_setting(
-    command: Group, d: Description, metavar: Any = None, many: bool | int = False, alone: str = ""
+    command: Group,
+    d: Description,
+    metavar: Any = None,
+    many: bool | int = False,
+    alone: str = "",
+    option: str = "",
 ) -> None:
     """Add the option of a setting: its type, choices, default and text; also --no-NAME of a flag that is set.
 
-    Its name is the setting's without the unit; many: it takes several words, or so many; alone: its value
-    where it stands without one. Bounds are checked by the job. A text that is empty by default is None
-    without the option.
+    Its name is `option`, or the setting's without the unit; many: it takes several words, or so many; alone:
+    its value where it stands without one. Bounds are checked by the job. A text that is empty by default is
+    None without the option.
     """
     unit = d.unit.replace("/", "_per_")
-    option = (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
+    option = option or (d.name.removesuffix(f"_{unit}") if unit else d.name).replace("_", "-")
     if d.type is bool and d.default:
         both = argparse.BooleanOptionalAction
         command.add_argument(f"--{option}", dest=d.name, action=both, default=True, help=help_of(d))

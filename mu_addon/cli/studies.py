@@ -17,6 +17,7 @@ from .options import (
     add_setting,
     add_unit,
     modelled_unit,
+    presets,
     require_out,
     unit_if_named,
 )
@@ -52,6 +53,18 @@ def _measured(options: argparse.Namespace, context: RunContext, one: Any) -> Any
     return read_folder(Path(options.folder))
 
 
+def _add_gripper(command: argparse.ArgumentParser, one: Any) -> None:
+    which = command.add_mutually_exclusive_group(required=True)
+    which.add_argument("--preset", metavar="NAME", help=f"Gripper preset: {presets('gripper')}.")
+    which.add_argument("--gripper", metavar="FILE", help="Gripper parameters, a TOML file.")
+
+
+def _gripper(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    from ..design.gripper import load_gripper, read_gripper
+
+    return load_gripper(options.preset) if options.preset is not None else read_gripper(options.gripper)
+
+
 def _add_bending(command: argparse.ArgumentParser, one: Any) -> None:
     words = "Recordings, or folders of measured data of the kind waveguide_bending."
     command.add_argument("data", nargs="+", metavar="FOLDER", help=words)
@@ -63,6 +76,7 @@ def _bending(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
 
 OBJECTS = {
     "unit": (_add_unit, _unit),
+    "gripper": (_add_gripper, _gripper),
     "measured": (_add_measured, _measured),
     "bending": (_add_bending, _bending),
 }
@@ -78,20 +92,29 @@ def command_of(name: str) -> tuple[Callable[[Any], None], Callable[[Any, Any], N
 def _add(commands: Commands[Any], kind: type[Study]) -> None:
     words = " ".join(inspect.getdoc(kind).split("\n\n")[0].split())  # type: ignore[union-attr]
     command = commands.add_parser(kind.name, help=words, epilog=f"example: run.py {kind.example}")
+    if kind.from_file[0]:
+        command.add_argument("file", metavar="FILE", help=kind.from_file[0])
     for one in kind.inputs().values():
         if one.descriptions:
             _add_values(command, one)
+            if kind.from_file[0]:
+                command.set_defaults(**{_dest(one): None})
         elif one.kind in OBJECTS:
             OBJECTS[one.kind][0](command, one)
     add_results(command)
     add_report(command)
 
 
+def _dest(one: Input) -> str:
+    """Name of an input's value among the options."""
+    return one.option if len(one.descriptions) > 1 else one.descriptions[0].name
+
+
 def _add_values(command: argparse.ArgumentParser, one: Input) -> None:
     """The option of an input's plain values."""
     first = one.descriptions[0]
     if len(one.descriptions) == 1:
-        add_setting(command, first, one.metavar, one.many, one.alone)
+        add_setting(command, first, one.metavar, one.many, one.alone, one.option)
         return
     defaults = [d.default for d in one.descriptions]
     shown = " ".join(f"{value:g}" for value in defaults)
@@ -112,9 +135,15 @@ def _run(kind: type[Study], options: argparse.Namespace, context: RunContext) ->
     values: dict[str, Any] = {}
     for name, one in kind.inputs().items():
         if one.descriptions:
-            given = getattr(options, one.option or one.descriptions[0].name)
+            given = getattr(options, _dest(one))
+            if given is None and kind.from_file[0]:
+                continue
             given = one.descriptions[0].default if given is None else given
             values[name] = one.made(tuple(given) if len(one.descriptions) > 1 else (given,), values)
         elif one.kind in OBJECTS:
             values[name] = OBJECTS[one.kind][1](options, context, one)
-    use_case(kind.name).start(kind(**values).complete(), Path(options.out), context)
+    if kind.from_file[0]:
+        study = kind.read_file(Path(options.file), (kind.name, kind.from_file[1]), values)
+    else:
+        study = kind(**values).complete()
+    use_case(kind.name).start(study, Path(options.out), context)

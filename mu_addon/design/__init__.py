@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .dimensions import Dimensions as Dimensions
     from .gates import GateError as GateError
     from .gripper import Gripper as Gripper
+    from .gripper import GripperSolid as GripperSolid
     from .gripper import build_gripper as build_gripper
     from .gripper import load_gripper as load_gripper
     from .gripper import read_gripper as read_gripper

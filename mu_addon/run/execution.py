@@ -251,10 +251,14 @@ class Execution:
         return found or None
 
     def _write(self, file: File) -> None:
+        of = "" if file.of is None else content(file.of)
+        if of and self._written.get(file.name) == of:
+            return
         made = file.make(self.folder / file.name)
-        if made is not None and self._written.get(file.name) != digest(made):
+        of = of or digest(made or "")
+        if made is not None and self._written.get(file.name) != of:
             write_bytes(self.folder / file.name, made.encode() if isinstance(made, str) else made)
-            self._written[file.name] = digest(made)
+        self._written[file.name] = of
 
 
 # The study of a process of the pool, which remembers what it made.

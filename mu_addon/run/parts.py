@@ -67,10 +67,14 @@ class Table:
 
 @attrs.frozen
 class File:
-    """A file of the run's folder; make: its bytes or text, or None if it wrote the path that it is given."""
+    """A file of the run's folder; make: its bytes or text, or None if it wrote the path that it is given.
+
+    of: what it is made of: a file, or a folder of files, that takes long is not made again of the same.
+    """
 
     name: str
     make: Callable[[Path], bytes | str | None]
+    of: Any = None
 
 
 def csv(name: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> File:

@@ -27,11 +27,13 @@ import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import attrs
 
 from ..errors import InputError
+from ..reading import parse_toml
 from .folder import RUN, FolderLayout
 from .inputs import FORMAT, read_inputs, structured
 
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from .progress import Progress
 
 _INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
+_NONE: Mapping[str, Any] = MappingProxyType({})
 TELL = "tell"
 """Parameter by which a stage reports its progress: see `Tell`."""
 
@@ -131,7 +134,8 @@ class ReadInput(Input):
 class Found:
     """Inputs as they are found: their file, its keys, those of its table [run], the inputs read so far.
 
-    before: hashes of what was read from other files (`ReadInput`).
+    before: hashes of what was read from other files (`ReadInput`). replaced: names of inputs whose values
+    options of a command replace.
     """
 
     path: Path
@@ -139,6 +143,7 @@ class Found:
     run: dict[str, Any]
     given: dict[str, Any] = attrs.field(factory=dict)
     before: dict[str, Any] = attrs.field(factory=dict)
+    replaced: tuple[str, ...] = ()
 
 
 def setting(description: Any, *, metavar: str | None = None, decides: bool = True) -> Any:
@@ -346,14 +351,16 @@ class Members(dict[Any, Any]):
 class Study:
     """Base of all studies; see the module.
 
-    name: of its command; its inputs are in `name`.toml. files: content of each file of the run's folder, by
-    name or pattern; to_fill: files that are filled in by hand, which no run removes. example: a command line.
-    node: None of a study that is no node.
+    name: of its command; its inputs are in `name`.toml. from_file: of a command that reads such a file, and
+    whose options replace values in it: help on the file, and what to do where it cannot be read. files:
+    content of each file of the run's folder, by name or pattern; to_fill: files that are filled in by hand,
+    which no run removes. example: a command line. node: None of a study that is no node.
     """
 
     name: ClassVar[str]
     files: ClassVar[Mapping[str, str]]
     to_fill: ClassVar[tuple[str, ...]] = ()
+    from_file: ClassVar[tuple[str, str]] = ("", "")
     example: ClassVar[str] = ""
     node: ClassVar[Node | None] = None
 
@@ -441,9 +448,20 @@ class Study:
     @classmethod
     def read(cls, folder: Path) -> Self:
         """The study whose inputs are in a folder; raises InputError."""
-        path = folder / cls.layout().inputs
-        keys, run = read_inputs(path)
-        found = Found(path, keys, run)
+        return cls.read_file(folder / cls.layout().inputs)
+
+    @classmethod
+    def read_file(cls, path: Path, words: Sequence[str] = (), replaced: Mapping[str, Any] = _NONE) -> Self:
+        """The study of a file, and of those that it names in its folder; raises InputError.
+
+        words: as those of `read_inputs`. replaced: values of inputs, in place of the file's.
+        """
+        from ..toml_writer import toml_text
+
+        keys, run = read_inputs(path, *words)
+        for name, value in replaced.items():
+            keys |= parse_toml(toml_text(cls.inputs()[name].write(name, value).keys, ""), name)
+        found = Found(path, keys, run, replaced=tuple(replaced))
         special = {}
         for name, one in cls.inputs().items():
             if one.kind != "setting":

@@ -9,10 +9,12 @@ from ..run.study import Study
 
 STUDIES = {
     "calibrate": "Calibrate",
+    "chain": "Chain",
     "check": "Check",
     "design-experiments": "DesignExperiments",
     "export": "Export",
     "fit-material": "FitMaterial",
+    "grip": "Grip",
     "homogenize": "Homogenize",
     "measure": "Measure",
     "specimens": "Specimens",

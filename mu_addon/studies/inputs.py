@@ -344,6 +344,22 @@ class OnceInput(Input):
 
 
 @attrs.frozen
+class TableInput(Input):
+    """Values in a table of their own; of: their attrs class, which is loaded when they are read."""
+
+    kind: str = "table"
+    of: Callable[[], type] = lambda: dict
+
+    def write(self, name: str, value: Any) -> Written:
+        """Its table."""
+        return Written({name: attrs.asdict(value)})
+
+    def read(self, name: str, found: Found) -> Any:
+        """The values of the table, the others by default; raises InputError."""
+        return structured(self.of(), found.keys.pop(name, {}), f"{found.path}, [{name}]")
+
+
+@attrs.frozen
 class NumbersInput(Input):
     """Several numbers."""
 

@@ -22,8 +22,6 @@ MODULES = {
     "study.toml": ".simulate_and_place.run",
     "prepare.toml": ".prepare",
     "live.toml": ".live_bending.run",
-    "grip.toml": ".grip.run",
-    "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
     "record.toml": ".sensor.record",
     "sweep.toml": ".parameter_study.run",

@@ -15,6 +15,7 @@ from mu_addon.cli.main import parser
 from mu_addon.design import settings as design
 from mu_addon.design.quantity import Description
 from mu_addon.fem import device
+from mu_addon.grasp import settings as grip
 from mu_addon.meshing import settings as mesh
 from mu_addon.optimization import settings as search
 from mu_addon.placement import settings as path
@@ -22,7 +23,6 @@ from mu_addon.usecases.graph.chain_nodes import chain_nodes
 from mu_addon.usecases.graph.optimize_nodes import optimize_nodes
 from mu_addon.usecases.graph.study_nodes import study_nodes
 from mu_addon.usecases.graph.sweep_nodes import sweep_nodes
-from mu_addon.usecases.grip import settings as grip
 from mu_addon.usecases.parameter_study import settings as sweep
 from mu_addon.usecases.simulate_and_place import settings as study
 
@@ -45,8 +45,7 @@ OTHERWISE = {
     "optimization/unit_body.py": {"self_contact"},
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
-    "usecases/chain/job.py": {"orientation_deg"},  # of a chain's base
-    "usecases/graph/chain_nodes.py": {"protocol", "orientation_deg"},
+    "usecases/graph/chain_nodes.py": {"protocol"},
 }
 
 

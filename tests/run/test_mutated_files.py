@@ -21,20 +21,22 @@ import numpy as np
 import pytest
 
 from mu_addon.design.body import read_body
+from mu_addon.design.gripper import load_gripper
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.surface import stl_bytes, stl_surface
 from mu_addon.errors import InputError
 from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
+from mu_addon.grasp import read_phases, shipped_phases
 from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.measured.folder import read_folder
 from mu_addon.run.folder import keep_inputs
 from mu_addon.sensing.recording import read_recording
 from mu_addon.studies.check import Check
+from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
-from mu_addon.usecases.grip.phases import read_phases, shipped_phases
 from mu_addon.usecases.resume import use_case_of
 from mu_addon.usecases.track_video.tracked_table import read_pixels
 
@@ -233,11 +235,12 @@ FOLDERS: dict[str, tuple[Callable[[Path], Any], Path]] = {
     "measured": (read_folder, DATA / "measured"),
     **{
         kind: (lambda folder: use_case_of(folder).read(folder), DATA / "folders" / kind)
-        for kind in ("grip", "place")
+        for kind in ("place",)
     },
 }
 STUDIES = {
     "check": Check(printer=load_printer(), unit=load_preset("mu-1.0x")),
+    "grip": Grip(gripper=load_gripper("gripper")),
     "homogenize": Homogenize(unit=load_preset("mu-1.0x"), resin=ResinInput().made(("flexible-80a",), {})),
 }
 

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from mu_addon import reading
+from mu_addon.chain import read_pressures
 from mu_addon.cli.main import main
 from mu_addon.design.gripper import load_gripper, read_gripper
 from mu_addon.design.gripper import to_toml as gripper_text
@@ -27,6 +28,7 @@ from mu_addon.errors import InputError
 from mu_addon.evidence.extended import load_model
 from mu_addon.fem.protocol import read_protocol
 from mu_addon.files import read_npz
+from mu_addon.grasp import read_phases
 from mu_addon.homogenize.effective_file import read_effective
 from mu_addon.materials.library import read_material
 from mu_addon.measured import table
@@ -37,9 +39,8 @@ from mu_addon.reading import MOST_ROWS, file_bytes, file_text, parse_json, parse
 from mu_addon.run.folder import FolderLayout, claim
 from mu_addon.sensing.calibration import read_calibration
 from mu_addon.sensing.recording import read_recording
+from mu_addon.studies.chain import Chain
 from mu_addon.studies.inputs import path_of
-from mu_addon.usecases.chain.job import read_chain, read_pressures
-from mu_addon.usecases.grip.phases import read_phases
 from mu_addon.usecases.parameter_study.plan import read_plan
 from mu_addon.usecases.track_video.run import read_bench, read_pressure
 from mu_addon.usecases.track_video.tracked_table import read_pixels
@@ -74,7 +75,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str | None]] = {
     "protocol": (read_protocol, "time_s,pressure_kPa\n0,0\n1,5\n"),
     "phases": (read_phases, None),
     "chain": (
-        read_chain,
+        Chain.read_file,
         "[target]\nreach = [0.0, 5.0, 40.0]\n"
         + 2 * '[[unit]]\npreset = "mu-1.0x"\npressure_kPa = [-5.0, 10.0]\n',
     ),

@@ -240,6 +240,7 @@ def test_inputs_go_through_their_files(tmp_path):
         (tmp_path / name).write_text(text)
     assert Spring.read(tmp_path) == one
     assert "[run]\nworkers = 3" in one.texts()["spring.toml"]
+    assert Spring.read_file(tmp_path / "spring.toml", replaced={"loads": 6}) == attrs.evolve(one, loads=6)
     text = one.texts()["spring.toml"].replace("loads = 5", "loads = 50")
     (tmp_path / "spring.toml").write_text(text)
     with pytest.raises(InputError, match="loads = 50 is out of bounds"):
@@ -261,16 +262,20 @@ class Letters(Study):
 
     @section()
     def answer(self, made):
-        yield from (File(f"{letter}.txt", lambda path, text=text: text) for letter, text in made.items())
+        yield File("same.txt", lambda path: "same")
+        for letter, text in made.items():
+            yield File(f"{letter}.txt", lambda path, text=text: CALLS.append(text) or text, of=letter)
 
 
 def test_members_have_their_own_seconds_and_a_file_is_written_once(tmp_path, monkeypatch):
+    CALLS.clear()
     written = []
     monkeypatch.setattr("mu_addon.run.execution.write_bytes", lambda path, text: written.append(path.name))
     work = Execution(Letters(), tmp_path, RunContext(Progress()))
     assert work.plan() == [("a", 1.0), ("b", 5.0)]
     work.run()
-    assert written == ["a.txt", "b.txt"]
+    assert written == ["same.txt", "a.txt", "b.txt"]
+    assert CALLS == ["a", "b"], "what is made of the same is not made again"
 
 
 def test_an_option_takes_so_many_words_or_stands_alone(capsys):

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mu_addon.chain import read_pressures
 from mu_addon.chain.unit_between_plates import PlateBody
 from mu_addon.cli.main import main
 from mu_addon.errors import InputError
-from mu_addon.usecases.chain.job import LAYOUT, read_chain, read_job, read_pressures
+from mu_addon.studies.chain import Chain
 from mu_addon.usecases.resume import use_case_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,19 +43,24 @@ def folder(tmp_path):
 
 
 def test_the_example_reads_and_its_folder_reads_alike(tmp_path):
-    job = read_chain(ROOT / "assets/examples/trunk/chain.toml")
+    job = Chain.read_file(ROOT / "assets/examples/trunk/chain.toml")
     assert len(job.units) == 5
     for name, text in job.texts().items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    again = read_job(tmp_path)
-    assert again.texts() == job.texts()
-    assert LAYOUT.is_of(tmp_path)
+    assert Chain.read(tmp_path).texts() == job.texts()
     assert use_case_of(tmp_path).name == "chain"
 
 
 def test_equal_units_share_the_range_of_their_pressures(folder):
     (folder / "chain.toml").write_text(CHAIN.replace("pressure_kPa = [0, 20]", "pressure_kPa = [-5, 5]", 1))
-    assert read_chain(folder / "chain.toml").ranges_kPa() == [(-5.0, 20.0)] * 2
+    ((_, unit, *span),) = Chain.read(folder).joints_of
+    assert (unit.name, span) == ("mu-1.0x", [-5.0, 20.0])
+
+
+def test_options_replace_values_of_the_file(folder):
+    """A point to reach takes the protocol's place."""
+    found = Chain.read_file(folder / "chain.toml", replaced={"reach": (0.0, 5.0, 150.0), "tip_mass_g": 3.0})
+    assert (found.reach, found.protocol, found.tip_mass_g) == ((0.0, 5.0, 150.0), None, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +81,7 @@ def test_equal_units_share_the_range_of_their_pressures(folder):
 def test_wrong_inputs_are_named(folder, old, new, words):
     (folder / "chain.toml").write_text(CHAIN.replace(old, new, 1))
     with pytest.raises(InputError) as error:
-        read_chain(folder / "chain.toml")
+        Chain.read(folder)
     assert words in str(error.value)
 
 

@@ -18,14 +18,12 @@ from mu_addon.errors import InputError
 from mu_addon.fem.protocol import Protocol
 from mu_addon.fem.unit_materials import materials_of
 from mu_addon.files import read_npz
+from mu_addon.grasp import NAMES, Contact, Cube, Phases, grasp, read_phases, shipped_phases
 from mu_addon.meshing.settings import MeshSettings
+from mu_addon.report.grasp_files import even, write_halves
 from mu_addon.report.motion_files import read_motion
 from mu_addon.report.pc2 import read_pc2
-from mu_addon.usecases.grip.grasp import grasp
-from mu_addon.usecases.grip.motion_files import even, write_halves
-from mu_addon.usecases.grip.phases import NAMES, Phases, read_phases, shipped_phases
-from mu_addon.usecases.grip.run import Job
-from mu_addon.usecases.grip.settings import Cube, Grip
+from mu_addon.studies.grip import Grip
 
 COARSE = MeshSettings(refine=0.35)
 
@@ -89,17 +87,19 @@ def test_a_cube_wider_than_the_gap_is_refused(finger):
     with pytest.raises(InputError, match="does not fit"):
         grasp(gripper, Cube(30.0), shipped_phases(), mesh, materials)
     with pytest.raises(InputError, match="does not fit"):
-        Job(gripper, (Cube(31.0),))
+        Grip(gripper=gripper, cubes_mm=(31.0,))
 
 
 @pytest.fixture(scope="module")
 def smooth(finger):
     """Grasps of both cubes without friction, by side."""
     gripper, mesh, materials = finger
-    grip = Grip(friction=0.0, step_s=1.0, halvings=1)
     corners = np.array([0.0, 1.0, 6.0, 6.5, 7.0, 11.0]), np.array([0.0, -10.0, 40.0, 40.0, 40.0, 0.0])
     short = Phases(Protocol(*corners), ("i", *NAMES))
-    return {side: grasp(gripper, Cube(side), short, mesh, materials, grip) for side in (25.0, 29.0)}
+    return {
+        side: grasp(gripper, Cube(side), short, mesh, materials, Contact(friction=0.0), step_s=1.0)
+        for side in (25.0, 29.0)
+    }
 
 
 def test_without_friction_a_cycle_gives_all_work_back_and_lifts_nothing(smooth):
@@ -230,10 +230,6 @@ def test_a_grasp_from_the_command_line_leaves_its_files_and_a_second_finds_it_do
     again = json.loads((out / "summary.json").read_text())
     assert again["seconds"]["grasp of 25 mm"] < 0.3 * summary["seconds"]["grasp of 25 mm"]
     assert (out / "grasp_25.csv").read_text() == before
-
-
-def test_self_contact_is_in_the_file():
-    assert "self_contact = true" in Job(load_gripper("gripper"), self_contact=True).texts()["grip.toml"]
 
 
 def short_gripper(folder):

@@ -6,7 +6,7 @@ from mu_addon.design.parameters import load_preset, write_unit
 from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
-from mu_addon.usecases.chain.job import read_chain
+from mu_addon.studies.chain import Chain
 from mu_addon.usecases.graph.chain_nodes import _chain, _solved
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.optimize_nodes import _optimize, _proposed
@@ -91,18 +91,18 @@ turn_deg = 90.0
     (tmp_path / "p.csv").write_text("time_s,pressure_1_kPa,pressure_2_kPa\n0,0,0\n1,10,20\n")
     asked = {"turns_deg": "0 90", "tip_mass_g": 20.0, "refine": 0.25, "protocol": str(tmp_path / "p.csv")}
     made = _chain(chain(UNIT, load_preset("mu-1.0x"), **asked)).job
-    assert made.texts() == read_chain(tmp_path / "chain.toml").texts()
+    assert made.texts() == Chain.read(tmp_path).texts()
 
 
 def test_a_point_to_reach_and_what_is_wrong_with_a_chain(tmp_path):
     job = _chain(chain(UNIT, copies=3, reach_mm="0 -25 200", high_kPa=20.0)).job
     assert [one.pressure_kPa for one in job.units] == [(0.0, 20.0)] * 3
-    assert job.target.reach == (0.0, -25.0, 200.0)
+    assert job.reach == (0.0, -25.0, 200.0)
     for settings, words in (
         ({}, "neither a protocol nor a target"),
         ({"copies": 8, "turns_deg": "0 1"}, "2 turns for 8 units"),
         ({"reach_mm": "0 a 1"}, "are not numbers"),
-        ({"reach_mm": "0 1"}, "is not a point"),
+        ({"reach_mm": "0 1"}, "is no vector"),
         ({"protocol": str(tmp_path / "none.csv")}, "cannot read the protocol"),
     ):
         with pytest.raises(InputError, match=words):

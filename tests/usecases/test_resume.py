@@ -16,25 +16,23 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
 from mu_addon.measured import read_folder
 from mu_addon.measured.kinds import NOISE
-from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
 from mu_addon.studies import STUDIES
+from mu_addon.studies.chain import Chain
 from mu_addon.studies.check import Check, read_part
 from mu_addon.studies.design_experiments import DesignExperiments
 from mu_addon.studies.export import Export, TakeOff
 from mu_addon.studies.fit_material import FitMaterial
+from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import NodePath, ResinInput
 from mu_addon.studies.specimens import Specimens
 from mu_addon.usecases import prepare
-from mu_addon.usecases.chain import job as chain
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
-from mu_addon.usecases.grip import job as grip
-from mu_addon.usecases.grip.settings import Cube, Grip
 from mu_addon.usecases.live_bending import requests as live_bending
 from mu_addon.usecases.optimize import job as optimize
 from mu_addon.usecases.parameter_study.plan import parse_plan
@@ -103,18 +101,14 @@ def jobs(folder):
     yield live_bending.Job()
     yield lattice(UNIT, "elastic-50a-v1", cells=2, friction="stick", strain=0.25, refine=2 / 3)
     yield lattice(load_preset("mu-1.5x"), None, friction="none")
-    yield grip.Job(
-        load_gripper("gripper"),
-        (Cube(10.0, 1 / 3),),
-        Grip(friction=0.3),
-        mesh=MeshSettings(refine=0.4),
-    )
+    hand = load_gripper("gripper")
+    yield Grip(gripper=hand, cubes_mm=(10.0,), density_g_per_ml=1 / 3, friction=0.3, refine=0.45, coarse=True)
     yield diagnose.Job(paper)
     yield diagnose.Job(paper, load_preset("mu-1.5x"))
     yield DesignExperiments(data=paper, noise={**NOISE, "angle": 1 / 3})
     yield FitMaterial(data=measured, laws=("yeoh", "neo-hooke"), hold_out=("uniaxial",), weights="relative")
     yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
-    yield chain.read_chain(asset_root() / "examples/trunk/chain.toml")
+    yield Chain.read_file(asset_root() / "examples/trunk/chain.toml")
     yield optimize.job_from(asset_root() / "examples/graded-finger/design.toml")
     yield record.Job(simulated=True, seconds=1 / 3, take=2)
     yield graph.Job(template("data-to-cause"), ("Diagnose",), node_reports=True)

@@ -221,7 +221,7 @@ def test_jobs_that_know_no_such_wall_refuse_it():
     from mu_addon.fem.equilibrium import Equilibrium
     from mu_addon.fem.model import Model
     from mu_addon.fem.trajectory import simulate
-    from mu_addon.usecases.grip.run import Job as GripJob
+    from mu_addon.studies.grip import Grip
     from mu_addon.usecases.simulate_and_place.named_effects import NamedEffects
 
     unit = unit_with_wall(law="prony", prony_g1=0.3)
@@ -231,7 +231,7 @@ def test_jobs_that_know_no_such_wall_refuse_it():
     gripper = load_gripper("gripper")
     gripper = attrs.evolve(gripper, unit=attrs.evolve(gripper.unit, wall=unit.wall))
     with pytest.raises(InputError, match="a grasp does not support a wall with memory"):
-        GripJob(gripper)
+        Grip(gripper=gripper)
     with pytest.raises(InputError, match="depends on its history"):
         simulate(Equilibrium(Model(mesh), materials_of(unit, mesh)), np.arange(2.0), np.array([0.0, 5.0]))
     with pytest.raises(InputError, match="wall with memory"):

@@ -14,6 +14,7 @@ import numpy as np
 from ...design.gripper import Gripper
 from ...design.steps import StepInputs
 from ...errors import MuError
+from ...grasp.settings import BEYOND
 from ..preview import materials, skeletons
 from ..shared import displays, updates
 from ..shared.blender_property import exact
@@ -29,9 +30,6 @@ MOVING = "moving:"
 SIDES = ("left", "right")
 SHOWN = ("membranes", "struts", "wells")
 """Steps of a finger's unit that are drawn."""
-BEYOND_MM = 3.0
-"""Initial distance of the cube's middle beyond the tips, equal to the core's `Grip`, which needs the solver.
-"""
 
 
 def roots() -> list[Any]:
@@ -114,7 +112,7 @@ def _draw(root: Any, gripper: Gripper) -> None:
     half = np.full(3, root.mu_gripper.cube_mm / 2.0)
     cube = put_box(root, "cube", -half, half, "MU Obstacle")
     if first:
-        cube.location.z = gripper.unit.dimensions.height + BEYOND_MM
+        cube.location.z = gripper.unit.dimensions.height + BEYOND.default
         # Fingers and cube are solved as mirror images: the cube moves between them, along them only.
         cube.lock_location[2] = False
 
@@ -123,7 +121,7 @@ def beyond_mm(root: Any) -> float:
     """Distance of the cube's middle beyond the tips, as placed by the user."""
     cube = part(root, "cube")
     if cube is None:
-        return BEYOND_MM
+        return BEYOND.default
     # Digits beyond a nanometre come from single precision.
     return round(exact(cube.location.z) - to_gripper(root.mu_gripper).unit.dimensions.height, 6)
 

@@ -8,11 +8,10 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ...design.anchors import farthest_window, windows
 from ...design.gripper import gripper_names, load_gripper
-from ..jobs import start_child
 from ..jobs.operators import job_operators
 from ..shared import landing, viewports
 from ..shared.operators import RootOperator, reports_errors
-from ..simulate import study_folder as studies
+from ..simulate.study_job import StudyOperator
 from ..unit.object import active_root
 from ..unit.properties import to_unit
 from . import object as gripper_object
@@ -82,25 +81,14 @@ class MU_OT_gripper_delete(GripperOperator, bpy.types.Operator):
         gripper_object.delete(root)
 
 
-class MU_OT_grasp(GripperOperator, bpy.types.Operator):
+class MU_OT_grasp(StudyOperator, GripperOperator, bpy.types.Operator):
     """Run the chosen job in a child process; Blender stays usable, and finished stages are not repeated"""
 
     bl_idname = "mu.grasp"
     bl_label = "Grasp"
     bl_options = {"REGISTER"}
 
-    @classmethod
-    def trouble(cls, root):
-        if grasps.GRASP.is_running(root):
-            return "A job of this gripper is running"
-        return root.mu_gripper.trouble.partition("\n")[0] or start_child.lacking()
-
-    def act(self, context, root):
-        folder = grasps.folder_of(root)
-        if not root.mu_gripper.folder:
-            root.mu_gripper.folder = studies.relative(folder)
-        grasps.GRASP.start(root, folder, lambda folder: grasps.write_inputs(root, folder))
-        viewports.redraw()
+    job = grasps.GRASPING
 
 
 class MU_OT_grasp_show(GripperOperator, bpy.types.Operator):

@@ -6,8 +6,8 @@ import bpy
 
 from ...design.gripper import SECTIONS
 from ...design.quantity import describe
-from ...usecases.grip.phases import WORDS
-from ..jobs.panel import job_state, start_button, timed
+from ...grasp.phases import WORDS
+from ..jobs.panel import job_state, start_button
 from ..shared.panels import RootPanel, alert, wrapped
 from ..unit.fields import field
 from . import object as gripper_object
@@ -68,7 +68,7 @@ class MU_PT_grasp(GripperPanel, bpy.types.Panel):
             layout.prop(props, "self_contact")
         child = grasps.GRASP.child(root)
         name = "Make the Part" if props.detail == "part" else "Grasp"
-        start_button(layout, child, "mu.grasp", "PLAY", text=timed(name, grasps.announced(root)))
+        start_button(layout, child, "mu.grasp", "PLAY", text=grasps.GRASPING.label(root, name))
         job_state(layout, child, "see below", JOB)
         found = grasps.of(root)
         if found is None:
@@ -85,7 +85,7 @@ def _found(layout, scene, root, found):
     box = layout.box()
     if found.stale:
         box.alert = True
-        wrapped(box, "Stale: gripper, cube or friction were changed. Grasp again", "ERROR")
+        wrapped(box, f"Stale: {found.stale}. Grasp again", "ERROR")
     column = box.column(align=True)
     column.active = not found.stale
     f = found.figures

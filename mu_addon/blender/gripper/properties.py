@@ -11,8 +11,8 @@ from ...design import parameters
 from ...design.gripper import SECTIONS, Gripper
 from ...design.quantity import describe
 from ...design.settings import FRICTION
+from ...grasp.settings import DENSITY
 from ...meshing.settings import SELF_CONTACT
-from ...usecases.grip.settings import DENSITY
 from ..shared import displays
 from ..shared.blender_property import MILLIMETRES, blender_property, exact, millimetres
 from ..shared.registration import property_group_factory

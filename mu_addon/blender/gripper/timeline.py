@@ -63,7 +63,7 @@ def show(root: Any, scene: Any) -> None:
 
 def _halves(folder: Path) -> Any:
     # Imported late, with the solver's packages.
-    from ...usecases.grip.motion_files import write_halves
+    from ...report.grasp_files import write_halves
 
     return write_halves(folder)
 

@@ -44,7 +44,7 @@ WRITERS = (
     "mu_addon.placement.graph",
     "mu_addon.usecases.simulate_and_place.named_effects",
     "mu_addon.usecases.simulate_and_place.job",
-    "mu_addon.usecases.grip.job",
+    "mu_addon.studies.grip",
     "mu_addon.usecases.live_bending.requests",
     "mu_addon.usecases.prepare",
     "mu_addon.studies.export",

@@ -6,6 +6,7 @@ By hand stay the fields that a panel asks for in its own way, the words on a but
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import attrs
 from ...errors import MuError
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
+from ...run.progress_estimate import Plan
 from ...run.study import Study
 from ...run.summary import SUMMARY
 from ...studies import STUDIES, study
@@ -28,6 +30,7 @@ from . import study_folder, timings
 
 REPORT_S = 5.0
 """Expected seconds of a report, on two cores."""
+_NUMBER = re.compile(r"[\d.]+")
 OF_UNIT = ("unit", "path")
 """Inputs that are the unit's own parameters."""
 
@@ -108,10 +111,21 @@ class StudyJob:
 
     def announced(self, root: Any) -> tuple[float, bool]:
         """Expected seconds, and True if every stage was measured on this machine; raises MuError."""
+        plan, known = self._expected(root)
+        return sum(seconds for _, seconds in plan), known
+
+    def plan(self, root: Any) -> Plan:
+        """Expected stages with the seconds of each; raises MuError."""
+        return self._expected(root)[0]
+
+    def _expected(self, root: Any) -> tuple[Plan, bool]:
         wanted = self.inputs(root)
-        plan, taken = wanted.expected(), timings.measured(wanted.detail())
-        seconds = sum(taken.get(title, expected) for title, expected in plan.items())
-        return seconds + taken.get("report", REPORT_S), plan.keys() <= taken.keys()
+        expected, taken = wanted.expected(), timings.measured(wanted.detail())
+        # Members of a set differ in a number: one takes about as long as another.
+        alike = {_NUMBER.sub("", title): seconds for title, seconds in taken.items()}
+        known = {title: taken.get(title, alike.get(_NUMBER.sub("", title))) for title in expected}
+        plan = [(title, expected[title] if s is None else s) for title, s in known.items()]
+        return [*plan, ("report", taken.get("report", REPORT_S))], None not in known.values()
 
     def child(self, root: Any) -> Any:
         """Its own child of this session, running or ended, or None."""

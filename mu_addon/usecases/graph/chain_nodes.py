@@ -22,10 +22,10 @@ def _remark(outputs: Outputs) -> str:
 
 def _chain(call: Call) -> Order:
     from ...chain.joint_learning import Sampling
+    from ...chain.pressures import read_pressures
     from ...graph.evaluation import Order
-    from ...meshing.settings import MeshSettings
-    from ..chain.job import MOST_UNITS, ChainUnit, Job, Target, read_pressures
-    from ..chain.run import USE_CASE
+    from ...studies.chain import MOST_UNITS, Chain, ChainUnit, MeshTable
+    from ...studies.use_case import use_case
     from .parts import refuse_body
 
     s = call.settings
@@ -44,21 +44,19 @@ def _chain(call: Call) -> Order:
             "give one for each unit, or leave it empty",
         )
     reach = _numbers(s["reach_mm"], "reach_mm")
-    if reach and len(reach) != 3:
-        raise InputError(f"{s['reach_mm']!r} is not a point", "reach_mm", "give x, y and z in mm")
     bounds = (s["low_kPa"], s["high_kPa"]) if reach else None
-    job = Job(
+    job = Chain(
         units=tuple(ChainUnit(d.unit, turn, bounds) for d, turn in zip(designs, turns, strict=True)),
         protocol=read_pressures(Path(s["protocol"]), len(designs)) if s["protocol"] else None,
-        target=Target((reach[0], reach[1], reach[2])) if reach else None,
+        reach=tuple(reach),
         gravity=s["gravity"],
         orientation_deg=s["orientation_deg"],
         tip_mass_g=s["tip_mass_g"],
         times=s["times"],
-        mesh=MeshSettings(refine=s["refine"], fraction="full"),
+        mesh=MeshTable(s["refine"]),
         joint=Sampling(pressure_step_kPa=s["step_kPa"], loaded=s["loaded"]),
     )
-    return Order(USE_CASE, job)
+    return Order(use_case("chain"), job)
 
 
 def _numbers(text: str, where: str) -> list[float]:
@@ -104,9 +102,7 @@ def chain_nodes() -> tuple[Definition, ...]:
                 ),
                 setting("high_kPa", 30.0, "highest pressure", unit="kPa", low=-99.0, high=1000.0),
                 Setting(chain.GRAVITY),
-                setting(
-                    "orientation_deg", 0.0, "of the base about x; 0: hanging", unit="deg", low=-360, high=360
-                ),
+                Setting(chain.ORIENTATION),
                 Setting(chain.TIP_MASS),
                 Setting(chain.TIMES),
                 Setting(chain.PRESSURE_STEP._replace(name="step_kPa")),

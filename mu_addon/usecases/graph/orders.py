@@ -16,10 +16,6 @@ from ...measured import Measured
 from ...meshing.settings import MeshSettings
 from ..diagnose.job import Job as DiagnoseJob
 from ..diagnose.run import USE_CASE as DIAGNOSE
-from ..grip.job import Job as GripJob
-from ..grip.job import detailed
-from ..grip.run import USE_CASE as GRIP
-from ..grip.settings import Cube
 from ..simulate_and_place.extended_unit import read_extended
 from ..simulate_and_place.job import Job, grasp, protocol_of
 from ..simulate_and_place.named_effects import NamedEffects
@@ -123,26 +119,6 @@ def figure_of(call: Call) -> Outputs:
     if found is None:
         raise InputError(f"the study has no {what}", "figure", "choose another figure, or link Rank Paths")
     return {"number": float(found)}
-
-
-def grip_order(call: Call) -> Order:
-    """Run of a gripper's grasp."""
-    s = call.settings
-    detail = detailed(s["coarse"])
-    try:
-        sides = [float(word) for word in s["cubes_mm"].split()]
-    except ValueError:
-        raise InputError(
-            f"{s['cubes_mm']!r} are not side lengths", "cubes_mm", "give numbers in mm, such as 12.5 25"
-        ) from None
-    job = GripJob(
-        gripper=call.inputs["gripper"],
-        cubes=tuple(Cube(side, s["density_g_per_ml"]) for side in sides),
-        grip=detail.grip(friction=s["friction"]),
-        mesh=detail.mesh,
-        self_contact=s["self_contact"],
-    )
-    return Order(GRIP, job)
 
 
 def simulate_order(call: Call) -> Order:

@@ -21,6 +21,7 @@ SOCKETS: dict[str, tuple[Input, Callable[[Any], Any]]] = {
         Input("bending", ("recording", "data"), "link recordings, or measured data", many=True),
         lambda linked: tuple(getattr(value, "folder", value) for _, value in linked),
     ),
+    "gripper": (Input("gripper", ("gripper",), "link a gripper"), lambda linked: linked),
     "recording": (Input("recording", ("recording",), "link a node Record or Recording"), Path),
     "calibration": (Input("calibration", ("calibration",), "link a node Calibrate or Calibration"), Path),
 }

@@ -9,7 +9,6 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-from ..grip.settings import COARSE, CUBES, DENSITY
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 from .parts import refuse_body
 from .shared_settings import (
@@ -47,11 +46,6 @@ def _study_remark(outputs: Outputs) -> str:
     words = [f"{angles[p]:.1f}° at {p:g} kPa" for p in (max(angles),)] if angles else []
     chosen = summary.get("chosen")
     return ", ".join([*([chosen] if chosen else []), *words])
-
-
-def _grasp_remark(outputs: Outputs) -> str:
-    held = [side for side, g in outputs["grasp"].summary.get("grasps", {}).items() if g["held"]]
-    return f"holds {', '.join(held)} mm" if held else ""
 
 
 FIGURES = (
@@ -167,20 +161,5 @@ def study_nodes() -> tuple[Definition, ...]:
             make=_gripper,
             remark=lambda outputs: "{:.4g} x {:.4g} mm".format(*outputs["gripper"].size_mm),
         ),
-        Definition(
-            "grip",
-            "Grasp",
-            GRASP,
-            "the gripper's grasp of cubes",
-            (Input("gripper", ("gripper",), "link a gripper"),),
-            (Output("grasp", "grasp", "the grasp"),),
-            (
-                *(Setting(d) for d in (CUBES, DENSITY, FRICTION, COARSE)),
-                SELF_CONTACT,
-            ),
-            order=of_orders("grip_order"),
-            read=lambda call, done: {"grasp": done},
-            muting=MUTED,
-            remark=_grasp_remark,
-        ),
+        node_of("grip"),
     )

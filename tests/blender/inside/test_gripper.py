@@ -17,12 +17,9 @@ from mu_addon.blender.simulate import timings
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.drawing import PARTS
 from mu_addon.design.gripper import load_gripper
-from mu_addon.design.gripper import to_toml as gripper_toml
-from mu_addon.design.parameters import to_toml
 from mu_addon.files import write_npz
 from mu_addon.report.pc2 import write_pc2
-from mu_addon.usecases.grip.job import read_job
-from mu_addon.usecases.grip.settings import Grip
+from mu_addon.studies.grip import Grip
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -148,15 +145,14 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     props = root.mu_gripper
     props.folder, props.cube_mm, props.friction = str(tmp_path / "out"), 20.0, 0.3
     props.fingers.gap_mm = 26.5
-    grasps.write_inputs(root, tmp_path / "asked")
-    job = read_job(tmp_path / "asked")
-    assert [cube.side_mm for cube in job.cubes] == [20.0]
-    assert (job.grip.friction, job.grip.beyond_mm, job.grip.step_s) == (0.3, 3.0, 1.0)
-    assert job.mesh.refine == 0.4
-    assert job.gripper.fingers.gap_mm == 26.5
-    assert job.self_contact
+    grasps.GRASPING.write(root, tmp_path / "asked")
+    asked = Grip.read(tmp_path / "asked")
+    assert (asked.sides, asked.friction, asked.beyond_mm) == ((20.0,), 0.3, 3.0)
+    assert (asked.coarse, asked.refine) == (True, 0.4)
+    assert asked.gripper.fingers.gap_mm == 26.5
+    assert asked.self_contact
     props.detail = "part"
-    assert grasps.job_of(root).cubes == ()
+    assert grasps.GRASPING.inputs(root).sides == ()
     assert "was not grasped yet" in drawn()
     assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
 
@@ -164,7 +160,7 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     watch(lambda: child.progress)
     assert "0.50 50%, motion" in drawn()
     assert "mu.grasp_cancel" in drawn()
-    assert "job of this gripper is running" in refused(bpy.ops.mu.grasp)
+    assert "A grasp is running" in refused(bpy.ops.mu.grasp)
     assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
     ended(child)
     assert "Cancelled" in drawn()
@@ -182,12 +178,14 @@ def test_the_button_says_what_a_grasp_will_take_by_what_was_measured_here(tmp_pa
     props = root.mu_gripper
     props.folder, props.cube_mm = str(tmp_path / "out"), 20.0
     assert "Grasp, perhaps " in drawn()
-    grasps.write_inputs(root, tmp_path / "out")
+    grasps.GRASPING.write(root, tmp_path / "out")
     seconds = {"solid": 3.0, "mesh": 5.0, "grasp of 20 mm": 582.0, "light": 4.0, "report": 6.0}
     (tmp_path / "out" / "summary.json").write_text(json.dumps({"seconds": seconds}), encoding="utf-8")
     timings.note(*timings.READERS["grip"](tmp_path / "out"))
     assert "Grasp, about 10 min" in drawn()
-    assert dict(grasps.plan_of(root))["grasp of 20 mm"] == 582.0, "and the bar counts by the same figure"
+    assert dict(grasps.GRASP.plan_of(root))["grasp of 20 mm"] == 582.0, (
+        "and the bar counts by the same figure"
+    )
     props.cube_mm = 12.5
     assert "Grasp, about 10 min" in drawn(), "another cube takes about as long"
     props.self_contact = False
@@ -198,12 +196,9 @@ def test_the_button_says_what_a_grasp_will_take_by_what_was_measured_here(tmp_pa
 
 def write_folder(folder):
     """What `grip` leaves of a grasp of 20 mm in 2 s: a triangle a finger, which goes 5 mm inward and back."""
-    gripper = load_gripper("gripper")
     (folder / "cube-20").mkdir(parents=True)
-    (folder / "gripper.toml").write_text(gripper_toml(gripper, "unit.toml"), encoding="utf-8")
-    (folder / "unit.toml").write_text(to_toml(gripper.unit), encoding="utf-8")
-    cubes = "cubes = [{ side_mm = 20.0, density_g_per_ml = 1.24 }]"
-    (folder / "grip.toml").write_text(f"{cubes}\n[grip]\nfriction = 0.5\nbeyond_mm = 3.0\n", encoding="utf-8")
+    for name, text in Grip(gripper=load_gripper("gripper"), cubes_mm=(20.0,)).texts().items():
+        (folder / name).write_text(text, encoding="utf-8")
     figures = {"angle_at_hold_deg": 12.3, "normal_at_hold_N": 0.45, "held": True, "margin": 4.0}
     figures["gap_error_mm"] = 0.02
     (folder / "summary.json").write_text(json.dumps({"grasps": {"20": figures}}), encoding="utf-8")
@@ -301,10 +296,6 @@ def test_an_unsaved_files_grasp_goes_where_saving_finds_it(tmp_path):
         path = bpy.path.abspath(part.modifiers["Motion"].filepath)
         assert Path(path).is_file(), path
     assert grasps.of(root) is not None
-
-
-def test_the_cube_is_drawn_where_the_core_puts_it():
-    assert Grip().beyond_mm == 3.0, "gripper_object.BEYOND_MM, which the first test here sees drawn"
 
 
 @pytest.mark.nightly("test_what_a_grasp_is_asked_and_how_it_ends")

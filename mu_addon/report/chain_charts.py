@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from ...meshing.mesh import LATTICE, MEMBRANE
-from ...report import plots
-from ...report.render import Part, fit, png, render
-from ...report.results import Picture
-from ...report.shapes import ball
-from ...report.unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin
-
-if TYPE_CHECKING:
-    from .run import Running
+from ..chain import ChainState, Shape
+from ..meshing.mesh import LATTICE, MEMBRANE
+from . import plots
+from .render import Camera, Part, fit, png, render
+from .results import Picture
+from .shapes import ball
+from .unit_pictures import LATTICE_COLOR, MEMBRANE_COLOR, WHITE, region_skin
 
 Array = np.ndarray[Any, Any]
 
@@ -24,52 +23,55 @@ _UP = (0.0, 0.0, -1.0)
 _TOWARDS = (1.0, 0.35, -0.15)
 
 
-def moments(run: Running) -> list[tuple[str, int]]:
+def moments(states: Sequence[ChainState]) -> list[tuple[str, int]]:
     """Names and numbers of the instants to show: first, most bent, last; equal ones once."""
-    angles = [state.angle_deg for state in run.states]
-    wanted = {"start": 0, "most bent": int(np.argmax(angles)), "end": len(run.states) - 1}
+    angles = [state.angle_deg for state in states]
+    wanted = {"start": 0, "most bent": int(np.argmax(angles)), "end": len(states) - 1}
     found: dict[int, str] = {}
     for name, number in wanted.items():
         found.setdefault(number, name)
     return [(name, number) for number, name in sorted(found.items())]
 
 
-def pictures(run: Running, height: int = 620) -> dict[str, Picture]:
-    """Pictures, all to one scale, of the chain at its `moments`, by name of the file's stem."""
-    mesh = run.whole_mesh()
+def pictures(
+    shape: Shape, states: Sequence[ChainState], target: Sequence[float], hangs: bool, height: int = 620
+) -> dict[str, Picture]:
+    """Pictures, all to one scale, of the chain at its `moments`, by name of the file's stem.
+
+    target (3,) in mm, or empty; hangs: the base is above.
+    """
+    mesh = shape.mesh()
     skins = {MEMBRANE: region_skin(mesh, MEMBRANE), LATTICE: region_skin(mesh, LATTICE)}
-    owner = np.repeat(np.arange(len(run.meshes)), [len(one.nodes) for one in run.meshes])
+    owner = np.repeat(np.arange(len(shape.meshes)), [len(one.nodes) for one in shape.meshes])
     # Neighbours in two shades, so that a unit is told from the next.
     shade = np.where(owner % 2 == 0, 1.0, 0.86)[:, None]
     scenes = []
-    for _, number in moments(run):
-        x = run.places(run.states[number])
+    for _, number in moments(states):
+        x = shape.places(states[number])
         parts = [
             Part(x, skins[LATTICE], np.asarray(LATTICE_COLOR) * shade, opacity=0.45),
             Part(x, skins[MEMBRANE], np.asarray(MEMBRANE_COLOR) * shade),
         ]
-        if run.job.target is not None:
-            parts.append(Part(*ball(np.array(run.job.target.reach), 4.0), _TARGET_COLOR, whole=True))
+        if target:
+            parts.append(Part(*ball(np.array(target), 4.0), _TARGET_COLOR, whole=True))
         scenes.append(parts)
     every = [part for scene in scenes for part in scene]
-    up = _UP if abs(run.job.orientation_deg) <= 90 else (0.0, 0.0, 1.0)
+    up = _UP if hangs else (0.0, 0.0, 1.0)
     aspect = _aspect(every, up)
     camera = fit(every, _TOWARDS, up, aspect, margin=0.03)
     found = {}
-    for scene, (name, number) in zip(scenes, moments(run), strict=True):
-        state = run.states[number]
+    for scene, (name, number) in zip(scenes, moments(states), strict=True):
+        state = states[number]
         image = render(scene, camera, round(height * aspect), height, background=WHITE)
         p = ", ".join(f"{v:.3g}" for v in state.pressures_kPa)
         caption = f"{name}: {p} kPa, tip turned by {state.angle_deg:.1f}°"
         found[f"chain_{name.replace(' ', '_')}"] = Picture(
-            png(image), caption, f"The chain of {len(run.meshes)} units, {name}"
+            png(image), caption, f"The chain of {len(shape.meshes)} units, {name}"
         )
     return found
 
 
 def _aspect(parts: list[Part], up: tuple[float, float, float]) -> float:
-    from ...report.render import Camera
-
     axes = Camera((0, 0, 0), _TOWARDS, up, 1.0).axes
     extent = np.ptp(np.vstack([np.asarray(part.vertices) for part in parts]) @ axes.T, axis=0)
     return float(np.clip(extent[0] / extent[1], 0.35, 2.5))
@@ -91,23 +93,22 @@ def over_time(time_s: Array, values: dict[str, Array], label: str, error: Array 
     return svg()
 
 
-def tip_way(run: Running) -> str:
+def tip_way(states: Sequence[ChainState], target: Sequence[float]) -> str:
     """The way of the tip in the planes y-z and x-z, as SVG, with the error at its end."""
-    tips = np.array([state.tip_mm for state in run.states])
-    last = run.states[-1].tip_error_mm
+    tips = np.array([state.tip_mm for state in states])
+    last = states[-1].tip_error_mm
     with plots.canvas(plots.WIDTH, 3.4) as (figure, svg):
         for k, (axis, name) in enumerate(((1, "y"), (0, "x"))):
             axes = figure.add_axes((0.14 + 0.46 * k, 0.14, 0.36, 0.80))
-            for n in range(len(run.states)):
-                middles = run.states[n].plates[:, :3, 3]
+            for state in states:
+                middles = state.plates[:, :3, 3]
                 axes.plot(middles[:, axis], middles[:, 2], "-", color=plots.GRID, linewidth=1.0)
             axes.plot(tips[:, axis], tips[:, 2], "-o", color=plots.CHOSEN, linewidth=1.6, markersize=2.5)
             axes.errorbar(
                 tips[-1, axis], tips[-1, 2], last[2], last[axis], color=plots.INK, linewidth=1.2, capsize=2
             )
-            if run.job.target is not None:
-                at = run.job.target.reach
-                axes.plot([at[axis]], [at[2]], "x", color=plots.INK, markersize=8)
+            if target:
+                axes.plot([target[axis]], [target[2]], "x", color=plots.INK, markersize=8)
             axes.set_aspect("equal", adjustable="datalim")
             axes.invert_yaxis()
             axes.set(xlabel=f"{name} [mm]", ylabel="z, down [mm]" if k == 0 else "")

@@ -9,9 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.assets import asset_root
-from ...errors import InputError
-from ...fem.protocol import COLUMNS, Protocol, read_protocol, read_protocol_text
+from ..design.assets import asset_root
+from ..errors import InputError
+from ..fem.protocol import COLUMNS, Protocol, read_protocol, read_protocol_text
 
 Array = np.ndarray[Any, Any]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ...design.gripper import ROOT, Gripper, GripperSolid
-from ...meshing.mesh import Mesh
-from ...report import plots
-from ...report.render import Camera, Cut, Part, fit, png, render
-from ...report.results import Picture
-from ...report.unit_pictures import COLORS, WHITE, skins_of, unit_parts
-from .grasp import Grasp
+from ..design.gripper import ROOT, Gripper, GripperSolid
+from ..grasp import Grasp
+from ..meshing.mesh import Mesh
+from . import plots
+from .render import Camera, Cut, Part, fit, png, render
+from .results import Picture
+from .unit_pictures import COLORS, WHITE, skins_of, unit_parts
 
 Array = np.ndarray[Any, Any]
 

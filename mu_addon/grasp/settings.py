@@ -1,26 +1,17 @@
-"""Settings of a grasp, used by the job, the command line, the node and Blender."""
+"""Settings of a grasp: the cube, and its contact with the fingers."""
 
 from __future__ import annotations
 
 import attrs
 
-from ...design.quantity import described
-from ...design.settings import FRICTION
-from ...errors import InputError
-from ...fem.dead_loads import STANDARD_GRAVITY
-from ...meshing.settings import REFINE as REFINEMENT
+from ..design.quantity import described
+from ..design.settings import FRICTION
+from ..errors import InputError
 
 MOST_SIDE_MM = 200.0
 
-REFINE, COARSE_REFINE = REFINEMENT._replace(default=0.5), 0.4
-STEP_S, COARSE_STEP_S = 0.5, 1.0
-"""Longest interval between instants in s, of a whole run and of a quick look."""
-CUBES = described(
-    "cubes_mm",
-    "12.5 25",
-    "side lengths in mm of the cubes to grasp",
-)
-SIDES = tuple(map(float, CUBES.default.split()))
+STEP_S = 0.5
+"""Longest interval between instants in s."""
 DENSITY = described(
     "density_g_per_ml", 1.24, "density of the cubes; solid PLA is assumed", unit="g/ml", low=0.001, high=25.0
 )
@@ -32,7 +23,6 @@ BEYOND = described(
     low=-50.0,
     high=50.0,
 )
-COARSE = described("coarse", False, "quick, less accurate run: coarser mesh, longer time steps")
 
 
 def _side(_: object, field: attrs.Attribute[float], value: float) -> None:
@@ -61,16 +51,17 @@ class Cube:
     @property
     def weight_N(self) -> float:
         """Weight of the whole cube."""
+        from ..fem.dead_loads import STANDARD_GRAVITY
+
         return self.mass_g * 1e-6 * STANDARD_GRAVITY
 
 
 @attrs.frozen
-class Grip:
+class Contact:
     """Contact of fingers and cube.
 
     friction: the lower end of known values. beyond_mm: assumed, the tips' edges then meet both cubes near the
-    middle of their sides. pressure_MPa, depth_mm, stick_mm and halvings: of the contact, see `Obstacle`.
-    step_s: longest interval between instants.
+    middle of their sides. The others: of the contact, see `Obstacle`.
     """
 
     friction: float = FRICTION.field()
@@ -79,8 +70,3 @@ class Grip:
     depth_mm: float = 0.05
     stick_mm: float = 0.1
     halvings: int = 1
-    step_s: float = STEP_S
-
-    def __attrs_post_init__(self) -> None:
-        if not 0.0 < self.step_s <= 2.0:
-            raise InputError(f"instants {self.step_s:g} s apart", "step_s", "give a time up to 2 s")

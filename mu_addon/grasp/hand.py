@@ -13,24 +13,24 @@ from typing import Any
 import attrs
 import numpy as np
 
-from ...design.anchors import anchor_points
-from ...design.gripper import Gripper
-from ...errors import ConvergenceError, InputError
-from ...fem.bending_angle import TipSection
-from ...fem.equilibrium import Equilibrium
-from ...fem.kinematics import probe
-from ...fem.materials import Materials
-from ...fem.model import Model
-from ...fem.newton_settings import CONTACT_NEWTON, NewtonSettings
-from ...fem.obstacle import Obstacle
-from ...fem.outer_faces import OuterFaces, outer_faces
-from ...fem.rigid import Box, Pose
-from ...fem.self_contact import SelfContact
-from ...fem.state import State
-from ...fem.time_stepping import simulate_in_time
-from ...meshing.mesh import Mesh
+from ..design.anchors import anchor_points
+from ..design.gripper import Gripper
+from ..errors import ConvergenceError, InputError
+from ..fem.bending_angle import TipSection
+from ..fem.equilibrium import Equilibrium
+from ..fem.kinematics import probe
+from ..fem.materials import Materials
+from ..fem.model import Model
+from ..fem.newton_settings import CONTACT_NEWTON, NewtonSettings
+from ..fem.obstacle import Obstacle
+from ..fem.outer_faces import OuterFaces, outer_faces
+from ..fem.rigid import Box, Pose
+from ..fem.self_contact import SelfContact
+from ..fem.state import State
+from ..fem.time_stepping import simulate_in_time
+from ..meshing.mesh import Mesh
 from .phases import WORDS, Phases
-from .settings import Cube, Grip
+from .settings import STEP_S, Contact, Cube
 
 Array = np.ndarray[Any, Any]
 
@@ -127,13 +127,13 @@ class Grasp:
         return max(i for i, name in enumerate(self.phase) if name == phase)
 
 
-def place_of(gripper: Gripper, grip: Grip) -> Array:
+def place_of(gripper: Gripper, contact: Contact) -> Array:
     """The cube's middle (3,) in mm in a finger's frame, once it is between the tips."""
     d = gripper.unit.dimensions
-    return np.array([0.0, gripper.axis_mm, d.height + grip.beyond_mm])
+    return np.array([0.0, gripper.axis_mm, d.height + contact.beyond_mm])
 
 
-def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacle:
+def obstacle_of(gripper: Gripper, cube: Cube, contact: Contact, mesh: Mesh) -> Obstacle:
     """The cube between the tips as an obstacle of a finger; raises InputError where it does not fit."""
     if cube.side_mm >= gripper.fingers.gap_mm:
         raise InputError(
@@ -144,12 +144,12 @@ def obstacle_of(gripper: Gripper, cube: Cube, grip: Grip, mesh: Mesh) -> Obstacl
     return Obstacle(
         mesh,
         Box(np.zeros(3), np.full(3, cube.side_mm / 2.0)),
-        grip.pressure_MPa,
-        grip.depth_mm,
-        grip.halvings,
-        grip.friction,
-        grip.stick_mm,
-        pose=Pose(shift=place_of(gripper, grip)),
+        contact.pressure_MPa,
+        contact.depth_mm,
+        contact.halvings,
+        contact.friction,
+        contact.stick_mm,
+        pose=Pose(shift=place_of(gripper, contact)),
         faces=_facing(gripper, mesh),
     )
 
@@ -169,7 +169,8 @@ def grasp(
     phases: Phases,
     mesh: Mesh,
     materials: Materials,
-    grip: Grip | None = None,
+    contact: Contact | None = None,
+    step_s: float = STEP_S,
     threads: int = 1,
     on_instant: Callable[[float, str], None] = lambda share, words: None,
     newton: NewtonSettings = CONTACT_NEWTON,
@@ -177,15 +178,16 @@ def grasp(
 ) -> Grasp:
     """Close a finger on a cube phase by phase, in time order, and lift the cube.
 
-    mesh and materials: of the gripper's unit, the half mesh. on_instant: called with
-    the share done. newton: settings for the mesh; self_contact: of the finger's parts. Raises InputError for
-    a cube that does not fit, ConvergenceError where an instant has no equilibrium.
+    mesh and materials: of the gripper's unit, the half mesh. step_s: longest interval between instants.
+    on_instant: called with the share done. newton: settings for the mesh; self_contact: of the finger's
+    parts. Raises InputError for a cube that does not fit, ConvergenceError where an instant has no
+    equilibrium.
     """
-    grip = grip or Grip()
+    contact = contact or Contact()
     model = Model(mesh, threads=threads)
     model.self_contact = self_contact
     equilibrium = Equilibrium(model, materials, newton)
-    return _Hand(gripper, cube, phases, equilibrium, grip, on_instant).work()
+    return _Hand(gripper, cube, phases, equilibrium, contact, step_s, on_instant).work()
 
 
 class _Hand:
@@ -197,19 +199,20 @@ class _Hand:
         cube: Cube,
         phases: Phases,
         equilibrium: Equilibrium,
-        grip: Grip,
+        contact: Contact,
+        step_s: float,
         on_instant: Callable[[float, str], None],
     ) -> None:
         mesh = equilibrium.model.mesh
-        self.cube, self.grip, self.phases, self.mesh = cube, grip, phases, mesh
+        self.cube, self.contact, self.phases, self.mesh = cube, contact, phases, mesh
         self.anchors = anchor_points(gripper.unit)
         self.tip = TipSection.of(mesh)
-        self.place = place_of(gripper, grip)
-        self.obstacle = obstacle_of(gripper, cube, grip, mesh)
+        self.place = place_of(gripper, contact)
+        self.obstacle = obstacle_of(gripper, cube, contact, mesh)
         self.obstacle.path = self.pose
         self.equilibrium = equilibrium
         equilibrium.model.obstacles = (self.obstacle,)
-        self.time, self.pressure, self.phase = phases.sample(grip.step_s)
+        self.time, self.pressure, self.phase = phases.sample(step_s)
         self.on_instant = on_instant
         self.sunk = 0.0
         self.lift: Lift | None = None
@@ -280,7 +283,7 @@ class _Hand:
         self.on_instant((number + 1) / len(self.time), words + (", touching" if contact.area_mm2 else ""))
         last_of_hold = max(i for i, name in enumerate(self.phase) if name == "iii")
         if number == last_of_hold:
-            self.lift = lifted(self.equilibrium, self.obstacle, state, self.cube, self.grip.friction)
+            self.lift = lifted(self.equilibrium, self.obstacle, state, self.cube, self.contact.friction)
             self.sunk = self.lift.sag_mm if self.lift.held else 0.0
 
 

@@ -16,18 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from ...design.gripper import Gripper
-from ...design.quantity import in_MPa
-from ...errors import InputError
-from ...fem.materials import Materials
-from ...fem.state import State
-from ...fem.trajectory import Trajectory
-from ...files import make_folder, read_npz, write_npz
-from ...meshing.mesh import Mesh
-from ...report.motion_files import read_motion, write_model_a
-from ...report.pc2 import write_pc2
-from ...report.vtk import write_trajectory
-from .grasp import Grasp
+from ..design.gripper import Gripper
+from ..design.quantity import in_MPa
+from ..errors import InputError
+from ..fem.materials import Materials
+from ..fem.state import State
+from ..fem.trajectory import Trajectory
+from ..files import make_folder, read_npz, write_npz
+from ..grasp import Grasp
+from ..meshing.mesh import Mesh
+from .motion_files import read_motion, write_model_a
+from .pc2 import write_pc2
+from .vtk import write_trajectory
 
 Array = np.ndarray[Any, Any]
 

@@ -1,1 +1,0 @@
-"""Units in series: their joints, their motion under pressures or to a point, a report."""

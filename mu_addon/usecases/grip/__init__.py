@@ -1,1 +1,0 @@
-"""The gripper: its grasp phase by phase, its light signal, and the deviation of its sensor paths."""
