@@ -15,7 +15,9 @@ STUDIES = {
     "fit-material": "FitMaterial",
     "homogenize": "Homogenize",
     "measure": "Measure",
+    "optimize": "Optimize",
     "specimens": "Specimens",
+    "sweep": "Sweep",
 }
 """Class by name: of its command, its node and its module."""
 

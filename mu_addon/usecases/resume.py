@@ -26,8 +26,6 @@ MODULES = {
     "chain.toml": ".chain.run",
     "diagnose.toml": ".diagnose.run",
     "record.toml": ".sensor.record",
-    "sweep.toml": ".parameter_study.run",
-    "design.toml": ".optimize.run",
     "graph.toml": ".graph.run",
 }
 

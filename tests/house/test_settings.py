@@ -46,6 +46,8 @@ OTHERWISE = {
     "placement/search.py": {"batch"},  # of paths
     "sensing/calibration.py": {"dark"},  # subtracted already
     "usecases/chain/job.py": {"orientation_deg"},  # of a chain's base
+    "usecases/parameter_study/plan.py": {"protocol"},  # a file
+    "usecases/parameter_study/point.py": {"memory_MB"},  # that a study took
     "usecases/graph/chain_nodes.py": {"protocol", "orientation_deg"},
 }
 
