@@ -74,11 +74,40 @@ def _bending(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
     return tuple(map(Path, options.data))
 
 
+def _add_file(command: argparse.ArgumentParser, one: Any) -> None:
+    command.add_argument("file", metavar="FILE", help=one.text)
+
+
+def _design(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    from ..optimization import read_design
+
+    return read_design(Path(options.file))
+
+
+def _plan(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    from ..usecases.parameter_study.plan import read_plan
+
+    return read_plan(Path(options.file)).continued(Path(options.out) / "sweep.toml", options.add)
+
+
+def _add_model(command: argparse.ArgumentParser, one: Any) -> None:
+    add_model(command)
+
+
+def _model(options: argparse.Namespace, context: RunContext, one: Any) -> Any:
+    from ..evidence import load_model
+
+    return None if options.model is None else load_model(Path(options.model))
+
+
 OBJECTS = {
     "unit": (_add_unit, _unit),
     "gripper": (_add_gripper, _gripper),
     "measured": (_add_measured, _measured),
     "bending": (_add_bending, _bending),
+    "design": (_add_file, _design),
+    "model": (_add_model, _model),
+    "plan": (_add_file, _plan),
 }
 """By kind of an input that is no plain value: its options are added, its value made of them."""
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 from ..lazy import public_face
 
 if TYPE_CHECKING:
+    from .design_file import Design as Design
+    from .design_file import read_design as read_design
     from .evaluation import Evaluated as Evaluated
-    from .evaluation import Evaluator as Evaluator
     from .evaluation import evaluate as evaluate
     from .freedoms import Freedom as Freedom
     from .freedoms import changed_unit as changed_unit
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
     from .quantities import Angle as Angle
     from .quantities import RestStiffness as RestStiffness
     from .quantities import Stretch as Stretch
+    from .robust_search import unit_search as unit_search
+    from .robustness import Verified as Verified
+    from .robustness import verified as verified
+    from .search import Found as Found
+    from .search import Observed as Observed
     from .structure import Condition as Condition
     from .structure import Structure as Structure
     from .structure import solve as solve

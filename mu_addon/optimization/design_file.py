@@ -19,19 +19,21 @@ from ..design.settings import ORIENTATION, USUAL_RESIN
 from ..errors import InputError, did_you_mean
 from ..materials.library import Material, load_material, material_text, read_material
 from ..meshing.settings import MeshSettings
-from ..reading import parse_toml
+from ..reading import file_text, parse_toml
 from ..toml_writer import toml_text
 from . import settings as settings_of
 from .freedoms import PATH, Freedom, changed_unit, fixed_values, read_freedoms
 from .freedoms import RESIN as RESIN_FREEDOM
 from .quantities import Stretch
 from .search import SearchSettings
-from .settings import BODY, FINER, HEADER, RESIN, UNIT
+from .settings import BODY, DESIGN, FINER, HEADER, RESIN, UNIT
 from .targets import Supplies, Target, read_targets
 from .uncertainty import Uncertainty
 from .unit_quantities import Mass
 
 FORMAT = 1
+# No file of a design is longer, in bytes.
+_LONGEST = 1_000_000
 _KEYS = (
     "format", "preset", "unit", "refine", "check_refine", "evaluations", "batch", "seed", "resin",
     "printer", "print_tolerance_mm", "modulus_tolerance", "target", "freedom", "run",
@@ -75,6 +77,28 @@ class Design:
         """Scatter from print to print."""
         return Uncertainty(self.print_tolerance_mm, self.modulus_tolerance)
 
+    @property
+    def judged(self) -> list[Target]:
+        """Targets with a quantity."""
+        return [t for t in self.targets if t.quantity is not None]
+
+    @property
+    def bare(self) -> Design:
+        """The design without its file."""
+        targets = tuple(attrs.evolve(t, line="") for t in self.targets)
+        return attrs.evolve(self, targets=targets, document={})
+
+    @property
+    def simulated(self) -> Design:
+        """The design with what decides the values of its units alone: no bound, goal, search or check."""
+        asked = tuple(Target("", "", "", t.quantity) for t in self.targets)
+        scatter = {} if self.robust else {"print_tolerance_mm": 0.0, "modulus_tolerance": 0.0}
+        return attrs.evolve(
+            self, unit=attrs.evolve(self.unit, name="unit"), targets=asked, settings=MeshSettings(),
+            check_refine=0.0, search=SearchSettings(), printer="",
+            resin="", document={}, **scatter,
+        )  # fmt: skip
+
     def texts(self) -> dict[str, str]:
         """Text of every file of inputs, by name; the unit's is separate, with fixed values in it.
 
@@ -101,7 +125,7 @@ class Design:
         if self.body is not None:
             tables["body"] = BODY
             beside[BODY] = self.body.text()
-        return {"design.toml": toml_text(tables, HEADER), **beside}
+        return {DESIGN: toml_text(tables, HEADER), **beside}
 
     @property
     def start(self) -> tuple[Any, ...]:
@@ -164,8 +188,16 @@ def _elongation(material: Material) -> float:
     return material.values["elongation"].value / 100.0
 
 
-def read_design(path: Path, text: str, unit: Unit | None = None, body: Body | None = None) -> Design:
-    """The design of a file's text, see `parse_design`; raises InputError with file, line and key."""
+def read_design(path: Path, unit: Unit | None = None, body: Body | None = None) -> Design:
+    """The design of a file, see `parse_design`; raises InputError with file, line and key."""
+    try:
+        text = file_text(path, _LONGEST)
+    except OSError as error:
+        raise InputError(
+            f"cannot read the design: {error.strerror or error}", str(path), "give the path of a design.toml"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("the file is not UTF-8 text", str(path), "save it as UTF-8") from error
     return parse_design(text, str(path), unit, path.parent, body)
 
 

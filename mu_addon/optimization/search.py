@@ -10,7 +10,7 @@ the Pareto front.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -22,7 +22,7 @@ from .surrogate import Surrogate, fit_all
 from .targets import Target
 
 Array = np.ndarray[Any, Any]
-Values = tuple[Any, ...]
+Values = tuple[float | int | str, ...]
 """A design: one value for each freedom."""
 
 PENALTY = 10.0
@@ -69,6 +69,13 @@ class Found:
     feasible: bool
     in_the_way: tuple[str, ...] = ()
 
+    def some(self, most: int) -> list[int]:
+        """Numbers of at most so many sound proposals in order, the first and the last among them."""
+        chosen = np.array(self.proposed)
+        if len(chosen) > most:
+            chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, most).round().astype(int))]
+        return [n for n in chosen.tolist() if self.observed[n].sound]
+
 
 Observe = Callable[[Sequence[Values]], Sequence[Observed]]
 
@@ -79,27 +86,31 @@ def search_units(
     observe: Observe,
     start: Values,
     settings: SearchSettings | None = None,
-    on_step: Callable[[int, str], None] = lambda done, words: None,
-    known: Sequence[Observed] = (),
 ) -> Found:
     """Find designs for some targets, from a start, which may violate bounds of its freedoms.
 
-    observe: computes designs; on_step: called with the number computed, and a status. known: designs computed
-    before, replacing the start; they count as evaluations.
+    observe: computes designs.
     """
-    return _Search(freedoms, targets, observe, settings or SearchSettings(), on_step).run(start, known)
+    steps = Search(freedoms, targets, settings or SearchSettings()).steps(start)
+    asked = next(steps)
+    while True:
+        try:
+            asked = steps.send(observe(asked))
+        except StopIteration as end:
+            found: Found = end.value
+            return found
 
 
-class _Search:
+class Search:
+    """A search for designs that meet targets; `steps` is its course."""
+
     def __init__(
         self,
         freedoms: Sequence[Freedom],
         targets: Sequence[Target],
-        observe: Observe,
         settings: SearchSettings,
-        on_step: Callable[[int, str], None],
     ) -> None:
-        self.freedoms, self.settings, self.observe, self.on_step = freedoms, settings, observe, on_step
+        self.freedoms, self.settings = freedoms, settings
         self.judged = [i for i, t in enumerate(targets) if t.quantity is not None]
         self.targets = [targets[i] for i in self.judged]
         self.goals = [i for i, t in enumerate(self.targets) if t.goal is not None]
@@ -144,17 +155,22 @@ class _Search:
 
     # The course of the search.
 
-    def run(self, start: Values, known_before: Sequence[Observed] = ()) -> Found:
-        """See `search_units`."""
+    def steps(
+        self, start: Values, known_before: Sequence[Observed] = ()
+    ) -> Generator[list[Values], Sequence[Observed], Found]:
+        """Generator of the designs to compute next, that is sent what was observed of them.
+
+        known_before: designs computed before, replacing the start; they count as evaluations.
+        """
         if known_before:
             self.observed = [self._judged(o) for o in known_before]
         else:
-            self._compute(self._first(start))
+            yield from self._compute(self._first(start))
         weights = self._weights()
         stalled, most = 0, STALLED * max(len(self.goals), 1)
         while len(self.observed) < self.settings.evaluations and stalled < most and not self._done():
             if not any(o.sound for o in self.observed):
-                self._compute([self._random()])
+                yield from self._compute([self._random()])
                 continue
             room = self.settings.evaluations - len(self.observed)
             chosen: list[Values] = []
@@ -173,7 +189,7 @@ class _Search:
                 self.reach, stalled = min(2 * self.reach, MOST_REACH), stalled + 1
                 continue
             known = len(self.observed)
-            self._compute(chosen)
+            yield from self._compute(chosen)
             better = any(self._improved(known + i, known, w) for i, w in enumerate(used))
             self.reach = float(np.clip(self.reach * self._trust(models, known), LEAST_REACH, MOST_REACH))
             stalled = 0 if better else stalled + 1
@@ -201,26 +217,15 @@ class _Search:
         ]
         return self.design(np.array(places))
 
-    def _compute(self, designs: Sequence[Values]) -> None:
-        self.observed += [self._judged(o) for o in self.observe(designs)]
-        best = self.observed[self._best()]
-        self.on_step(len(self.observed), self._words(best))
+    def _compute(self, designs: list[Values]) -> Generator[list[Values], Sequence[Observed], None]:
+        observed = yield designs
+        self.observed += [self._judged(o) for o in observed]
 
     def _judged(self, o: Observed) -> Observed:
         """A design reduced to the quantities of the search."""
         margins = np.zeros_like(o.values) if o.margins is None else o.margins
         return attrs.evolve(
             o, values=o.values[self.judged], slopes=o.slopes[self.judged], margins=margins[self.judged]
-        )
-
-    def _words(self, best: Observed) -> str:
-        if not best.sound:
-            return "no design could be computed yet"
-        missed = sum(not met for met in self._met(best))
-        return (
-            f"{missed} of {len(self.targets) - len(self.goals)} targets missed"
-            if missed
-            else "all targets met"
         )
 
     def _models(self) -> Sequence[Surrogate]:
@@ -469,10 +474,14 @@ def _halvings() -> Iterator[float]:
 
 
 def pareto(costs: Array) -> Array:
-    """Numbers of the Pareto-optimal points (n, c): no other is as small in all costs and smaller in one."""
+    """Numbers of the Pareto-optimal points (n, c): no other is as small in all costs and smaller in one.
+
+    Equal points are all among them; one with a cost that is not finite is not.
+    """
+    finite = np.isfinite(costs).all(axis=1)
     found = []
-    for number, cost in enumerate(costs):
-        no_worse = (costs <= cost).all(axis=1)
-        if not (no_worse & (costs < cost).any(axis=1)).any():
+    for number in np.flatnonzero(finite):
+        no_worse = (costs <= costs[number]).all(axis=1) & finite
+        if not (no_worse & (costs < costs[number]).any(axis=1)).any():
             found.append(number)
     return np.array(found, dtype=int)

@@ -6,9 +6,9 @@ from ..design.quantity import described
 from ..meshing.settings import REFINE as REFINEMENT
 from ..meshing.settings import SELF_CONTACT as KEPT_APART
 
-UNIT, RESIN, BODY = "unit.toml", "resin.toml", "body.obj"
+DESIGN, UNIT, RESIN, BODY = "design.toml", "unit.toml", "resin.toml", "body.obj"
 HEADER = "# The inputs of this optimisation; unit.toml beside it is the unit that it starts from."
-"""Files beside design.toml in a run's folder, and the first line of that."""
+"""Files of a design in a run's folder, and the first line of the first."""
 FINER = 1.5
 """Refinement of a check's mesh over the search's, unless the file gives it."""
 EVALUATIONS = described(

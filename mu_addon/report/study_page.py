@@ -66,7 +66,7 @@ def _one(work: Execution, part: Part) -> str:
     if isinstance(part, Beside):
         stacks = [one if isinstance(one, list) else [one] for one in part.parts]
         columns = "".join(f"<div>{_html(work, stack)}</div>" for stack in stacks)
-        return f'<div class="pair">{columns}</div>'
+        return f'<div class="{"pair" if part.across < 3 else "triple"}">{columns}</div>'
     # A run that was asked to stop leaves out what takes long to draw.
     if work.context.hurried:
         return ""

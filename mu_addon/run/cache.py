@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files import read_npz, write_npz
+from ..files import output_error, read_npz, write_npz
 
 Array = np.ndarray[Any, Any]
 
@@ -59,6 +59,13 @@ class Cache:
     def has(self, kind: str, name: str) -> bool:
         """Return True if `get` would find an entry."""
         return self.path(kind, name).exists() and self.get(kind, name) is not None
+
+    def drop(self, kind: str, name: str) -> None:
+        """Remove an entry, if there is one. Raises OutputError."""
+        try:
+            self.path(kind, name).unlink(missing_ok=True)
+        except OSError as error:
+            raise output_error(error, self.path(kind, name)) from error
 
     def put(self, kind: str, name: str, arrays: dict[str, Any]) -> None:
         """Store an entry, completely or not at all. Raises OutputError."""

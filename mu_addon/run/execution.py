@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -9,11 +10,14 @@ from contextlib import closing
 from functools import partial
 from itertools import groupby
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from .. import __version__
 from ..errors import InputError, MuError, OutputError
 from ..files import write_bytes
-from .cache import key
+from .cache import REVISION, key
+from .cluster import Cluster
 from .context import KEEP_EVERY_S, RunContext
 from .inputs import digest
 from .parts import Fact, Fault, File, Part, Sentence, Warn, flat
@@ -22,7 +26,7 @@ from .progress import Progress
 from .progress_estimate import LOADED, LOADED_S, Plan
 from .results import Results, Task
 from .stored import content
-from .study import Dropped, Members, Section, Study
+from .study import Dropped, Growth, Members, Section, Study
 
 
 class Execution:
@@ -46,6 +50,17 @@ class Execution:
         # Digest of what each file holds: one that is shown again is not written again.
         self._written: dict[str, str] = {}
         self._shown_s = 0.0
+        self._growth: dict[str, tuple[Growth, Sequence[Any]]] = {}
+        for name in self.results.members:
+            over = self._stages[name].over
+            if over and over.grows:
+                growth = over.grows(self.study)
+                self._growth[name] = growth, next(growth, ())
+                self._grow(name)
+        for task in self.tasks:
+            again = self._stages[task[0]].again
+            if again and self.results.is_kept(task) and again(self.study, self.results.value(task)):
+                self.results.drop(task)
 
     @property
     def tasks(self) -> list[Task]:
@@ -64,9 +79,16 @@ class Execution:
         found = []
         for title, tasks in self._titled():
             seconds = self._stages[tasks[0][0]].seconds(self.study, title)
-            missing = sum(not self.results.is_kept(task) for task in tasks) / len(tasks)
+            kept = sum(self.results.is_kept(task) for task in tasks)
+            missing = 1.0 - kept / self._expected(tasks)
             found.append((title, max(missing * seconds, min(LOADED * seconds, LOADED_S))))
         return found
+
+    def _expected(self, tasks: Sequence[Task]) -> int:
+        """Number of tasks of a title, with those by which their sets are expected to grow."""
+        sets = {name: self._stages[name].over for name, _ in tasks}
+        more = [over.most(self.study) - len(self.results.members[n]) for n, over in sets.items() if over]
+        return len(tasks) + sum(count for count in more if count > 0)
 
     def run(self) -> None:
         """Make every result, and show what there is after each stage; raises the error of a stage."""
@@ -78,15 +100,28 @@ class Execution:
             self._forget()
 
     def _make_all(self, tasks: list[Task]) -> None:
-        """Make the results of tasks, each after those that it takes, in this process or in several."""
+        """Make the results of tasks, each after those that it takes, here, in processes or by a scheduler."""
         waiting, running = list(tasks), dict[Future[None], Task]()
-        workers = self.study.processes if any(self._stages[name].parallel for name, _ in tasks) else 1
+        expected, before = self._expected(tasks), len(self._done)
+        parallel = any(self._stages[name].parallel for name, _ in tasks)
+        workers = self.study.processes if parallel else 1
+
+        def update() -> None:
+            done = len(self._done) - before
+            self.context.progress.update(done / max(expected, done + len(waiting) + len(running)))
+            if waiting and time.monotonic() - self._shown_s > KEEP_EVERY_S:
+                self.show()
+
+        one_here = workers == 1 and not (parallel and self.study.elsewhere)
         with closing(Pool(workers, tasks[0][0], _begin, (self.study, self.folder))) as pool:
             while waiting or running:
-                worth = self._worth(waiting, first=workers == 1)
-                here = next((t for t in worth if workers == 1 or not self._is_for_pool(t)), None)
+                worth = self._worth(waiting, first=one_here)
+                here = next((t for t in worth if one_here or not self._is_for_pool(t)), None)
                 if here is not None:
                     self._finish(here, waiting)
+                elif worth and self.study.elsewhere:
+                    self._make_elsewhere(worth, waiting, update)
+                    continue
                 for task in [] if here is not None else worth[: workers - len(running)]:
                     failed, members = self.results.failed, self.results.members
                     running[pool.submit(_in_process, task, failed, members)] = task
@@ -96,10 +131,20 @@ class Execution:
                         self._finish(running.pop(future), waiting, partial(pool.result, future))
                 elif here is None and waiting:
                     self._give_up(waiting)
-                done = sum(task in self._done for task in tasks)
-                self.context.progress.update(done / max(len(tasks), done + len(waiting) + len(running)))
-                if waiting and time.monotonic() - self._shown_s > KEEP_EVERY_S:
-                    self.show()
+                update()
+
+    def _make_elsewhere(self, worth: list[Task], waiting: list[Task], update: Callable[[], None]) -> None:
+        """Have the results of tasks made by the workers of the study's scheduler."""
+        orders = [(self.study, task, self.results.taken_values(task), version()) for task in worth]
+        with closing(Cluster(self.study.elsewhere)) as cluster:
+            for number, found in cluster.results(orders, _elsewhere, self.context.progress.warning):
+                self._finish(worth[number], waiting, partial(self._receive, worth[number], found))
+                update()
+
+    def _receive(self, task: Task, found: Any) -> None:
+        if isinstance(found, MuError):
+            raise found
+        self.results.keep(task, found)
 
     def _is_for_pool(self, task: Task) -> bool:
         return self._stages[task[0]].parallel and not self.results.is_kept(task)
@@ -165,11 +210,23 @@ class Execution:
         self._done.add(task)
         if task in waiting:
             waiting.remove(task)
-        if stage.over and stage.over.grows:
-            known = self.results.members[task[0]]
-            new = [m for m in stage.over.grows(self.study, self._so_far(task[0])) if m not in known]
-            self.results.grow(task[0], new)
-            waiting += [(task[0], member) for member in new]
+        waiting += self._grow(task[0])
+
+    def _grow(self, name: str) -> list[Task]:
+        """Tasks of the members by which a set grows now, that its growth asks for (`Over.grows`)."""
+        new: list[Any] = []
+        while name in self._growth:
+            growth, asked = self._growth[name]
+            new += [m for m in asked if m not in self.results.members[name] and m not in new]
+            if not all((name, member) in self._done for member in asked):
+                break
+            try:
+                results = [self.results.value((name, member)) for member in asked]
+                self._growth[name] = growth, growth.send(results)
+            except (StopIteration, Dropped):
+                del self._growth[name]
+        self.results.grow(name, new) if new else None
+        return [(name, member) for member in new]
 
     def _forget(self) -> None:
         """Release results that no task to come takes: a factor, a field of displacements."""
@@ -277,6 +334,28 @@ def _in_process(task: Task, failed: dict[Task, str], members: dict[str, list[Any
     (results,) = _HERE
     results.catch_up(failed, members)
     results.value(task)
+
+
+def version() -> str:
+    """Version that a scheduler's workers must have, too."""
+    return f"{__version__} revision {REVISION}"
+
+
+def _elsewhere(study: Study, task: Task, taken: dict[str, Any], asked: str) -> Any:
+    """Make a result on a worker of a scheduler; taken: what it takes of other stages; asked: `version`.
+
+    Raises the stage's errors, and MuError where this worker is of another version.
+    """
+    if asked != version():
+        raise MuError(
+            f"the worker has mu_addon {version()}, the run {asked}",
+            platform.node(),
+            "install the same version on every worker",
+        )
+    with TemporaryDirectory(prefix="mu-worker-", ignore_cleanup_errors=True) as folder:
+        results = Results(study, Path(folder), Progress())
+        own = {n: results.given(n) for n in results.stages[task[0]].needs if n not in results.stages}
+        return results.made(task, {**taken, **own})
 
 
 def _drop(table: dict[str, Any], path: Sequence[str]) -> None:

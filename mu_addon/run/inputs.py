@@ -11,7 +11,7 @@ from typing import Any, TypeVar, Union
 
 import attrs
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..reading import file_text, parse_toml
 from .folder import RUN
 
@@ -69,7 +69,9 @@ def structured(kind: type[Made], table: Any, where: str, **given: Any) -> Made:
     names = [field.name for field in attrs.fields(kind) if field.init and field.name not in given]  # type: ignore[arg-type]
     for key in table:
         if key not in names:
-            raise InputError(f"unknown key {key!r}", where, f"known: {', '.join(names)}")
+            raise InputError(
+                f"unknown key {key!r}{did_you_mean(key, names)}", where, f"known: {', '.join(names)}"
+            )
     values = {key: _value(hints[key], value, f"{where}, {key}") for key, value in table.items()}
     try:
         return kind(**values, **given)
@@ -99,7 +101,15 @@ def _value(hint: Any, value: Any, where: str) -> Any:
         return float(value)
     if hint in (float, int, str, bool) and type(value) is hint:
         return value
-    words = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
+    if origin is tuple:
+        hint = tuple
+    words: dict[Any, str] = {
+        tuple: "a list",
+        float: "a number",
+        int: "a whole number",
+        str: "text in quotes",
+        bool: "true or false",
+    }
     raise InputError(
         f"{value!r} does not fit", where, f"give {words.get(hint, 'the value that a run writes there')}"
     )

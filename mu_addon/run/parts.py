@@ -101,9 +101,10 @@ class Pictures:
 
 @attrs.frozen
 class Beside:
-    """Columns side by side, each a part or a list of parts."""
+    """Columns side by side, each a part or a list of parts; across: 2 or 3 in a row of the page."""
 
     parts: Sequence[Any]
+    across: int = 2
 
 
 @attrs.frozen

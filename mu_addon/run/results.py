@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,8 @@ class Results:
     def key(self, task: Task) -> str | None:
         """Hash of all that a task's result depends on; None while it lacks something that it takes."""
         stage, member = self.stages[task[0]], task[1]
-        parts: list[Any] = [__version__, stage.name, stage.revision, content(member)]
+        own = stage.given_by(self.study, member) if stage.over and stage.over.gives else member
+        parts: list[Any] = [__version__, stage.name, stage.revision, content(own)]
         for name in stage.needs:
             if name not in self.stages:
                 parts += [name, self._content(name)]
@@ -164,12 +165,30 @@ class Results:
 
     def _make(self, task: Task, name: str) -> None:
         """Do the work of a task, and keep its result."""
-        stage, member = self.stages[task[0]], task[1]
-        values = {n: self._of_parameter(task, n) for n in stage.needs} | stage.of_member(member)
-        if TELL in parameters_of(stage.method):
-            values[TELL] = Tell(self.progress, self.folder / "cache")
+        values = {n: self._of_parameter(task, n) for n in self.stages[task[0]].needs}
+        self._keep(task, name, self.made(task, values))
+
+    def made(self, task: Task, values: Mapping[str, Any]) -> Any:
+        """The result of a task by the work of its stage; values: of what it takes, by parameter."""
+        stage = self.stages[task[0]]
+        more = (
+            {TELL: Tell(self.progress, self.folder / "cache")} if TELL in parameters_of(stage.method) else {}
+        )
         # Without the study: what a stage does not name cannot decide its result.
-        found = stage.method(None, **values)
+        return stage.method(None, **values, **stage.given_by(self.study, task[1]), **more)
+
+    def taken_values(self, task: Task) -> dict[str, Any]:
+        """What a task takes of other stages, by parameter."""
+        return {n: self._of_parameter(task, n) for n in self.stages[task[0]].needs if n in self.stages}
+
+    def keep(self, task: Task, found: Any) -> None:
+        """Keep a result that was made elsewhere."""
+        name = self._name(task)
+        assert name is not None
+        self._keep(task, name, found)
+
+    def _keep(self, task: Task, name: str, found: Any) -> None:
+        stage = self.stages[task[0]]
         self._values[task], self._digests[task] = found, name
         self._missing.clear()
         if stage.kept:
@@ -179,6 +198,14 @@ class Results:
             digest = key(*(part for item in sorted(arrays.items()) for part in item))
             self.cache.put(stage.name, name, {**arrays, _CONTENT: np.asarray(digest)})
             self._digests[task] = digest
+
+    def drop(self, task: Task) -> None:
+        """Remove a kept result, so that it is made anew."""
+        name = self._name(task)
+        if name is not None:
+            self.cache.drop(task[0], name)
+        self._values.pop(task, None)
+        self._digests.pop(task, None)
 
     def _of_parameter(self, task: Task, name: str) -> Any:
         if name not in self.stages:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import inspect
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -159,21 +159,39 @@ def given(one: Input, **more: Any) -> Any:
     return attrs.field(metadata={_INPUT: one}, kw_only=True, **more)
 
 
+Growth = Generator[Sequence[Any], Sequence[Any], Any]
+
+
+def grown(growth: Growth, results: Mapping[Any, Any]) -> Any:
+    """The value of a set's growth (`Over.grows`) with these results by member."""
+    asked = next(growth)
+    while True:
+        try:
+            asked = growth.send([results[member] for member in asked])
+        except StopIteration as end:
+            return end.value
+
+
 @attrs.frozen
 class Over:
     """The set that a stage is repeated over.
 
     names: of the stage's parameters that a member gives, one or several; members: the members of a study, in
-    order. needs: of a member, by parameter, the one member or the list of members of a stage's set that it
-    takes; a parameter that is not there takes the whole set. A stage that names itself takes earlier members.
-    grows: further members, from the results so far. choose: of the members that could be made now, those that
-    are worth it, the first one first, from the results so far; what is never chosen has no result.
+    order; gives: of a member, the values of these parameters, where they are not the member itself: its
+    result depends on them. needs: of a member, by parameter, the one member or the list of members of a
+    stage's set that it takes; a parameter that is not there takes the whole set. A stage that names itself
+    takes earlier members. grows: of a study, a generator that yields members, new ones among them, and is
+    sent their results once all are made; one without a result ends it. Its value is that of `grown`. most:
+    the expected number of members of a set that grows. choose: of the members that could be made now, those
+    that are worth it, the first one first, from the results so far; what is never chosen has no result.
     """
 
     names: tuple[str, ...]
     members: Callable[[Any], Sequence[Any]]
     needs: Callable[[Any, Any], Mapping[str, Any]] = lambda study, member: {}
-    grows: Callable[[Any, Members], Sequence[Any]] | None = None
+    gives: Callable[[Any, Any], Mapping[str, Any]] | None = None
+    grows: Callable[[Any], Growth] | None = None
+    most: Callable[[Any], int] = lambda study: 0
     choose: Callable[[Any, Sequence[Any], Members], Sequence[Any]] | None = None
 
 
@@ -191,6 +209,7 @@ class Stage:
     kept: bool
     failing: str
     parallel: bool
+    again: Callable[[Any, Any], bool] | None
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -203,10 +222,17 @@ class Stage:
         return not parameters_of(self.method)[name]
 
     def of_member(self, member: Any) -> dict[str, Any]:
-        """The parameters that a member of its set gives."""
+        """The parameters that a member of its set is."""
         if self.over is None:
             return {}
+        if self.over.gives:
+            return {"member": member}
         return dict(zip(self.over.names, member if len(self.over.names) > 1 else (member,), strict=True))
+
+    def given_by(self, study: Any, member: Any) -> Mapping[str, Any]:
+        """The parameters that a member of its set gives."""
+        gives = self.over.gives if self.over else None
+        return gives(study, member) if gives else self.of_member(member)
 
     def title_of(self, member: Any) -> str:
         """Its title, for a member of its set."""
@@ -228,6 +254,7 @@ def stage(
     failing: str = "",
     revision: int = 1,
     parallel: bool = False,
+    again: Callable[[Any, Any], bool] | None = None,
 ) -> Callable[[Any], Any]:
     """A method that makes one result, or one for each member of a set; its `self` is None.
 
@@ -238,7 +265,8 @@ def stage(
     each run. failing: words for a warning; an error of the stage then does not end the run, and what
     needs it is left out. revision: raise it when a change of the code changes the result. parallel:
     members may be made in processes of their own, the study's `workers`, side by side with other parallel
-    stages of the same title.
+    stages of the same title, or by the workers of its `scheduler`. again: True of a study and a result that
+    an earlier run kept and this one makes anew.
     """
 
     if parallel and not kept:
@@ -252,7 +280,19 @@ def stage(
         setattr(
             method,
             _STAGE,
-            Stage(method.__name__, method, title, in_time, revision, over, wanted, kept, failing, parallel),
+            Stage(
+                method.__name__,
+                method,
+                title,
+                in_time,
+                revision,
+                over,
+                wanted,
+                kept,
+                failing,
+                parallel,
+                again,
+            ),
         )
         return method
 
@@ -368,6 +408,11 @@ class Study:
     def processes(self) -> int:
         """Number of processes for its parallel stages: its input `workers`, if it has one."""
         return int(getattr(self, "workers", 1))
+
+    @property
+    def elsewhere(self) -> str:
+        """Address of a Dask scheduler for its parallel stages: its input `scheduler`, "" without."""
+        return str(getattr(self, "scheduler", None) or "")
 
     def title(self) -> str:
         """The report's title."""

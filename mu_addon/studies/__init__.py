@@ -17,7 +17,9 @@ STUDIES = {
     "grip": "Grip",
     "homogenize": "Homogenize",
     "measure": "Measure",
+    "optimize": "Optimize",
     "specimens": "Specimens",
+    "sweep": "Sweep",
 }
 """Class by name: of its command, its node and its module."""
 

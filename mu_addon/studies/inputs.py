@@ -10,7 +10,7 @@ from typing import Any
 
 import attrs
 
-from .. import design, materials, measured
+from .. import design, evidence, materials, measured
 from ..design.quantity import described, in_kPa, in_MPa
 from ..design.settings import USUAL_RESIN
 from ..errors import InputError
@@ -18,7 +18,7 @@ from ..reading import file_text, unreadable
 from ..run.inputs import named_path, structured
 from ..run.study import Found, Input, Written, given
 
-UNIT = "unit.toml"
+UNIT, MODEL = "unit.toml", "model.toml"
 # Characters of a path's points: some ten thousand of them.
 _LONGEST_PATH = 1 << 18
 
@@ -386,3 +386,39 @@ class NumbersInput(Input):
         if not isinstance(numbers, list) or not all(type(n) in (int, float) for n in numbers):
             raise InputError(f"{numbers!r} does not fit", f"{found.path}, {name}", "give a list of numbers")
         return tuple(map(float, numbers))
+
+
+@attrs.frozen
+class ModelInput(Input):
+    """An extended model of a diagnosis, in a file of its own, or None."""
+
+    kind: str = "model"
+
+    def write(self, name: str, value: evidence.ExtendedModel | None) -> Written:
+        """The file's name, and its text."""
+        return Written() if value is None else Written({name: MODEL}, files={MODEL: value.text()})
+
+    def read(self, name: str, found: Found) -> evidence.ExtendedModel | None:
+        """The model of the folder, if it has one; raises InputError."""
+        named = found.keys.pop(name, None)
+        return None if named is None else evidence.load_model(found.path.parent / MODEL)
+
+    def file_names(self, name: str) -> tuple[str, ...]:
+        """Its file."""
+        return (MODEL,)
+
+
+_SCHEDULER = described(
+    "scheduler",
+    "",
+    "address of a Dask scheduler whose workers do the simulations, such as tcp://host:8786; empty: none",
+)
+
+
+@attrs.frozen
+class SchedulerInput(OnceInput):
+    """Address of a Dask scheduler. Its workers get code from it, so a folder does not name one."""
+
+    descriptions: tuple[Any, ...] = (_SCHEDULER,)
+    decides: bool = False
+    metavar: str = "ADDRESS"

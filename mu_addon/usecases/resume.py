@@ -24,8 +24,6 @@ MODULES = {
     "live.toml": ".live_bending.run",
     "diagnose.toml": ".diagnose.run",
     "record.toml": ".sensor.record",
-    "sweep.toml": ".parameter_study.run",
-    "design.toml": ".optimize.run",
     "graph.toml": ".graph.run",
 }
 

@@ -21,7 +21,6 @@ UNLIMITED = {
     "mu_addon/blender/unit/resins.py": "a property of the unit",
     "mu_addon/blender/shared/operators.py": "a text that the user opens in Blender",
     "mu_addon/measured/table.py": "the text of a file read within its limit",
-    "mu_addon/optimization/evaluation.py": "an entry of the cache, sealed and within its limit",
     "mu_addon/report/html.py": "a part of the program",
     "mu_addon/report/pc2.py": "written the moment before",
     "mu_addon/run/child.py": "messages of a process of its own",
@@ -30,7 +29,6 @@ UNLIMITED = {
     "mu_addon/sensing/text_lines.py": "a line, see its limit",
     "mu_addon/sensing/recording.py": "a line of a file read within its limit",
     "mu_addon/usecases/diagnose/job.py": "the program itself",
-    "mu_addon/usecases/parameter_study/run.py": "an entry of the cache, sealed and within its limit",
     "mu_addon/usecases/sensor/watch.py": "a status read within the limit of a text",
 }
 READING = {

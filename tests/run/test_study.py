@@ -350,7 +350,8 @@ class Race(Study):
             ("runner", "lap"),
             lambda s: [(r, lap) for r in range(len(s.paces.split())) for lap in range(s.laps)],
             lambda s, m: {"laps_run": [(m[0], lap) for lap in range(m[1])], "shoes": "left"},
-            grows=lambda s, done: [(1, s.laps)] if s.sprints and (1, s.laps - 1) in done else [],
+            grows=lambda s: s.sprint(),
+            most=lambda s: 12,
             choose=lambda s, ready, done: [m for m in ready if s.can_win(m[0], done)],
         ),
         parallel=True,
@@ -360,6 +361,14 @@ class Race(Study):
         if pace[runner] > 9:
             raise ConvergenceError("out of breath")
         return State(sum(s.moved[0] for s in laps_run.values()) + pace[runner], np.array([pace[runner]]))
+
+    def sprint(self):
+        """One more lap after the second runner's last."""
+        last = (1, self.laps - 1)
+        results = yield [last] if self.sprints else []
+        if self.sprints:
+            yield [(1, self.laps)]
+        return results
 
     def can_win(self, runner, done):
         """Sums of times only grow: one beyond a finished runner's is lost."""

@@ -30,7 +30,7 @@ from mu_addon.run.progress import Progress
 from mu_addon.sensing.framing import info_frame, sample_frame
 from mu_addon.sensing.recording import read_recording
 from mu_addon.sensing.sources import EndOfStream
-from mu_addon.usecases.parameter_study.point import Task
+from mu_addon.usecases.parameter_study.point import Outcome, Task
 from mu_addon.usecases.simulate_and_place import light, study
 from mu_addon.usecases.simulate_and_place import run as placing
 from mu_addon.usecases.simulate_and_place.job import Job
@@ -265,13 +265,13 @@ method = "grid"
 """
 
 
-def answered(task: Task) -> dict[str, Any]:
+def answered(task: Task) -> Outcome:
     """A point whose answer is known."""
     summary = {
         "gates": {"unit.stl": {"volume_mm3": 1000.0}},
         "angle_deg": {"20": len(task.files["unit.toml"])},
     }
-    return {"status": "done", "seconds": 0.1, "memory_MB": 1, "summary": summary}
+    return Outcome("done", 0.1, 1, summary=json.dumps(summary))
 
 
 def placement(monkeypatch: pytest.MonkeyPatch, known: Cache | None = None) -> Run:
@@ -280,19 +280,6 @@ def placement(monkeypatch: pytest.MonkeyPatch, known: Cache | None = None) -> Ru
     monkeypatch.setattr(light, "traced_signal", computed_once(light.traced_signal))
     Remembered(monkeypatch, known)
     return lambda folder, context: placing.USE_CASE.start(PLACEMENT, folder, context)
-
-
-class OneProcess:
-    """Stands for the cluster, which writes nothing into the folder and takes a second to start."""
-
-    def __init__(self, scheduler: str | None, workers: int) -> None:
-        pass
-
-    def results(self, tasks: list[Task], work: Any, warn: Any) -> Iterator[tuple[int, dict[str, Any]]]:
-        yield from enumerate(map(work, tasks))
-
-    def close(self) -> None:
-        pass
 
 
 class Prepared:

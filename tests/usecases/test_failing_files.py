@@ -18,10 +18,11 @@ from mu_addon.errors import MuError
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.studies.export import Export
+from mu_addon.studies.sweep import Sweep
 from mu_addon.studies.use_case import use_case
-from mu_addon.usecases.parameter_study import run as sweeping
+from mu_addon.usecases.parameter_study import point
 from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.parameter_study.point import Task, run_point, version
+from mu_addon.usecases.parameter_study.point import Task, run_point
 from mu_addon.usecases.sensor.stream import stream
 from mu_addon.usecases.simulate_and_place import analysis_mesh, study
 from mu_addon.usecases.simulate_and_place import run as placing
@@ -31,7 +32,6 @@ from .fault_injection import (
     PARTIAL,
     PLAN,
     STUDY,
-    OneProcess,
     Prepared,
     answered,
     computed_once,
@@ -84,11 +84,11 @@ def test_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> N
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])
 def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    monkeypatch.setattr(sweeping, "cluster_at", OneProcess)
-    job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
+    monkeypatch.setattr(point, "run_point", answered)
+    job = Sweep(plan=parse_plan(PLAN, tmp_path), workers=1)
 
     def run(folder: Path, context: RunContext) -> None:
-        sweeping.USE_CASE.start(job, folder, context)
+        use_case("sweep").start(job, folder, context)
 
     assert inject_each(run, tmp_path, failing, 5, partial=["points.csv"], step=step) == []
 
@@ -100,7 +100,7 @@ def test_a_point_of_a_sweep(tmp_path: Path, for_good: bool, monkeypatch: pytest.
     """Its folder lies where the system keeps what is of no duration."""
     pytest.importorskip("psutil", reason="sweeps are an extra")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    task = Task({"study.toml": "", "unit.toml": ""}, 1000, 1.0, version(), (FAKE, "good"))
+    task = Task({"study.toml": "", "unit.toml": ""}, 1000, 1.0, (FAKE, "good"))
     for at in range(1, 100):
         with failing(tmp_path, at, for_good) as files:
             row, error = None, None
@@ -108,7 +108,7 @@ def test_a_point_of_a_sweep(tmp_path: Path, for_good: bool, monkeypatch: pytest.
                 row = run_point(task)
             except MuError as told:
                 error = told
-        assert row is None or row["status"] == "done", f"{at}, {files.calls[at - 1]}"
+        assert row is None or row.status == "done", f"{at}, {files.calls[at - 1]}"
         assert error is None or error.what.startswith("cannot write"), f"{at}, {files.calls[at - 1]}"
         assert list(tmp_path.iterdir()) == []
         if at > len(files.calls):

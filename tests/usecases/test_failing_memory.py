@@ -18,8 +18,9 @@ from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
 from mu_addon.studies.check import Check, PartFile
 from mu_addon.studies.export import Export
+from mu_addon.studies.sweep import Sweep
 from mu_addon.studies.use_case import use_case
-from mu_addon.usecases.parameter_study import run as sweeping
+from mu_addon.usecases.parameter_study import point
 from mu_addon.usecases.parameter_study.plan import parse_plan
 from mu_addon.usecases.sensor.stream import stream
 from mu_addon.usecases.simulate_and_place import analysis_mesh, study
@@ -30,7 +31,6 @@ from .fault_injection import (
     PARTIAL,
     PLAN,
     STUDY,
-    OneProcess,
     Prepared,
     answered,
     computed_once,
@@ -98,11 +98,11 @@ def test_check(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])
 def test_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
-    monkeypatch.setattr(sweeping, "cluster_at", OneProcess)
-    job = sweeping.Job(parse_plan(PLAN, tmp_path), work=answered)
+    monkeypatch.setattr(point, "run_point", answered)
+    job = Sweep(plan=parse_plan(PLAN, tmp_path), workers=1)
 
     def run(folder: Path, context: RunContext) -> None:
-        sweeping.USE_CASE.start(job, folder, context)
+        use_case("sweep").start(job, folder, context)
 
     assert inject_each(run, tmp_path, any_array, MuError.status, ["points.csv"], step=step) == []
 

@@ -420,7 +420,7 @@ def test_a_sweep_may_turn_a_unit_that_weighs_something(tmp_path):
         '"simulate.orientation_deg" = { values = [0.0, 90.0] }\n',
         tmp_path,
     )
-    found = [point.job.effects for point in plan.points(plan.values()[0])]
+    found = [plan.point(number).job.effects for number in (1, 2)]
     assert found == [with_effects(turn, gravity=1300.0).effects for turn in (0.0, 90.0)]
 
 

@@ -6,12 +6,13 @@ from mu_addon.design.parameters import load_preset, write_unit
 from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
+from mu_addon.optimization import read_design
 from mu_addon.studies.chain import Chain
+from mu_addon.studies.optimize import Optimize
 from mu_addon.usecases.graph.chain_nodes import _chain, _solved
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.optimize_nodes import _optimize, _proposed
 from mu_addon.usecases.graph.parts import Design
-from mu_addon.usecases.optimize.job import job_from
 
 DESIGN = """
 format = 1
@@ -43,7 +44,7 @@ def node(tmp_path):
 
 def test_the_linked_unit_is_optimised_by_the_files_targets(node, tmp_path):
     order = _optimize(node())
-    assert order.job.texts() == job_from(tmp_path / "design.toml", unit=UNIT).texts()
+    assert order.job.texts() == Optimize(design=read_design(tmp_path / "design.toml", UNIT)).texts()
     assert order.job.design.unit == UNIT
     assert _optimize(node(proposed=2)).key == order.key, "another of the front is no other run"
     (tmp_path / "design.toml").write_text(DESIGN.replace("evaluations = 5", "evaluations = 6"))

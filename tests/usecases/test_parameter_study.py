@@ -11,21 +11,23 @@ import sys
 import time
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
 from mu_addon.design.parameters import from_toml, load_preset, to_toml
 from mu_addon.errors import InputError, MuError
+from mu_addon.run import cluster as cluster_module
+from mu_addon.run import execution
 from mu_addon.run.child import RUNNING, Child
 from mu_addon.run.context import run_to_end
 from mu_addon.run.progress import Progress
-from mu_addon.usecases.parameter_study import cluster as cluster_module
+from mu_addon.run.study import stage
+from mu_addon.studies.sweep import Sweep
+from mu_addon.studies.use_case import use_case
 from mu_addon.usecases.parameter_study import point as point_module
-from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.parameter_study.point import Task, run_point, version
-from mu_addon.usecases.parameter_study.run import USE_CASE, Job
-
-pytest.importorskip("distributed", reason="sweeps are an extra")
+from mu_addon.usecases.parameter_study.plan import parse_plan, read_plan
+from mu_addon.usecases.parameter_study.point import Outcome, Task, run_point
 
 ROOT = Path(__file__).resolve().parents[2]
 FAKE = str(Path(__file__).resolve().parents[1] / "run" / "fake_worker.py")
@@ -51,34 +53,33 @@ asked = []
 
 def formula(task):
     """A study whose answer is known: it stands where a worker's process would be."""
-    asked.append(task.name)
+    asked.append(task.hash())
     wall = from_toml(task.files["unit.toml"]).chambers.wall_mm
     if wall > 1.1:
-        return {
-            "status": "failed",
-            "seconds": 0.1,
-            "memory_MB": 1,
-            "what": "too thick",
-            "where": "",
-            "what_to_do": "",
-        }
+        return Outcome("failed", 0.1, 1, what="too thick")
     summary = {
         "gates": {"unit.stl": {"volume_mm3": 1000 * wall}},
         "angle_deg": {"-20": -5.0, "20": 10 / wall},
     }
-    return {"status": "done", "seconds": 0.1, "memory_MB": 1, "summary": summary}
+    return Outcome("done", 0.1, 1, summary=json.dumps(summary))
 
 
-def swept(text, folder, work=formula, status=0, **options):
+@pytest.fixture
+def by_formula(monkeypatch):
+    monkeypatch.setattr(point_module, "run_point", formula)
+
+
+def swept(text, folder, add=0, status=0, **options):
     messages = []
     asked.clear()
     with run_to_end(Progress([messages.append])) as context:
-        USE_CASE.start(Job(parse_plan(text, folder), work=work, **options), folder, context)
+        plan = parse_plan(text, folder).continued(folder / "sweep.toml", add)
+        use_case("sweep").start(Sweep(plan=plan, workers=1, **options), folder, context)
     assert context.status == status, messages[-1]
     return list(csv.DictReader((folder / "points.csv").open(newline=""))), messages
 
 
-def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
+def test_every_point_is_a_row_whatever_became_of_it(tmp_path, by_formula):
     text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 1.0, 1.15, 2.5] }")
     rows, messages = swept(text.replace('"latin_hypercube"', '"grid"'), tmp_path)
     (plan,) = (m for m in messages if m["type"] == "plan")
@@ -96,9 +97,9 @@ def test_every_point_is_a_row_whatever_became_of_it(tmp_path):
     assert "<script" not in report
 
 
-def test_a_report_of_all_points_says_that_its_run_was_stopped(tmp_path):
+def test_a_report_of_all_points_says_that_its_run_was_stopped(tmp_path, by_formula):
     with run_to_end(Progress([])) as context:
-        USE_CASE.start(Job(parse_plan(TEXT, tmp_path), work=formula), tmp_path, context)
+        use_case("sweep").start(Sweep(plan=parse_plan(TEXT, tmp_path), workers=1), tmp_path, context)
         assert "is partial" not in (tmp_path / "report.html").read_text()
         raise KeyboardInterrupt
     page = (tmp_path / "report.html").read_text()
@@ -106,7 +107,7 @@ def test_a_report_of_all_points_says_that_its_run_was_stopped(tmp_path):
     assert "chambers.wall_mm" in page
 
 
-def test_what_is_done_stays_done_and_more_can_be_added(tmp_path):
+def test_what_is_done_stays_done_and_more_can_be_added(tmp_path, by_formula):
     first, _ = swept(TEXT, tmp_path)
     assert len(asked) == 6
     again, _ = swept(TEXT, tmp_path)
@@ -120,7 +121,7 @@ def test_what_is_done_stays_done_and_more_can_be_added(tmp_path):
     assert not (tmp_path / "stale").exists()
 
 
-def test_failures_are_run_again_only_when_asked_for(tmp_path):
+def test_failures_are_run_again_only_when_asked_for(tmp_path, by_formula):
     text = TEXT.replace("{ low = 0.8, high = 1.2 }", "{ values = [1.0, 1.15] }").replace(
         '"latin_hypercube"', '"grid"'
     )
@@ -131,7 +132,7 @@ def test_failures_are_run_again_only_when_asked_for(tmp_path):
     assert len(asked) == 1
 
 
-def test_another_range_is_another_sweep_but_shares_its_equal_points(tmp_path):
+def test_another_range_is_another_sweep_but_shares_its_equal_points(tmp_path, by_formula):
     text = TEXT.replace('"latin_hypercube"', '"grid"').replace("high = 1.2", "high = 1.0, steps = 3")
     first, _ = swept(text, tmp_path)
     rows, _ = swept(text.replace("steps = 3", "steps = 5"), tmp_path)
@@ -139,10 +140,9 @@ def test_another_range_is_another_sweep_but_shares_its_equal_points(tmp_path):
     assert (tmp_path / "stale" / "points.csv").is_file()
 
 
-def test_a_damaged_plan_or_point_is_made_again(tmp_path):
+def test_a_damaged_point_is_made_again(tmp_path, by_formula):
     first, _ = swept(TEXT, tmp_path)
-    (tmp_path / "plan.csv").write_text("chambers.wall_mm\n7\n")
-    path = sorted((tmp_path / "cache").glob("point-*"))[0]
+    path = sorted((tmp_path / "cache").glob("points-*"))[0]
     whole = bytearray(path.read_bytes())
     whole[len(whole) // 2] ^= 1
     path.write_bytes(whole)
@@ -151,12 +151,9 @@ def test_a_damaged_plan_or_point_is_made_again(tmp_path):
 
 
 def test_a_grid_cannot_be_added_to(tmp_path):
-    text = TEXT.replace('"latin_hypercube"', '"grid"')
-    _, messages = [], []
-    with run_to_end(Progress([messages.append])) as context:
-        USE_CASE.start(Job(parse_plan(text, tmp_path), add=2, work=formula), tmp_path / "out", context)
-    assert context.status == 2
-    assert "--add" in messages[-1]["where"]
+    with pytest.raises(InputError, match="cannot be added") as caught:
+        parse_plan(TEXT.replace('"latin_hypercube"', '"grid"'), tmp_path).continued(tmp_path / "none", 2)
+    assert caught.value.where == "--add"
 
 
 # One point, in a process of its own.
@@ -165,7 +162,7 @@ def test_a_grid_cannot_be_added_to(tmp_path):
 def task(how, **limits):
     files = {"study.toml": "", "unit.toml": ""}
     given = {"memory_MB": 1000, "minutes": 1.0} | limits
-    return Task(files, version=version(), module=(FAKE, how), **given)
+    return Task(files, module=(FAKE, how), **given)
 
 
 @pytest.mark.parametrize(
@@ -183,21 +180,22 @@ def test_whatever_happens_to_a_study_becomes_a_row(how, limits, words):
     if how == "greedy" and sys.platform != "linux":
         pytest.skip("only Linux refuses memory")
     row = run_point(task(how, **limits))
-    assert row["status"] == "failed"
-    assert words in row["what"]
-    assert row["seconds"] > 0
+    assert row.status == "failed"
+    assert words in row.what
+    assert row.seconds > 0
     # Looked at every 50 ms, a study that takes 20 MB every 20 ms is some 60 MB over when it is stopped.
-    assert row["memory_MB"] < limits.get("memory_MB", 1000) + 200
+    assert row.memory_MB < limits.get("memory_MB", 1000) + 200
 
 
 def test_a_study_that_is_done_is_a_row_with_its_summary():
     row = run_point(task("garbage"))
-    assert (row["status"], row["summary"]) == ("done", {})
+    assert (row.status, row.summary) == ("done", "{}")
 
 
-def test_a_worker_of_another_version_does_not_compute():
-    with pytest.raises(MuError, match=r"the sweep 0\.0\.0"):
-        run_point(Task({}, 1000, 1.0, "0.0.0 revision 0"))
+def test_a_worker_of_another_version_does_not_compute(tmp_path):
+    study = Sweep(plan=parse_plan(TEXT, tmp_path))
+    with pytest.raises(MuError, match=r"the run 0\.0\.0"):
+        execution._elsewhere(study, ("points", 1), {}, "0.0.0 revision 0")
 
 
 def test_a_study_ends_with_the_worker_that_started_it(tmp_path):
@@ -251,7 +249,7 @@ def test_child_runs_of_the_command_line_end_with_their_parent_and_tell_their_err
     assert child.error["status"] == 2
 
 
-def test_a_sweep_that_stops_ends_its_studies_at_once_and_says_nothing_of_dask(monkeypatch, capfd):
+def test_a_sweep_that_stops_ends_its_study_at_once(monkeypatch):
     children = []
 
     class Kept(Child):
@@ -259,27 +257,14 @@ def test_a_sweep_that_stops_ends_its_studies_at_once_and_says_nothing_of_dask(mo
             super().begin()
             children.append(self)
 
+    def interrupted(child, task):
+        raise KeyboardInterrupt
+
     monkeypatch.setattr(point_module, "Child", Kept)
-    cluster = cluster_module.Cluster(None, 1)
-    tasks = [task("garbage"), task("hang", minutes=600.0)]
-    results = cluster.results(tasks, run_point, lambda words: None)
-    assert next(results)[1]["status"] == "done"
-    end = time.monotonic() + PATIENCE_S
-    while len(children) < 2:
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    results.close()
-    cluster.close()
-    while children[1].state == RUNNING:
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    assert not _alive(children[1].pid)
-    assert "distributed" not in "".join(capfd.readouterr())
-    # The next sweep of the same process is another.
-    again = cluster_module.Cluster(None, 1)
-    (row,) = dict(again.results([task("garbage")], run_point, lambda words: None)).values()
-    again.close()
-    assert row["status"] == "done"
+    monkeypatch.setattr(point_module, "_watch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_point(task("hang", minutes=600.0))
+    assert not _alive(children[0].pid)
 
 
 def test_a_real_study_is_swept(tmp_path):
@@ -291,7 +276,7 @@ def test_a_real_study_is_swept(tmp_path):
     text = text.replace("times = 3", "times = 2\nself_contact = false").replace(
         "memory_MB = 2000", "memory_MB = 4000"
     )
-    rows, _ = swept(text, tmp_path, work=run_point)
+    rows, _ = swept(text, tmp_path)
     assert [row["status"] for row in rows] == ["done", "done"]
     thin, thick = (float(row["angle_range_deg"]) for row in rows)
     assert thin > thick > 0.1
@@ -349,14 +334,24 @@ class Farm:
 
 @pytest.fixture
 def farm(tmp_path):
+    pytest.importorskip("distributed", reason="an extra")
     found = Farm(tmp_path)
     yield found
     found.close()
 
 
-def slow_formula(task):
-    time.sleep(0.3)
-    return formula(task)
+class SlowSweep(Sweep):
+    """A sweep whose points take a while, and whose answers are known."""
+
+    @stage(
+        "points",
+        1.0,
+        over=attrs.evolve(Sweep.stages()["points"].over, names=("task",)),
+        parallel=True,
+    )
+    def points(self, task: Task) -> Outcome:
+        time.sleep(0.3)
+        return formula(task)
 
 
 @pytest.mark.slow
@@ -385,9 +380,9 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
                 farm.scheduler()
                 farm.worker()
 
+    plan = parse_plan(text, tmp_path)
     with run_to_end(Progress([Trouble()])) as context:
-        plan = parse_plan(text, tmp_path)
-        USE_CASE.start(Job(plan, scheduler=farm.address, work=slow_formula), folder, context)
+        use_case("sweep").start(SlowSweep(plan=plan, scheduler=farm.address), folder, context)
     assert context.status == 0, messages[-1]
     assert lost.poll() is not None
     assert first.poll() is not None
@@ -399,11 +394,12 @@ def test_a_lost_worker_and_a_restarted_scheduler_lose_no_point(farm, tmp_path):
 
 
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
+    pytest.importorskip("distributed", reason="an extra")
     monkeypatch.setattr(cluster_module, "PATIENCE_S", 4.0)
     messages = []
     with run_to_end(Progress([messages.append])) as context:
-        job = Job(parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
-        USE_CASE.start(job, tmp_path / "out", context)
+        job = Sweep(plan=parse_plan(TEXT, tmp_path), scheduler=f"tcp://127.0.0.1:{free_port()}")
+        use_case("sweep").start(job, tmp_path / "out", context)
     assert context.status == 1
     assert "no scheduler answers" in messages[-1]["what"]
     assert "dask scheduler" in messages[-1]["what_to_do"]
@@ -413,14 +409,12 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
 def test_without_dask_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match="not installed") as caught:
-        cluster_module.Cluster(None, 1)
+        cluster_module.Cluster("tcp://127.0.0.1:1")
     assert "mu_addon[sweeps]" in caught.value.remedy
 
 
 def test_the_example_is_a_sweep_that_can_be_read(tmp_path):
-    from mu_addon.usecases.parameter_study.plan import read_plan
-
     example = ROOT / "assets" / "examples" / "sweep"
     shutil.copytree(example, tmp_path / "sweep")
     plan = read_plan(tmp_path / "sweep" / "sweep.toml")
-    assert all(point.job is not None for point in plan.points(plan.values()[0]))
+    assert all(plan.task(number) is not None for number in range(1, plan.size + 1))

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
+from mu_addon.optimization.search import pareto
 from mu_addon.run.folder import keep_inputs, same_inputs
-from mu_addon.usecases.parameter_study.main_effects import main_effect, pareto_front
+from mu_addon.studies.sweep import Sweep
+from mu_addon.usecases.parameter_study.main_effects import main_effect
 from mu_addon.usecases.parameter_study.plan import parse_plan, sample
 from mu_addon.usecases.parameter_study.variable import Variable, variable_names
 
@@ -91,9 +93,8 @@ def test_every_input_has_its_name():
 
 def test_values_reach_the_study(tmp_path):
     plan = parse_plan(GOOD, tmp_path)
-    rows, places = plan.values()
-    assert places.shape == (8, 5)
-    points = plan.points(rows)
+    assert plan.places.shape == (8, 5)
+    points = [plan.point(number) for number in range(1, plan.size + 1)]
     assert [p.number for p in points] == list(range(1, 9))
     for point in points:
         v, job = point.values, point.job
@@ -123,7 +124,7 @@ def test_whole_numbers_stay_whole_and_within(u, low, width):
 def test_a_grid_is_all_levels_of_all(tmp_path):
     text = GOOD.replace("points = 8", 'method = "grid"').replace("high = 1.2", "high = 1.2, steps = 5")
     plan = parse_plan(text, tmp_path)
-    rows, _ = plan.values()
+    rows = plan.values
     assert plan.size == len(rows) == 5 * 3 * 2 * 3 * 2
     assert len({tuple(row.values()) for row in rows}) == len(rows)
     assert sorted({row["chambers.wall_mm"] for row in rows}) == [0.8, 0.9, 1.0, 1.1, 1.2]
@@ -135,7 +136,7 @@ def test_protocols_may_be_files_beside_the_sweep(tmp_path):
         '"protocol.factor" = { values = [0.5, 1.0] }', '"simulate.protocol" = { values = ["low.csv"] }'
     )
     plan = parse_plan(text, tmp_path)
-    assert plan.points(plan.values()[0])[0].job.protocol.pressure_kPa.tolist() == [0.0, 5.0]
+    assert plan.point(1).job.protocol.pressure_kPa.tolist() == [0.0, 5.0]
     with pytest.raises(InputError, match="protocol"):
         parse_plan(text.replace("low.csv", "none.csv"), tmp_path)
 
@@ -143,7 +144,7 @@ def test_protocols_may_be_files_beside_the_sweep(tmp_path):
 def test_a_point_that_breaks_a_rule_has_failed_already(tmp_path):
     """A wall of 2.5 mm is thicker than the chamber's curvature allows."""
     plan = parse_plan(GOOD.replace("{ low = 0.8, high = 1.2 }", "{ values = [0.9, 2.5] }"), tmp_path)
-    points = plan.points(plan.values()[0])
+    points = [plan.point(number) for number in range(1, plan.size + 1)]
     for point in points:
         assert (point.job is None) == (point.values["chambers.wall_mm"] == 2.5)
     assert any("wall" in point.error.what for point in points if point.error)
@@ -151,13 +152,13 @@ def test_a_point_that_breaks_a_rule_has_failed_already(tmp_path):
 
 def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
     plan = parse_plan(GOOD, tmp_path)
-    text = plan.texts()["sweep.toml"]
+    text = Sweep(plan=plan).texts()["sweep.toml"]
     document = tomllib.loads(text)
     assert document["vary"]["place.stations"] == {"low": 11, "high": 13, "log": False, "steps": 3}
     assert document["place"] == {"mesh_check": False}
     # How many points is no input: more may be added to those that are there.
-    keep_inputs(tmp_path, attrs.evolve(plan, count=99).texts())
-    assert same_inputs(tmp_path, plan.texts())
+    keep_inputs(tmp_path, Sweep(plan=attrs.evolve(plan, counts=(8, 99))).texts())
+    assert same_inputs(tmp_path, Sweep(plan=plan).texts())
     again = parse_plan(
         text.replace("format = 1", 'format = 1\npreset = "mu-1.0x"\nstages = "place"'), tmp_path
     )
@@ -177,7 +178,7 @@ def test_the_inputs_are_written_as_toml_that_says_the_same(tmp_path):
         ("points = 8", "pionts = 8", "did you mean 'points'"),
         ("points = 8", 'method = "random"', "is not known"),
         ("points = 8", "memory_MB = 1", "memory_MB"),
-        ("points = 8", "minimize = 3", "list of names"),
+        ("points = 8", "minimize = 3", "give a list"),
         ("times = 7", "times = 1", "times = 1 is out of bounds"),
         ("times = 7", "tmies = 7", "unknown key 'tmies'"),
         ("times = 7", 'times = 7\nobstacles = "post.obj"', "does not take obstacles"),
@@ -224,7 +225,7 @@ def test_an_input_that_never_changes_says_nothing():
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=25))
 def test_the_front_is_what_nobody_beats(points):
     costs = np.array(points, dtype=float)
-    front = set(pareto_front(costs).tolist())
+    front = set(pareto(costs).tolist())
 
     def beats(i, j):
         return (costs[i] <= costs[j]).all() and (costs[i] < costs[j]).any()
@@ -235,7 +236,7 @@ def test_the_front_is_what_nobody_beats(points):
 
 
 def test_a_point_without_a_figure_is_not_on_the_front():
-    assert pareto_front(np.array([[np.nan, 0.0], [1.0, 1.0]])).tolist() == [1]
+    assert pareto(np.array([[np.nan, 0.0], [1.0, 1.0]])).tolist() == [1]
 
 
 @pytest.mark.parametrize("table", ["simulate", "place", "vary"])

@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+import attrs
 import pytest
 import trimesh
 
@@ -16,6 +17,7 @@ from mu_addon.fem.protocol import Protocol
 from mu_addon.materials.library import load_material
 from mu_addon.measured import read_folder
 from mu_addon.measured.kinds import NOISE
+from mu_addon.optimization import read_design
 from mu_addon.run.context import RunContext
 from mu_addon.run.folder import keep_inputs, same_inputs
 from mu_addon.run.progress import Progress
@@ -28,15 +30,15 @@ from mu_addon.studies.fit_material import FitMaterial
 from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import NodePath, ResinInput
+from mu_addon.studies.optimize import Optimize
 from mu_addon.studies.specimens import Specimens
+from mu_addon.studies.sweep import Sweep
 from mu_addon.usecases import prepare
 from mu_addon.usecases.diagnose import job as diagnose
 from mu_addon.usecases.graph import job as graph
 from mu_addon.usecases.graph.templates import template
 from mu_addon.usecases.live_bending import requests as live_bending
-from mu_addon.usecases.optimize import job as optimize
 from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.parameter_study.run import Job as ParameterStudyJob
 from mu_addon.usecases.resume import MODULES, resume, use_case_of
 from mu_addon.usecases.sensor import record
 from mu_addon.usecases.simulate_and_place import job as study
@@ -107,9 +109,9 @@ def jobs(folder):
     yield diagnose.Job(paper, load_preset("mu-1.5x"))
     yield DesignExperiments(data=paper, noise={**NOISE, "angle": 1 / 3})
     yield FitMaterial(data=measured, laws=("yeoh", "neo-hooke"), hold_out=("uniaxial",), weights="relative")
-    yield ParameterStudyJob(parse_plan(sweep, folder), workers=2)
+    yield Sweep(plan=attrs.evolve(parse_plan(sweep, folder), counts=(4, 6)), workers=2)
     yield Chain.read_file(asset_root() / "examples/trunk/chain.toml")
-    yield optimize.job_from(asset_root() / "examples/graded-finger/design.toml")
+    yield Optimize(design=read_design(asset_root() / "examples/graded-finger/design.toml"))
     yield record.Job(simulated=True, seconds=1 / 3, take=2)
     yield graph.Job(template("data-to-cause"), ("Diagnose",), node_reports=True)
 

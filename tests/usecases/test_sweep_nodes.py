@@ -1,9 +1,11 @@
 """Nodes of parameter studies: they ask for the study that a sweep.toml of the same words describes."""
 
 import csv
+import json
 import sys
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
@@ -11,12 +13,13 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.errors import InputError
 from mu_addon.graph.definition import Call
 from mu_addon.graph.evaluation import Finished
+from mu_addon.studies.sweep import Sweep
 from mu_addon.usecases.graph import sweep_orders
 from mu_addon.usecases.graph.definitions import definitions
 from mu_addon.usecases.graph.parts import Design
-from mu_addon.usecases.parameter_study import cluster, variable
+from mu_addon.usecases.parameter_study import variable
 from mu_addon.usecases.parameter_study.plan import parse_plan
-from mu_addon.usecases.parameter_study.point import Task, run_point, version
+from mu_addon.usecases.parameter_study.point import run_point
 
 
 def call(kind, inputs=None, **settings):
@@ -56,10 +59,11 @@ mesh = { refine = 0.5 }
     made = sweep_orders.sweep_order(study(walls, counts, times=5)).job.plan
 
     wanted = parse_plan(text, Path("/"))
-    assert made.texts() == wanted.texts() | {"sweep.toml": made.texts()["sweep.toml"]}
+    texts = Sweep(plan=made).texts()
+    assert texts == Sweep(plan=wanted).texts() | {"sweep.toml": texts["sweep.toml"]}
     assert made.variables == wanted.variables
     assert (made.inputs.unit, made.inputs.tables) == (wanted.inputs.unit, wanted.inputs.tables)
-    assert [p.values for p in made.points(made.values()[0])] == [
+    assert made.values == [
         {"chambers.wall_mm": w, "chambers.count": n} for w in (0.8, 0.9, 1.0) for n in (4, 6)
     ]
 
@@ -132,35 +136,19 @@ def test_a_table_in_which_nothing_succeeded_says_why(tmp_path):
         table(tmp_path, [{"point": 1, "status": "failed", "what": "too thick"}], range_of(values="3.0"))
 
 
-def shares(task):
-    """What stands where a study's process would be."""
-    return {"status": "done", "minutes": task.minutes}
-
-
-@pytest.mark.slow
-def test_without_dask_processes_of_this_machine_do_the_tasks(monkeypatch):
-    monkeypatch.setattr(cluster, "find_spec", lambda name: None)
-    found = cluster.cluster_at(None, 2)
-    assert isinstance(found, cluster.Processes)
-    tasks = [Task({}, 500, float(k), version()) for k in range(1, 4)]
-    rows = dict(found.results(tasks, shares, print))
-    assert [rows[k]["minutes"] for k in range(3)] == [1.0, 2.0, 3.0]
-
-
-@pytest.mark.nightly("test_without_dask_processes_of_this_machine_do_the_tasks")
+@pytest.mark.nightly("test_a_tree_asks_for_what_a_sweep_file_says")
 def test_a_study_that_starts_at_blenders_entry_gives_the_same_figures(monkeypatch):
     """As in Blender, where the package has another name and there is no psutil."""
 
     from mu_addon.blender.jobs import child_main
 
     plan = sweep_orders.sweep_order(study(range_of(), refine=0.4, times=2, stages="design")).job.plan
-    (job, *_) = [p.job for p in plan.points(plan.values()[0])]
-    task = Task(job.texts(), 2000, 5.0, version())
+    task = attrs.evolve(plan.task(1), memory_MB=2000, minutes=5.0)
     here = run_point(task)
     monkeypatch.setenv("MU_ENTRY", child_main.__file__)
     monkeypatch.setitem(sys.modules, "psutil", None)
     there = run_point(task)
-    assert (here["status"], there["status"]) == ("done", "done"), (here, there)
-    assert here["summary"]["gates"] == there["summary"]["gates"]
+    assert (here.status, there.status) == ("done", "done"), (here, there)
+    assert json.loads(here.summary)["gates"] == json.loads(there.summary)["gates"]
     if sys.platform == "linux":
-        np.testing.assert_allclose(there["memory_MB"], here["memory_MB"], rtol=0.5)
+        np.testing.assert_allclose(there.memory_MB, here.memory_MB, rtol=0.5)

@@ -7,7 +7,7 @@ import re
 import bpy
 
 from ...optimization.freedoms import parameters
-from ...usecases.optimize.files import FRONT
+from ...studies.optimize import FRONT
 from ..jobs.panel import job_state, start_button, timed
 from ..shared.file_cache import icon_of
 from ..shared.panels import alert, wrapped

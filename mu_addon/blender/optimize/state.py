@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import bpy
@@ -13,12 +13,12 @@ from ...design.quantity import describe
 from ...design.repairs import tied
 from ...errors import InputError, MuError
 from ...optimization.freedoms import Freedom, changed_unit
-from ...optimization.settings import BODY, HEADER, UNIT
+from ...optimization.settings import BODY, DESIGN, HEADER, UNIT
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
+from ...studies.inputs import MODEL
+from ...studies.optimize import Optimize, expected_s
 from ...toml_writer import toml_text
-from ...usecases.optimize.expected import search_plan
-from ...usecases.optimize.files import DESIGN, LAYOUT, MODEL
 from ..jobs import prepared
 from ..jobs.start_child import JobKind
 from ..shared.blender_property import exact
@@ -28,9 +28,6 @@ from ..simulate import study_folder as studies
 from ..unit import envelope
 from ..unit.properties import shape_hash, to_unit
 from .properties import ASKED, AT_PRESSURE, AT_TWO, FREE, NAMED, OF_PATH, YES, asks_curve
-
-if TYPE_CHECKING:
-    from ...usecases.optimize.job import Job
 
 FOLDER = "optimize"
 """Folder of the optimisation in the unit's study folder."""
@@ -60,7 +57,7 @@ class Proposed:
 class Findings:
     """Results of the optimisation in a unit's folder; other_start: of a unit with other parameters.
 
-    feasible: a unit met every target on the search's mesh; simulated: number of units simulated by that run;
+    feasible: a unit met every target on the search's mesh; simulated: number of units;
     seconds: of its stages; in_the_way: names of targets, the others can be met without one of these.
     """
 
@@ -90,7 +87,7 @@ def plan_of(root: Any) -> list[tuple[str, float]]:
         taken = {**taken, "search": taken["search"] * units / found.simulated}
     return [
         (name, taken.get(name, seconds))
-        for name, seconds in search_plan(units, s.refine, s.check_refine, s.self_contact)
+        for name, seconds in expected_s(units, s.refine, s.check_refine, s.self_contact).items()
     ]
 
 
@@ -176,19 +173,41 @@ def document(root: Any) -> dict[str, Any]:
     }
 
 
-def job_of(root: Any) -> Job:
+def job_of(root: Any) -> Optimize:
     """Optimisation job from a unit's properties; raises InputError."""
     # Imported late: it needs the solver's packages, which a Blender may lack.
-    from ...optimization.design_file import parse_design
-    from ...usecases.optimize.job import Job, job_from
+    from ...optimization.design_file import parse_design, read_design
 
     unit, s = to_unit(root.mu_unit), root.mu_optimize
     body = envelope.envelope_in(root, unit)
     if s.source == "file":
         if not s.file:
             raise InputError("no file is chosen", "Optimize, File", "choose a design.toml")
-        return job_from(Path(bpy.path.abspath(s.file)), unit=unit if s.own_unit else None, body=body)
-    return Job(parse_design(toml_text(document(root)), DESIGN, unit, body=body))
+        design = read_design(Path(bpy.path.abspath(s.file)), unit if s.own_unit else None, body)
+    else:
+        design = parse_design(toml_text(document(root)), DESIGN, unit, body=body)
+    return Optimize(design=design, model=_model(root))
+
+
+def _model(root: Any) -> Any:
+    """The unit's named effects as a file of inputs."""
+    text = root.mu_unit.study.effects
+    return _Text({MODEL: text}) if text else None
+
+
+@attrs.frozen
+class _Text:
+    """A file of inputs that is written and not checked, and those beside it."""
+
+    files: dict[str, str]
+
+    def texts(self) -> dict[str, str]:
+        """Its text by name, and theirs."""
+        return self.files
+
+    def text(self) -> str:
+        """Its own text."""
+        return "".join(self.files.values())
 
 
 def unchecked_texts(root: Any) -> dict[str, str]:
@@ -200,7 +219,8 @@ def unchecked_texts(root: Any) -> dict[str, str]:
     tables["unit"] = tables.pop("unit")  # last, as the core writes it
     if body is not None:
         tables["body"], beside[BODY] = BODY, body.text()
-    return {DESIGN: toml_text(tables, HEADER), **beside}
+    design: Any = _Text({DESIGN: toml_text(tables, HEADER), **beside})
+    return Optimize(design=design, model=_model(root)).texts()
 
 
 def write_inputs(root: Any, folder: Path) -> None:
@@ -213,8 +233,7 @@ def write_inputs(root: Any, folder: Path) -> None:
     else:
         # The job checks them: the packages that this takes would hold the window for a second.
         texts, orientation_deg = unchecked_texts(root), document(root).get("orientation_deg")
-    model = root.mu_unit.study.effects
-    if model:
+    if root.mu_unit.study.effects:
         turned = effects.inputs(root).get("orientation_deg", 0.0)
         if turned != (orientation_deg or 0.0):
             raise InputError(
@@ -222,8 +241,7 @@ def write_inputs(root: Any, folder: Path) -> None:
                 "Optimize, Own Weight",
                 "turn it equally in both",
             )
-        texts[MODEL] = model
-    write_run(folder, LAYOUT, texts)
+    write_run(folder, Optimize.layout(), texts)
 
 
 _found: FileCache[Findings] = FileCache()
@@ -263,7 +281,7 @@ def _read(summary: Path) -> Findings:
         str(found.get("status", "")),
         found.get("feasible") is True,
         str(found.get("outcome", "")),
-        int(found.get("simulated_now") or 0),
+        int(found.get("designs") or 0),
         {name: float(taken) for name, taken in dict(found.get("seconds") or {}).items()},
         tuple(map(str, found.get("in_the_way") or ())),
         tuple(proposed),

@@ -26,15 +26,18 @@ def _remark(outputs: Outputs) -> str:
 
 
 def _optimize(call: Call) -> Order:
+    from ...evidence import load_model
     from ...graph.evaluation import Order
-    from ..optimize.job import job_from
-    from ..optimize.run import USE_CASE
+    from ...optimization import read_design
+    from ...studies.optimize import Optimize
+    from ...studies.use_case import use_case
 
     s, design = call.settings, call.inputs["unit"]
     if not s["file"]:
         raise InputError("no targets are named", "file", "give a design.toml")
-    job = job_from(Path(s["file"]), call.inputs["model"], s["workers"], unit=design.unit, body=design.body)
-    return Order(USE_CASE, job)
+    found, model = read_design(Path(s["file"]), design.unit, design.body), call.inputs["model"]
+    job = Optimize(design=found, model=None if model is None else load_model(model), workers=s["workers"])
+    return Order(use_case(job.name), job)
 
 
 def _proposed(call: Call, done: Finished) -> Outputs:

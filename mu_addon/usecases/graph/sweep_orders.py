@@ -14,8 +14,9 @@ from ...errors import InputError
 from ...graph.definition import Call, Outputs
 from ...graph.evaluation import Finished, Order
 from ...reading import file_text
-from ..parameter_study.plan import TABLE, Plan
-from ..parameter_study.run import LAST, USE_CASE, Job
+from ...studies.sweep import LAST, TABLE, Sweep
+from ...studies.use_case import use_case
+from ..parameter_study.plan import Plan
 from ..parameter_study.variable import Inputs, changed_inputs, variable
 from ..simulate_and_place.job import job_with, protocol_of
 from ..simulate_and_place.settings import STAGES
@@ -93,7 +94,7 @@ def _plan_of(call: Call) -> Plan:
 
 def sweep_order(call: Call) -> Order:
     """Run of a unit's parameter study."""
-    return Order(USE_CASE, Job(_plan_of(call), workers=call.settings["workers"]))
+    return Order(use_case("sweep"), Sweep(plan=_plan_of(call), workers=call.settings["workers"]))
 
 
 def table_of(call: Call, done: Finished) -> Outputs:
@@ -121,8 +122,8 @@ def best_of(call: Call) -> Outputs:
         raise InputError(f"no study has a number {figure!r}", "figure", f"one of: {', '.join(table.columns)}")
     sign = 1.0 if call.settings["goal"] == GOALS[1] else -1.0
     value, row = min(rows, key=lambda found: (sign * found[0], int(found[1]["point"])))
-    values, _ = table.plan.values()
-    inputs = changed_inputs(table.plan.inputs, values[int(row["point"]) - 1], table.plan.folder)
+    values = table.plan.values[int(row["point"]) - 1]
+    inputs = changed_inputs(table.plan.inputs, values, table.plan.folder)
     return {"unit": Design(inputs.unit), "number": value, "point": int(row["point"])}
 
 

@@ -1,1 +1,13 @@
-"""Parameter studies: many studies that differ in some inputs; plan, runs, table and analysis."""
+"""Parameter studies: many studies that differ in some inputs; their plan, their points, and effects."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import public_face
+
+if TYPE_CHECKING:
+    from .plan import Plan as Plan
+    from .plan import read_plan as read_plan
+    from .point import Outcome as Outcome
+    from .point import Task as Task
+else:
+    __getattr__, __dir__, __all__ = public_face(__name__)

@@ -1,4 +1,4 @@
-"""Analysis of a parameter study's table: first-order effects, and the Pareto-optimal points."""
+"""First-order effects of a parameter study's inputs."""
 
 from __future__ import annotations
 
@@ -65,19 +65,3 @@ def _explained(groups: Sequence[Array], figure: Array) -> float:
         return float("nan")
     within = sum(float(((figure[g] - figure[g].mean()) ** 2).sum()) for g in groups)
     return max(0.0, 1.0 - (within / (n - k)) / (whole / (n - 1)))
-
-
-def pareto_front(costs: Array) -> Array:
-    """Numbers of the points (n, c) that are Pareto-optimal: no other is as small in all costs and smaller in
-    one.
-
-    Equal points are all on it; one with a cost that is not finite is not.
-    """
-    finite = np.isfinite(costs).all(axis=1)
-    found = []
-    for number in np.flatnonzero(finite):
-        no_worse = (costs <= costs[number]).all(axis=1) & finite
-        better = (costs < costs[number]).any(axis=1)
-        if not (no_worse & better).any():
-            found.append(number)
-    return np.array(found, dtype=int)

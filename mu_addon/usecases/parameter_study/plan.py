@@ -5,26 +5,29 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ...design.parameters import Unit, load_preset, read_unit, to_toml
-from ...design.quantity import Description
-from ...errors import InputError, MuError, did_you_mean
-from ...fem.protocol import Protocol
+from ...design.parameters import Unit, load_preset, read_unit
+from ...errors import InputError, MuError
+from ...materials.library import load_material, read_material
 from ...meshing.settings import SELF_CONTACT
 from ...reading import parse_toml
-from ...run.folder import RUN, FolderLayout
-from ...run.inputs import FORMAT, read_toml
-from ...toml_writer import toml_text
-from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of, protocol_text
+from ...run.folder import RUN
+from ...run.inputs import FORMAT, read_inputs, read_toml, structured
+from ..simulate_and_place.job import OF_FILES, Job, job_with, protocol_of
 from ..simulate_and_place.settings import STAGES
 from ..simulate_and_place.study_file import FILES
+from .point import Task
 from .settings import GRID, LAST_STAGE, MEMORY, METHOD, MINUTES, MOST_POINTS, POINTS, RESIN, SEED, SOBOL
 from .variable import FILE, Inputs, Variable, changed_inputs, variable
+
+Array = np.ndarray[Any, Any]
 
 
 def sample(method: str, count: int, dimensions: int, seed: int, before: Array | None = None) -> Array:
@@ -61,21 +64,6 @@ def _into_empty_strata(known: Array, count: int, rng: np.random.Generator) -> Ar
     return added
 
 
-Array = np.ndarray[Any, Any]
-
-UNIT, PROTOCOL = "unit.toml", "protocol.csv"
-PLAN, TABLE, REPORT = "plan.csv", "points.csv", "report.html"
-LAYOUT = FolderLayout(
-    "sweep.toml",
-    "# The inputs of this sweep; unit.toml and protocol.csv beside it belong to them.",
-    results=(PLAN, TABLE, REPORT),
-)
-_KEYS = (
-    "format", "preset", "unit", "protocol", "resin", "stages", "method", "points", "seed", "memory_MB",
-    "minutes", "minimize", "maximize", "vary", *STAGES,
-)  # fmt: skip
-
-
 @attrs.frozen
 class Point:
     """One study of a sweep: its number from 1, its varied values, and its job, or why there is none."""
@@ -86,12 +74,13 @@ class Point:
     error: MuError | None = None
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class Plan:
     """A sweep: the study that is varied, its variables, and how its points are chosen.
 
     folder: of sweep.toml and the files that it names. memory_MB, minutes: limits of one study. minimize,
-    maximize: columns of the table, the objectives of Pareto fronts.
+    maximize: columns of the table, the objectives of Pareto fronts. counts: numbers of points by which it
+    grew, each the whole; what was added to a sample depends on them.
     """
 
     inputs: Inputs
@@ -105,6 +94,7 @@ class Plan:
     resin: str = RESIN.field()
     minimize: tuple[str, ...] = ()
     maximize: tuple[str, ...] = ()
+    counts: tuple[int, ...] = attrs.field(default=attrs.Factory(lambda self: (self.count,), takes_self=True))
 
     def __attrs_post_init__(self) -> None:
         if self.size > MOST_POINTS:
@@ -121,122 +111,158 @@ class Plan:
     def size(self) -> int:
         """Number of points: a grid's is its levels'."""
         if self.method != GRID:
-            return self.count
+            return self.counts[-1]
         return int(np.prod([len(v.levels) for v in self.variables]))
 
-    def values(
-        self, before: Array | None = None, count: int | None = None
-    ) -> tuple[list[dict[str, Any]], Array]:
-        """Varied values of each point, and positions (n, d) in the unit cube; `before`: an earlier plan's."""
-        if self.method == GRID:
-            grid = itertools.product(*(v.levels for v in self.variables))
-            names = [v.name for v in self.variables]
-            return [dict(zip(names, row, strict=True)) for row in grid], np.empty((0, len(names)))
-        places = sample(self.method, count or self.count, len(self.variables), self.seed, before)
-        rows = [
-            {v.name: v.at(u) for v, u in zip(self.variables, row, strict=True)} for row in places.tolist()
-        ]
-        return rows, places
+    @property
+    def density(self) -> float:
+        """Density of the resin in g/ml; raises InputError."""
+        path = self.folder / self.resin
+        material = read_material(path) if path.suffix == ".toml" else load_material(self.resin)
+        return material.density_g_per_ml
 
-    def points(self, rows: list[dict[str, Any]]) -> list[Point]:
-        """The study of every row; one that breaks a rule is a failed point."""
-        found = []
-        for number, values in enumerate(rows, 1):
-            try:
-                with_them = changed_inputs(self.inputs, values, self.folder)
-                job = job_with(
-                    with_them.tables, "[vary]", unit=with_them.unit, protocol=with_them.protocol, workers=1
-                )
-                found.append(Point(number, values, job))
-            except MuError as error:
-                found.append(Point(number, values, None, error))
+    @cached_property
+    def places(self) -> Array:
+        """Positions (n, d) of the points in the unit cube."""
+        found = None
+        for count in self.counts:
+            found = sample(self.method, count, len(self.variables), self.seed, found)
+        assert found is not None
         return found
 
-    def texts(self) -> dict[str, str]:
-        """Text of every file of inputs, by name, without the number of points, since more may be added."""
-        values = {
-            "format": FORMAT,
-            "method": self.method,
-            "seed": self.seed,
-            "memory_MB": self.memory_MB,
-            "minutes": self.minutes,
-            "resin": self.resin,
+    @cached_property
+    def values(self) -> list[dict[str, Any]]:
+        """Varied values of each point."""
+        if self.method == GRID:
+            grid = itertools.product(*(v.levels for v in self.variables))
+            return [dict(zip([v.name for v in self.variables], row, strict=True)) for row in grid]
+        rows = self.places.tolist()
+        return [{v.name: v.at(u) for v, u in zip(self.variables, row, strict=True)} for row in rows]
+
+    def point(self, number: int) -> Point:
+        """The point of a number from 1; one that breaks a rule has an error."""
+        values = self.values[number - 1]
+        try:
+            changed = changed_inputs(self.inputs, values, self.folder)
+            job = job_with(changed.tables, "[vary]", unit=changed.unit, protocol=changed.protocol, workers=1)
+            return Point(number, values, job)
+        except MuError as error:
+            return Point(number, values, None, error)
+
+    def task(self, number: int) -> Task | None:
+        """The study of a point, None of one that breaks a rule."""
+        job = self.point(number).job
+        return None if job is None else Task(job.texts(), self.memory_MB, self.minutes)
+
+    def continued(self, file: Path, add: int = 0) -> Plan:
+        """The plan with the points of an earlier run of it, by that one's sweep.toml, and `add` more.
+
+        Raises InputError for a grid that is added to.
+        """
+        if add and self.method == GRID:
+            raise InputError("points cannot be added to a grid", "--add", "give more steps in sweep.toml")
+        counts: tuple[int, ...] = ()
+        with suppress(InputError):
+            document, run = read_inputs(file)
+            same = document.get("method") == self.method and document.get("seed") == self.seed
+            if same and list(document.get("vary", {})) == [v.name for v in self.variables]:
+                counts = counts_of(run.get("points"), str(file))
+        count = (counts[-1] if counts and add else max([self.count, *counts])) + add
+        return attrs.evolve(self, counts=counts if counts[-1:] == (count,) else (*counts, count))
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """What decides it, in sweep.toml, without unit and protocol."""
+        return {
+            **{d.name: getattr(self, d.name) for d in (METHOD, SEED, MEMORY, MINUTES, RESIN)},
             "minimize": self.minimize,
             "maximize": self.maximize,
             **self.inputs.tables,
             "vary": {v.name: v.table for v in self.variables},
-            "run": {"points": self.count, "files": str(self.folder.resolve())},
         }
-        return {
-            LAYOUT.inputs: toml_text(values, LAYOUT.header),
-            UNIT: to_toml(self.inputs.unit),
-            PROTOCOL: protocol_text(self.inputs.protocol),
-        }
+
+
+@attrs.frozen
+class _File:
+    """The plain keys of sweep.toml."""
+
+    preset: str = ""
+    unit: str = ""
+    protocol: str = ""
+    resin: str = RESIN.field()
+    stages: str = LAST_STAGE.field()
+    method: str = METHOD.field()
+    points: int = POINTS.field()
+    seed: int = SEED.field()
+    memory_MB: int = MEMORY.field()
+    minutes: float = MINUTES.field()
+    minimize: tuple[str, ...] = ()
+    maximize: tuple[str, ...] = ()
 
 
 def read_plan(path: Path) -> Plan:
     """The sweep of a TOML file; raises InputError."""
     document = read_toml(path, "parameter study", "give the path of a TOML file")
-    return _plan_of(_kept_apart(document), path.parent, str(path))
+    return _plan_of(document, path.parent, str(path))
 
 
 def parse_plan(text: str, folder: Path, where: str = "sweep.toml") -> Plan:
     """The sweep of TOML text; folder: where the files lie that it names. Raises InputError."""
-    return _plan_of(_kept_apart(parse_toml(text, where)), folder, where)
+    return _plan_of(parse_toml(text, where), folder, where)
 
 
-def read_plan_of_run(folder: Path) -> Plan:
-    """The sweep that was run in a folder; raises InputError."""
-    path = folder / LAYOUT.inputs
-    document = read_toml(path, "parameter study")
-    run = document.pop(RUN, {})
-    if not isinstance(run, dict):
-        raise InputError(f"{RUN} is not a table", str(path), f"write it as [{RUN}]")
-    last = [stage for stage in STAGES if stage in document][-1:]
-    document |= {"unit": UNIT, "protocol": PROTOCOL, "stages": last[0] if last else STAGES[0]}
-    if "points" in run:
-        document["points"] = run["points"]
-    files = run.get("files", str(folder))
-    return _plan_of(document, folder, str(path), Path(str(files)))
+def _plan_of(document: dict[str, Any], folder: Path, where: str) -> Plan:
+    """The sweep of a document that a user wrote."""
+    found = document.pop("format", "missing")
+    if found != FORMAT or isinstance(found, bool):
+        raise InputError(f"format = {found}", where, f"write format = {FORMAT}")
+    document.pop(RUN, None)
+    last = document.get("stages", LAST_STAGE.default)
+    simulate = document.get("simulate", {})
+    # What is no table is refused later, by name.
+    if isinstance(simulate, dict) and last != STAGES[0]:
+        document["simulate"] = {"self_contact": SELF_CONTACT.default} | simulate
+    given = [document.get(name) for name in ("preset", "unit") if document.get(name)]
+    if len(given) != 1:
+        raise InputError("no unit is given", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
+
+    def unit(file: _File) -> Unit:
+        return load_preset(file.preset) if file.preset else read_unit(folder / file.unit)
+
+    return planned(document, unit, folder, where)
 
 
-def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | None = None) -> Plan:
-    """The sweep of a document; files: folder of the files that its variables name, by default its own."""
-    for key in document:
-        if key not in (*_KEYS, RUN):
-            raise InputError(
-                f"unknown key {key!r}{did_you_mean(key, _KEYS)}", where, f"known: {', '.join(_KEYS)}"
-            )
-    if document.get("format") != FORMAT or isinstance(document.get("format"), bool):
-        raise InputError(f"format = {document.get('format', 'missing')}", where, f"write format = {FORMAT}")
-    vary = document.get("vary")
+def planned(
+    document: Mapping[str, Any], unit: Any, files: Path, where: str, counts: tuple[int, ...] = ()
+) -> Plan:
+    """The plan of sweep.toml's keys; unit: its unit, or what gives it of the plain keys. Raises InputError.
+
+    files: folder of the files that it names; counts: numbers of points by which an earlier run grew.
+    """
+    keys = dict(document)
+    vary, tables = keys.pop("vary", None), {name: keys.pop(name) for name in STAGES if name in keys}
     if not isinstance(vary, dict) or not vary:
         raise InputError(
             "no input is varied",
             where,
             'add [vary] and lines like "chambers.wall_mm" = { low = .., high = .. }',
         )
-    stage = _checked(document, LAST_STAGE, where)
-    stages = STAGES[: STAGES.index(stage) + 1]
-    tables: dict[str, dict[str, Any]] = {name: _settings(document, name, where) for name in stages}
-    for name in STAGES[len(stages) :]:
-        if name in document:
+    file = structured(_File, keys, where)
+    stages = STAGES[: STAGES.index(file.stages) + 1]
+    for name in tables:
+        if name not in stages:
             raise InputError(
                 f"[{name}] is not one of its stages", where, f'write stages = "{name}", or leave it out'
             )
+    settings = {name: _settings(tables.get(name, {}), name, where) for name in stages}
     variables = tuple(variable(name, given, where) for name, given in _flat(vary).items())
-    inputs = Inputs(_unit(document, folder, where), _protocol(document, folder), tables)
-    plan = Plan(
-        inputs=inputs,
-        variables=variables,
-        folder=folder if files is None else files,
-        count=_checked(document, POINTS, where),
-        **{d.name: _checked(document, d, where) for d in (METHOD, SEED, MEMORY, MINUTES, RESIN)},
-        minimize=_words(document, "minimize", where),
-        maximize=_words(document, "maximize", where),
-    )
+    protocol = protocol_of(files / file.protocol if file.protocol else None)
+    inputs = Inputs(unit(file), protocol, settings)
+    plain = ("method", "seed", "memory_MB", "minutes", "resin", "minimize", "maximize")
+    own = {name: getattr(file, name) for name in plain}
+    plan = Plan(inputs, variables, files, count=file.points, counts=counts or (file.points,), **own)
     # A setting that is wrong for every point is reported before any work, and not as many failures.
-    job_with(tables, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
+    job_with(settings, where, unit=inputs.unit, protocol=inputs.protocol, workers=1)
     for v in variables:
         if v.name == FILE:
             for name in v.values:
@@ -244,13 +270,12 @@ def _plan_of(document: dict[str, Any], folder: Path, where: str, files: Path | N
     return plan
 
 
-def _kept_apart(document: dict[str, Any]) -> dict[str, Any]:
-    """The document with self-contact where it names none and something is simulated."""
-    simulate = document.get("simulate", {})
-    # What is no table is refused later, by name.
-    if not isinstance(simulate, dict) or document.get("stages", LAST_STAGE.default) == STAGES[0]:
-        return document
-    return document | {"simulate": {"self_contact": SELF_CONTACT.default} | simulate}
+def counts_of(found: Any, where: str) -> tuple[int, ...]:
+    """Numbers of points by which a sweep grew, of its [run] points; raises InputError."""
+    listed = found if isinstance(found, list) else [found]
+    if not all(type(n) is int and 2 <= n <= MOST_POINTS for n in listed) or sorted(listed) != listed:
+        raise InputError(f"points = {found!r} are no numbers of points", where, "leave [run] points out")
+    return tuple(listed)
 
 
 def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
@@ -263,8 +288,7 @@ def _flat(vary: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, Any]:
-    found = document.get(stage, {})
+def _settings(found: Any, stage: str, where: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise InputError(f"{stage} is not a table", where, f"write it as [{stage}]")
     for key in found:
@@ -275,37 +299,3 @@ def _settings(document: Mapping[str, Any], stage: str, where: str) -> dict[str, 
                 "leave it out; unit and protocol are named at the top of the file",
             )
     return dict(found)
-
-
-def _unit(document: Mapping[str, Any], folder: Path, where: str) -> Unit:
-    if ("preset" in document) == ("unit" in document):
-        raise InputError("no unit is given", where, 'write preset = "mu-1.0x" or unit = "my-unit.toml"')
-    if "preset" in document:
-        return load_preset(_word(document, "preset", where))
-    return read_unit(folder / _word(document, "unit", where))
-
-
-def _protocol(document: Mapping[str, Any], folder: Path) -> Protocol:
-    name = document.get("protocol")
-    return protocol_of(None if name is None else folder / str(name))
-
-
-def _word(document: Mapping[str, Any], key: str, where: str) -> str:
-    found = document[key]
-    if not isinstance(found, str):
-        raise InputError(f"{key} = {found!r} is not a text", where, "write it in quotes")
-    return found
-
-
-def _words(document: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]:
-    found = document.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(word, str) for word in found):
-        raise InputError(f"{key} = {found!r} is not a list of names", where, f'write {key} = ["mass_g"]')
-    return tuple(found)
-
-
-def _checked(document: Mapping[str, Any], d: Description, where: str) -> Any:
-    try:
-        return d.checked(document.get(d.name, d.default))
-    except InputError as error:
-        raise InputError(error.what, f"{where}, {error.where}", error.remedy) from error

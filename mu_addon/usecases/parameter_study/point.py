@@ -1,14 +1,11 @@
-"""One point of a parameter study: its study in a child process, within limits of memory and time.
-
-A worker on any machine runs this: its inputs come with the task, and its result returns as a row.
-"""
+"""One point of a parameter study: its study in a child process, within limits of memory and time."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,67 +13,51 @@ from typing import Any
 
 import attrs
 
-from ...errors import MuError
 from ...files import output_error, plain
 from ...reading import file_text
-from ...run.cache import REVISION, key
 from ...run.child import RUNNING, Child
 from ...run.folder import keep_inputs
 from ...run.interpreter import core_command, core_path
-from ...run.versions import package_versions
 
 # Seconds between two looks at a study's memory.
 LOOK_S = 0.05
-_STOPPED = {"what": "the sweep was stopped", "what_to_do": "run it again"}
-
-_under_way: set[threading.Event] = set()
-"""Event of each point that a thread of this process works on; setting it ends the study at once."""
-
-
-def stop_points() -> None:
-    """End the studies of the points that threads of this process work on."""
-    for stop in list(_under_way):
-        stop.set()
 
 
 @attrs.frozen
 class Task:
     """One study to run: files of inputs by name, and its limits; plain data, so that it can be sent.
 
-    version: of the program that asks, which must be the worker's; module: run by the process in place of the
-    core's command line.
+    module: run by the process in place of the core's command line.
     """
 
     files: Mapping[str, str]
     memory_MB: int
     minutes: float
-    version: str
     module: tuple[str, ...] = ()
 
-    @property
-    def name(self) -> str:
+    def hash(self) -> str:
         """Hash of all inputs that decide the result."""
+        from ...run.cache import key
+
         return key(*(part for item in sorted(self.files.items()) for part in item))
 
 
-def version() -> str:
-    """Version that must be the same on every worker."""
-    return f"{package_versions()['mu_addon']} revision {REVISION}"
+@attrs.frozen
+class Outcome:
+    """Result of a study: "done" with its `summary` as JSON, or "failed" with the reason; worker: of Dask."""
+
+    status: str
+    seconds: float = 0.0
+    memory_MB: int = 0
+    worker: str = ""
+    summary: str = "{}"
+    what: str = ""
+    where: str = ""
+    what_to_do: str = ""
 
 
-def run_point(task: Task) -> dict[str, Any]:
-    """Result or failure of a study, as plain data; a failing study raises nothing.
-
-    status: "done" with the study's `summary`, or "failed" with what, where and what_to_do; also its seconds,
-    memory_MB and worker. Raises MuError where this worker is of another version, and OutputError where it has
-    no room for the study.
-    """
-    if task.version != version():
-        raise MuError(
-            f"the worker has mu_addon {version()}, the sweep {task.version}",
-            os.uname().nodename if hasattr(os, "uname") else "",
-            "install the same version on every worker",
-        )
+def run_point(task: Task) -> Outcome:
+    """Run a study; a failing one raises nothing. Raises OutputError where there is no room for it."""
     start = time.monotonic()
     try:
         scratch = tempfile.TemporaryDirectory(prefix="mu-point-", ignore_cleanup_errors=True)
@@ -88,25 +69,18 @@ def run_point(task: Task) -> dict[str, Any]:
         line = [sys.executable, *task.module] if task.module else [*core_command(), "resume"]
         command = [*line, str(folder / "study"), "--json", "--no-report", "--workers", "1"]
         child = Child(command, folder / "words", _environment(task), ends_with_parent=True)
-        stop = threading.Event()
-        _under_way.add(stop)
         try:
-            peak_MB, stopped = _watch(child, task, stop)
+            peak_MB, stopped = _watch(child, task)
         finally:
             child.kill()
-            _under_way.discard(stop)
-    row: dict[str, Any] = {
-        "seconds": round(time.monotonic() - start, 3),
-        "memory_MB": round(peak_MB),
-        "worker": _worker(),
-    }
+    cost = round(time.monotonic() - start, 3), round(peak_MB), _worker()
     if stopped is None and child.result is not None and child.error is None:
-        return {"status": "done", **row, "summary": plain(child.result.get("summary", {}))}
+        return Outcome("done", *cost, json.dumps(plain(child.result.get("summary", {}))))
     error = stopped or child.error or {}
     words = {
         name: str(error.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
     }
-    return {"status": "failed", **row, **words}
+    return Outcome("failed", *cost, **words)
 
 
 def _worker() -> str:
@@ -125,13 +99,13 @@ def _environment(task: Task) -> dict[str, str]:
     return {**os.environ, **threads, **more}
 
 
-def _watch(child: Child, task: Task, stop: threading.Event) -> tuple[float, dict[str, str] | None]:
+def _watch(child: Child, task: Task) -> tuple[float, dict[str, str] | None]:
     """Peak memory of a study in MB, and why it was stopped if it was."""
     peak = 0.0
     while child.state == RUNNING:
         child.poll()
         peak = max(peak, _memory_MB(child.pid))
-        over = _STOPPED if stop.is_set() else _too_much(child, task, peak)
+        over = _too_much(child, task, peak)
         if over is not None:
             child.kill()
             return peak, over

@@ -1,13 +1,9 @@
-"""Result of a sweep: a row for each point, with a study's figures as columns."""
+"""Figures of a study, as columns of a parameter study's table."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
-
-import attrs
-
-from .plan import Plan
 
 Row = dict[str, Any]
 
@@ -37,40 +33,3 @@ def figures(summary: Mapping[str, Any], density_g_per_ml: float) -> Row:
     if of_lattice := (summary.get("search") or {}).get("best"):
         found |= {"J_hat_mm lattice": of_lattice["J_hat_mm"], "length_mm lattice": of_lattice["length_mm"]}
     return found
-
-
-def column_names(rows: Sequence[Row]) -> list[str]:
-    """Names of all columns, in the order in which rows first have them."""
-    return list(dict.fromkeys(name for row in rows for name in row))
-
-
-def cell(value: Any) -> Any:
-    """A value as a cell of the table: lists as text, None as an empty cell."""
-    if value is None:
-        return ""
-    if isinstance(value, list | tuple):
-        return " ".join(map(str, value))
-    return value
-
-
-@attrs.frozen(eq=False)
-class Found:
-    """Rows of a sweep, one a point: `number`, `status`, its inputs and figures, or why it failed.
-
-    inputs, outputs: names of the columns varied and computed.
-    """
-
-    plan: Plan
-    rows: tuple[Row, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-    @property
-    def done(self) -> list[Row]:
-        """Rows of the points that were solved."""
-        return [row for row in self.rows if row["status"] == "done"]
-
-    @property
-    def failed(self) -> list[Row]:
-        """Rows of the points that were not."""
-        return [row for row in self.rows if row["status"] == "failed"]

@@ -17,8 +17,8 @@ from mu_addon.blender.unit.properties import shape_hash, to_unit
 from mu_addon.design.parameters import write_unit
 from mu_addon.evidence.extended import ExtendedModel, Fitted
 from mu_addon.optimization.targets import KINDS as KNOWN
-from mu_addon.usecases.optimize.charts import picture
-from mu_addon.usecases.optimize.job import mechanics_of, read_job
+from mu_addon.report.design_charts import picture
+from mu_addon.studies.optimize import Optimize, mechanics_of
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
@@ -55,7 +55,7 @@ def finished(root, **changed):
     chambers = attrs.evolve(unit.chambers, wall_mm=0.712345678)
     proposed = attrs.evolve(unit, name="proposed-1", chambers=chambers)
     write_unit(proposed, folder / "proposed-1.toml")
-    picture(proposed, folder / "proposed-1.png")
+    (folder / "proposed-1.png").write_bytes(picture(proposed))
     common = {"standard_error": 0.5, "objective": False}
     targets = [
         {"name": "angle at 30 kPa", "asked": "at least 20 deg", "unit": "deg", "value": 18.25,
@@ -114,7 +114,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert f"Optimize, perhaps {rounded(expected)}" in drawn()
     assert optimization.unchecked_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
-    design = read_job(tmp_path / "run").design
+    design = Optimize.read(tmp_path / "run").design
     unit = to_unit(root.mu_unit)
     assert shape_hash(design.unit) == shape_hash(
         attrs.evolve(unit, chambers=attrs.evolve(unit.chambers, bladder_share=0.55))
@@ -145,7 +145,7 @@ def test_properties_are_written_as_the_file_that_the_core_reads(tmp_path):
     assert cell.also == {"chambers.bladder_diameter_mm": 2.0}, "the bladder is two cells wide"
     assert (design.search.evaluations, design.settings.refine, design.check_refine) == (7, 0.5, 0.75)
     # What the core reads is what it writes again.
-    assert read_job(tmp_path / "run").texts() == design.texts()
+    assert Optimize.read(tmp_path / "run").texts() == Optimize(design=design).texts()
 
 
 def test_path_resin_kind_and_struts_as_printed_are_asked_for_by_name(tmp_path):
@@ -163,7 +163,7 @@ def test_path_resin_kind_and_struts_as_printed_are_asked_for_by_name(tmp_path):
     target(root, "angle", ask="low", low=5.0)
     root.mu_optimize.self_contact = True
     optimization.write_inputs(root, tmp_path / "run")
-    design = read_job(tmp_path / "run").design
+    design = Optimize.read(tmp_path / "run").design
     assert design.self_contact
     assert [f.values for f in design.freedoms] == [
         ("alpha2", "alpha4"), ("elastic-50a-v1", "flexible-80a"), (1, 2),
@@ -186,7 +186,7 @@ def test_the_users_own_body_goes_along(tmp_path):
     root.mu_unit.envelope = cube.data
     assert optimization.unchecked_texts(root) == optimization.job_of(root).texts()
     optimization.write_inputs(root, tmp_path / "run")
-    job = read_job(tmp_path / "run")
+    job = Optimize.read(tmp_path / "run")
     np.testing.assert_allclose(np.ptp(job.design.body.bounds, axis=0), 2 * half, atol=1e-4)
     assert mechanics_of(job.design, None)[0].body is job.design.body
 
@@ -231,7 +231,7 @@ def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
     effects.keep(root, ExtendedModel("named", found, {}).text())
     assert "With the named effects" in drawn()
     optimization.write_inputs(root, tmp_path / "run")
-    job = read_job(tmp_path / "run")
+    job = Optimize.read(tmp_path / "run")
     assert mechanics_of(job.design, job.model)[1] == [], "nothing of it is left out"
     assert job.model.of_effects == {
         "clogged_chamber.share_lost": 0.5, "gravity.density_kg_m3": 1100.0,
@@ -241,7 +241,7 @@ def test_named_effects_of_the_unit_are_optimised_with_it(tmp_path):
     root.mu_optimize.has_gravity = True
     root.mu_optimize.orientation_deg = 90.0
     optimization.write_inputs(root, tmp_path / "level")
-    assert read_job(tmp_path / "level").design.orientation_deg == 90.0
+    assert Optimize.read(tmp_path / "level").design.orientation_deg == 90.0
 
 
 def test_a_file_is_searched_from_this_unit_or_from_its_own(tmp_path):
@@ -348,7 +348,7 @@ def test_the_panel_says_how_to_begin_what_is_entered_and_what_a_sign_means(tmp_p
     summary.write_text(json.dumps(said))
     assert "Question mark: met" in drawn()
     pictures = drawn().count("a picture")
-    picture(to_unit(root.mu_unit), optimization.folder_of(root) / panels.FRONT)
+    (optimization.folder_of(root) / panels.FRONT).write_bytes(picture(to_unit(root.mu_unit)))
     assert drawn().count("a picture") == pictures + 1
 
 

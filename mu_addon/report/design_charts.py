@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...design.body import Body, covering, envelope, section
-from ...design.dimensions import Dimensions
-from ...design.lattice import lattice_of
-from ...design.parameters import Unit
-from ...design.profile import cavity_polygon, outer_polygon
-from ...design.section_picture import struts_beside_section
-from ...files import write_bytes
-from ...report.plots import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
+from ..design.body import Body, covering, envelope, section
+from ..design.dimensions import Dimensions
+from ..design.lattice import lattice_of
+from ..design.parameters import Unit
+from ..design.profile import cavity_polygon, outer_polygon
+from ..design.section_picture import struts_beside_section
+from .plots import BY_LENGTH, CHOSEN, INK, QUIET, canvas, styled
 
 if TYPE_CHECKING:
-    from .run import Optimised
+    from ..optimization import Design, Found
 
 Array = np.ndarray[Any, Any]
 
@@ -28,31 +26,33 @@ STATIONS = np.linspace(0.0, 1.0, 7)
 """Number of positions along a strut at which its outline is drawn."""
 
 
-def front(found: Optimised, first: int, second: int) -> str:
+def front(design: Design, found: Found, proposed: Sequence[int], first: int, second: int) -> str:
     """SVG of all computed designs by two judged targets (numbers); proposals are numbered squares."""
     with canvas(4.6, 3.5) as (drawn, svg):
-        _front(drawn, found, first, second)
+        _front(drawn, design, found, proposed, first, second)
     return svg()
 
 
-def front_picture(found: Optimised, first: int, second: int, path: Path) -> None:
-    """Write the same as a square PNG of 512 pixels, as a panel shows it; raises OutputError."""
-    _write_png(path, 3.6, 512, False, lambda drawn: _front(drawn, found, first, second))
+def front_picture(design: Design, found: Found, proposed: Sequence[int], first: int, second: int) -> bytes:
+    """The same as a square PNG of 512 pixels, as a panel shows it."""
+    return _png(3.6, 512, False, lambda drawn: _front(drawn, design, found, proposed, first, second))
 
 
-def compared(found: Optimised) -> tuple[int, int] | None:
+def compared(design: Design, found: Found) -> tuple[int, int] | None:
     """Numbers of the two targets that a front is drawn for, objectives first; None without two."""
-    if not any(o.sound for o in found.search.observed):
+    if not any(o.sound for o in found.observed):
         return None
-    targets = [t for t in found.design.targets if t.quantity is not None]
+    targets = design.judged
     goals = [i for i, t in enumerate(targets) if t.goal is not None]
     first, second, *_ = [*goals, *(i for i in range(len(targets)) if i not in goals), -1, -1]
     return None if second < 0 else (first, second)
 
 
-def _front(drawn: Any, found: Optimised, first: int, second: int) -> None:
-    targets = [t for t in found.design.targets if t.quantity is not None]
-    sound = [o for o in found.search.observed if o.sound]
+def _front(
+    drawn: Any, design: Design, found: Found, proposed: Sequence[int], first: int, second: int
+) -> None:
+    targets = design.judged
+    sound = [o for o in found.observed if o.sound]
     values = np.array([[o.values[first], o.values[second]] for o in sound])
     meets = np.array([all(t.met(v) for t, v in zip(targets, o.values, strict=True)) for o in sound])
     left = 0.69 / drawn.get_figwidth()  # inches, for numbers of four digits and the axis' name
@@ -61,10 +61,10 @@ def _front(drawn: Any, found: Optimised, first: int, second: int) -> None:
         axes.plot(*values[~meets].T, "o", color=QUIET, markersize=3.5, alpha=0.8, label="misses a target")
     if meets.any():
         axes.plot(*values[meets].T, "o", color=BY_LENGTH[0], markersize=4, label="meets all")
-    for row, p in enumerate(found.proposals):
-        x, y = p.observed.values[first], p.observed.values[second]
-        axes.plot(x, y, "s", color=CHOSEN, markersize=6.5, label="" if row else "proposed")
-        axes.annotate(str(p.place), (x, y), (5, 5), textcoords="offset points", fontsize=8, color=INK)
+    for place, number in enumerate(proposed, 1):
+        x, y = found.observed[number].values[[first, second]]
+        axes.plot(x, y, "s", color=CHOSEN, markersize=6.5, label="" if place > 1 else "proposed")
+        axes.annotate(str(place), (x, y), (5, 5), textcoords="offset points", fontsize=8, color=INK)
     for target, line in ((targets[first], axes.axvline), (targets[second], axes.axhline)):
         for bound in (target.low, target.high, target.value):
             if not np.isnan(bound):
@@ -73,15 +73,14 @@ def _front(drawn: Any, found: Optimised, first: int, second: int) -> None:
     axes.legend(fontsize=7, frameon=False)
 
 
-def course(found: Optimised) -> str:
+def course(design: Design, found: Found) -> str:
     """SVG of the largest misfit in tolerances by the number of designs computed, and of the best so far."""
-    targets = [t for t in found.design.targets if t.quantity is not None]
     misfit = np.array(
         [
-            max((abs(t.misfit(v)) for t, v in zip(targets, o.values, strict=True)), default=0.0)
+            max((abs(t.misfit(v)) for t, v in zip(design.judged, o.values, strict=True)), default=0.0)
             if o.sound
             else np.nan
-            for o in found.search.observed
+            for o in found.observed
         ]
     )
     number = np.arange(1, len(misfit) + 1)
@@ -110,13 +109,13 @@ def thumbnail(unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None
     return svg()
 
 
-def picture(unit: Unit, path: Path, body: Body | None = None) -> None:
-    """Write a unit's half section as a square PNG of 256 pixels, as a panel shows it; raises OutputError."""
+def picture(unit: Unit, body: Body | None = None) -> bytes:
+    """A unit's half section as a square PNG of 256 pixels, as a panel shows it."""
     size = 1.05 * max(sizes([unit], body))
-    _write_png(path, 2.56, 256, True, lambda drawn: _half_section(drawn, unit, size, size, body))
+    return _png(2.56, 256, True, lambda drawn: _half_section(drawn, unit, size, size, body))
 
 
-def _write_png(path: Path, inches: float, pixels: int, clear: bool, draw: Callable[[Any], None]) -> None:
+def _png(inches: float, pixels: int, clear: bool, draw: Callable[[Any], None]) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     stream = io.BytesIO()
@@ -126,7 +125,7 @@ def _write_png(path: Path, inches: float, pixels: int, clear: bool, draw: Callab
         drawn.savefig(
             stream, format="png", dpi=pixels / inches, transparent=clear, metadata={"Software": None}
         )
-    write_bytes(path, stream.getvalue())
+    return stream.getvalue()
 
 
 def _half_section(drawn: Any, unit: Unit, widest_mm: float, tallest_mm: float, body: Body | None) -> None:

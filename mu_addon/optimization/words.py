@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...optimization.freedoms import Freedom
-from ...optimization.robustness import Verified
-from ...optimization.search import Found, Observed
-from ...optimization.targets import Target
+from .freedoms import Freedom
+from .robustness import Verified
+from .search import Found, Observed
+from .targets import Target
 
 Array = np.ndarray[Any, Any]
 

@@ -1,1 +1,0 @@
-"""Design by intent: units that meet targets within given freedoms."""
