@@ -108,8 +108,8 @@ class MU_GT_candidate(bpy.types.Gizmo):
             batch.draw(shader)
         size, known = round(13 * scale), ranking.known(root)
         words = path_symbol(self.path)
-        if self.path in known.j:
-            words += f": {known.j[self.path]:.3f} mm{', stale' if known.stale else ''}"
+        if mean := known.mean(self.path):
+            words += f": {mean} mm{', stale' if known.stale else ''}"
         x, y = line[-1]
         legend.write(words, x + 1.2 * size, y, size)
 

@@ -45,8 +45,8 @@ def marks(known: ranking.Known) -> list[tuple[float, str]]:
 def label(root: Any, known: ranking.Known, name: str) -> list[str]:
     """Name and rank of a path, with a question mark where the ranking is stale."""
     found = [path_symbol(name)]
-    if name in known.j:
-        found.append(known.rank(name))
+    if below := known.rank(name) if name in known.j else known.mean(name):
+        found.append(below)
     return found
 
 

@@ -12,6 +12,7 @@ from . import ranking
 from .legend import BETTER, UNDECIDED
 from .picking import selected_candidate
 
+BOUND = "≥: cannot be the best, not solved further"
 ORDERS = (
     ("name", "By Name", "As they stand beside the unit"),
     ("deviation", "By Deviation", "The one that disturbs the motion least first"),
@@ -55,7 +56,7 @@ def _list(layout, context, root) -> None:
     if ranked and known.tied:
         layout.label(text=UNDECIDED)
     column = layout.column(align=True)
-    for window in in_order(root, ranked, context.window_manager.mu_path_order):
+    for window in in_order(root, known, context.window_manager.mu_path_order):
         chosen = root.mu_unit.path == window.name
         row = column.split(factor=0.34, align=True)
         icon = "RADIOBUT_ON" if chosen else "RADIOBUT_OFF"
@@ -63,17 +64,21 @@ def _list(layout, context, root) -> None:
         button.name = "none" if chosen else window.name
         row = row.split(factor=0.45)
         row.label(text=anchors_of(window))
-        if window.name in ranked:
-            row.label(text=f"{ranked[window.name][0]:.3f}  {known.rank(window.name)}")
+        if ranked and known.mean(window.name):
+            row.label(text=f"{known.mean(window.name)}  {known.rank(window.name)}".rstrip())
+    if ranked and known.at_least:
+        layout.label(text=BOUND)
 
 
-def in_order(root, ranked, order: str):
-    """Windows of a unit by their names or, if ranked and wanted, the best first."""
+def in_order(root, known: ranking.Known, order: str):
+    """Windows of a unit by their names or, if ranked and wanted, the best first and lower bounds last."""
     found = windows(root.mu_unit.chambers.count)
-    if order == "name":
+    if order == "name" or known.stale:
         return found
+    numbers = {name: (0, j) for name, j in known.j.items()}
+    numbers |= {name: (1, bound) for name, bound in known.at_least.items()}
     # Sorting is stable.
-    return sorted(found, key=lambda window: ranked.get(window.name, (float("inf"), 0))[0])
+    return sorted(found, key=lambda window: numbers.get(window.name, (2, 0.0)))
 
 
 CLASSES = (MU_PT_path,)

@@ -19,17 +19,32 @@ class Known:
     """Candidate paths of the shown run: J_hat in mm by name, the best first.
 
     stale: True if it is of a unit with other parameters; tied: paths that differ from the best by less than
-    the error of the mesh, and the best with them.
+    the error of the mesh, and the best with them; at_least: lower bound of J_hat in mm of paths that were not
+    solved further, since they cannot be the best.
     """
 
     j: dict[str, float]
     stale: bool = False
     tied: frozenset[str] = frozenset()
+    at_least: dict[str, float] = attrs.field(factory=dict)
 
     def rank(self, name: str) -> str:
-        """Rank of a path as text: "#2"; "≈#1" if undecided among the best; "#2?" if stale."""
+        """Rank of a path as text: "#2"; "≈#1" if undecided among the best; "#2?" if stale.
+
+        Empty where a lower bound leaves it open.
+        """
         doubt = "?" if self.stale else ""
-        return f"≈#1{doubt}" if name in self.tied else f"#{list(self.j).index(name) + 1}{doubt}"
+        if name in self.tied:
+            return f"≈#1{doubt}"
+        if name in self.at_least or self.j[name] > min(self.at_least.values(), default=np.inf):
+            return ""
+        return f"#{list(self.j).index(name) + 1}{doubt}"
+
+    def mean(self, name: str) -> str:
+        """J_hat of a path in mm as text, or its lower bound; empty without either."""
+        if name in self.j:
+            return f"{self.j[name]:.3f}"
+        return f"≥ {self.at_least[name]:.3f}" if name in self.at_least else ""
 
     def share(self, name: str) -> float:
         """Position of a path's J between the smallest, 0, and the largest, 1, shown by its colour."""
@@ -47,7 +62,12 @@ def known(root: Any) -> Known:
     if found is None:
         return Known({})
     tied = found.summary.get("tied_with_chosen") or ()
-    return Known(dict(found.ranking), found.stale, frozenset([found.ranking[0][0], *tied] if tied else ()))
+    return Known(
+        dict(found.ranking),
+        found.stale,
+        frozenset([found.ranking[0][0], *tied] if tied else ()),
+        found.run.at_least_mm,
+    )
 
 
 def ranked(root: Any) -> dict[str, tuple[float, int]]:
@@ -66,17 +86,18 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
     """Colour and label candidate tubes, objects by path; the chosen one keeps its colour.
 
-    Stale ones are grey, their rank with a question mark.
+    Stale ones are grey, their rank with a question mark; so are those of which only a bound is known.
     """
     found = known(root)
-    for name in found.j:
+    for name in (*found.j, *found.at_least):
         if name not in candidates:
             continue
         tube = candidates[name]
         modifier = tube.modifiers[0]
         # Below the name: the tubes are too close for more beside it.
-        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
-        if name != root.mu_unit.path and not found.stale:
+        below = found.rank(name) or found.mean(name)
+        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{below}")
+        if name in found.j and name != root.mu_unit.path and not found.stale:
             j_colour = field_colours.of_map(found.share(name))
             colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
             tube.data.materials[0] = colour

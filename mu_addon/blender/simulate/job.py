@@ -76,7 +76,7 @@ def job_of(root: Any) -> Job:
     stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
     extra: dict[str, Any] = {}
     if settings.command == "place":
-        extra["paths"] = settings.paths
+        extra |= {"paths": settings.paths, "all_paths": settings.all_paths}
     if settings.self_contact:
         extra["self_friction"] = round(settings.self_friction, 6)
     body = envelope.envelope_in(root, unit)

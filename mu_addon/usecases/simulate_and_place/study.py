@@ -25,6 +25,7 @@ from ...materials.library import load_material
 from ...meshing.mesh import Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
+from ...placement.elimination import Contest
 from ...reading import file_bytes, parse_json
 from ...report.motion_files import write_model_a
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
@@ -215,7 +216,7 @@ class Study:
             model = job.model(self.mesh)
             if candidates_beside and job.workers > 1 and not job.in_time:
                 self._ahead = CandidateSolver(
-                    job, self.cache, self.mesh, self.candidates, samples[1], whole=True
+                    job, self.cache, self.mesh, self.candidates, samples[1], whole=True, contest=self.contest
                 )
             try:
                 self.trajectory, self.contact = solve_model_a(
@@ -291,18 +292,38 @@ class Study:
         assert self.mesh is not None
         assert self.trajectory is not None
         with self.progress.stage("candidates"):
-            found = self.solve_candidates(
-                self.mesh, self.trajectory, self.candidates, self._ahead, verify=True, to_look_at=True
-            )
-        self.ranking = Ranking({e.name: e for e in found})
+            self._rank(self.contest, self._ahead)
         self._write_ranking()
         if self.job.mesh_check:
             try:
                 self._compare_meshes()
             except (ConvergenceError, MeshingError) as error:
                 self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
+            if self.ranking.may_be_tied:
+                with self.progress.stage("candidates"):
+                    self._rank(attrs.evolve(self.contest, margin_mm=self.ranking.uncertainty_mm))
             self._write_ranking()
         return self.ranking.chosen
+
+    @property
+    def contest(self) -> Contest:
+        """The paths whose deviation is to be known exactly: the best one, or those of the mesh check."""
+        return Contest(PATHS_CHECKED if self.job.mesh_check else 1, every=self.job.all_paths)
+
+    def _rank(self, contest: Contest, under_way: CandidateSolver | None = None) -> None:
+        """Solve the candidates as far as a contest needs; the ranking keeps its mesh uncertainty."""
+        assert self.mesh is not None
+        assert self.trajectory is not None
+        found, at_least_mm = self.solve_candidates(
+            self.mesh,
+            self.trajectory,
+            self.candidates,
+            under_way,
+            verify=True,
+            to_look_at=True,
+            contest=contest,
+        )
+        self.ranking = Ranking({e.name: e for e in found}, self.ranking.uncertainty_mm, at_least_mm)
 
     def _write_ranking(self) -> None:
         self.context.summary |= self.ranking.write(self.folder, self.job, self.candidates)
@@ -316,8 +337,11 @@ class Study:
         verify: bool = False,
         to_look_at: bool = False,
         done: float = 0.0,
-    ) -> list[Evaluation]:
-        """Evaluation of every candidate on a mesh against its Model A; see `candidates_by_pressure`.
+        contest: Contest | None = None,
+    ) -> tuple[list[Evaluation], dict[str, float]]:
+        """Evaluation of candidates on a mesh against its Model A; see `candidates_by_pressure`.
+
+        And lower bounds of J_hat in mm, by name, of those that a contest does without.
 
         to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's. done: share of
         the stage that is done before.
@@ -327,8 +351,20 @@ class Study:
         update = within(self.progress.update, done, 1.0)
         solving = SOLVING["candidates"] if shown else 1.0
         found, figures = solve_candidates(
-            self.job, self.cache, mesh, trajectory, candidates, update, solving, under_way, verify, shown
+            self.job,
+            self.cache,
+            mesh,
+            trajectory,
+            candidates,
+            update,
+            solving,
+            under_way,
+            verify,
+            shown,
+            contest,
         )
+        at_least_mm = figures.pop("at_least_mm", {})
+        self.warn(*(f"No deviation is known of {path}." for path in figures.pop("ended", ())))
         if not figures.pop("independent_of_path", True):
             self.warn(
                 "A candidate started from Model A's states does not lie on its own equilibrium path from "
@@ -338,7 +374,7 @@ class Study:
         paths = "Paths" if mesh is self.mesh else "On the coarser mesh, paths"
         self.warn(*(f"{paths} are not compared {where}." for where in figures["not_reached"]))
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = figures
-        return found
+        return found, at_least_mm
 
     def _compare_meshes(self) -> None:
         """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures.
@@ -361,9 +397,8 @@ class Study:
             mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing))
             model = job.model(mesh)
             trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
-            found = self.solve_candidates(mesh, trajectory, checked, done=moving)
-        fine = self.ranking.evaluations
-        self.ranking = Ranking(fine, mesh_change_mm(fine, found, instants))
+            found, _ = self.solve_candidates(mesh, trajectory, checked, done=moving)
+        self.ranking.uncertainty_mm = mesh_change_mm(self.ranking.evaluations, found, instants)
 
 
 def begin_study(job: Job, folder: Path, context: RunContext) -> None:

@@ -408,8 +408,10 @@ def test_candidates_say_their_rank(study):
     assert tubes["alpha4"].data.materials[0].name == "MU Waveguide"
     # The list of the panel is sorted either way, and says what its numbers are.
     by_rank = sorted(known, key=lambda name: known[name][1])
-    assert [w.name for w in path_panel.in_order(root, known, "deviation")] == by_rank
-    assert [w.name for w in path_panel.in_order(root, known, "name")] == [f"alpha{k}" for k in range(1, 11)]
+    assert [w.name for w in path_panel.in_order(root, ranking.known(root), "deviation")] == by_rank
+    assert [w.name for w in path_panel.in_order(root, ranking.known(root), "name")] == [
+        f"alpha{k}" for k in range(1, 11)
+    ]
     words = drawn([path_panel.MU_PT_path])
     assert "Mean deviation [mm], smaller is better" in words.replace("  ", " ")
     assert f"{known['alpha4'][0]:.3f}  #{known['alpha4'][1]}" in words
