@@ -9,7 +9,7 @@ from ...design.anchors import windows
 from ..shared.wording import anchors_of, path_symbol
 from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
-from .legend import BETTER, UNDECIDED
+from .legend import BETTER, ESTIMATED, UNDECIDED
 from .picking import selected_candidate
 
 BOUND = "≥: cannot be the best, not solved further"
@@ -45,14 +45,15 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
 def _list(layout, context, root) -> None:
     """Draw every path: its anchors and, once ranked, its mean deviation and rank."""
-    ranked = ranking.ranked(root)
+    known = ranking.known(root)
+    ranked = bool(known.numbers) and not known.stale
     row = layout.row(align=True)
     row.use_property_split = False
-    row.enabled = bool(ranked)
+    row.enabled = ranked
     row.prop(context.window_manager, "mu_path_order", expand=True)
     # Same height in both cases, so that a click on a run without a ranking moves nothing.
-    layout.label(text=BETTER if ranked else "Simulate to rank them")
-    known = ranking.known(root)
+    words = ESTIMATED if known.estimated else BETTER
+    layout.label(text=words if ranked else "Simulate to rank them")
     if ranked and known.tied:
         layout.label(text=UNDECIDED)
     column = layout.column(align=True)
@@ -75,7 +76,7 @@ def in_order(root, known: ranking.Known, order: str):
     found = windows(root.mu_unit.chambers.count)
     if order == "name" or known.stale:
         return found
-    numbers = {name: (0, j) for name, j in known.j.items()}
+    numbers = {name: (0, j) for name, j in known.numbers.items()}
     numbers |= {name: (1, bound) for name, bound in known.at_least.items()}
     # Sorting is stable.
     return sorted(found, key=lambda window: numbers.get(window.name, (2, 0.0)))

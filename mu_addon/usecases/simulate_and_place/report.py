@@ -120,7 +120,7 @@ def _key_figures(r: ReportData, found: RankingResult) -> str:
 def _ranking(r: ReportData) -> str:
     found = r.ranking
     if found is None:
-        return ""
+        return _estimates(r)
     over = "the compared part of the pressure cycle" if r.is_partly_compared else "the whole pressure cycle"
     tied = f" Hatched: tied with {_name(found.chosen)}." if found.tied else ""
     whiskers = (
@@ -157,6 +157,20 @@ def _ranking(r: ReportData) -> str:
         rows.append(([label(path.name), path.anchors, *figures], path.name == found.chosen))
     every = table("Every path. J cont: root mean square instead of mean.", head, rows)
     return f'{words}<div class="pair">{bars}<div>{every}</div></div>'
+
+
+def _estimates(r: ReportData) -> str:
+    """Estimated deviations, of a run that solved no path."""
+    if not r.estimated_mm:
+        return ""
+    anchors = {path.name: path.anchors for path in r.paths}
+    rows = [([label(n), anchors[n], f"{j:.2f}"], False) for n, j in r.estimated_mm.items()]
+    words = (
+        "<p>No path was solved yet. Estimated by the linear response of the unit under pressure; exact ones "
+        "differ by some 10 to 40 %, and paths close to each other may change places.</p>"
+    )
+    head = [("path", ""), ("anchors", "line"), ("estimated Ĵ [mm]", "n")]
+    return words + table("Estimated mean deviation, least first.", head, rows)
 
 
 def _search(r: ReportData) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ...design.solid import Solid, build_solid
 from ...design.stl_and_nodes import write_nodes, write_stl
 from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.bending_angle import TipSection
+from ...fem.factor import IndefiniteError
 from ...fem.model import Model
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory
@@ -42,6 +43,7 @@ from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_tables import Row, in_order, instants, write_motion, write_self_contact, write_stretch
+from .path_estimate import estimated_J_mm
 from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
@@ -52,6 +54,7 @@ Array = np.ndarray[Any, Any]
 _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
+ESTIMATED = "J_hat_estimated_mm"
 # Paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only paths
 # near the best can be tied with it.
 PATHS_CHECKED = 3
@@ -76,6 +79,8 @@ class Study:
     self_contact: list[Row] = attrs.field(factory=list)
     search: LatticeSearch | None = None
     light: Signals | None = None
+    estimated_mm: dict[str, float] = attrs.field(factory=dict)
+    _estimates: bool = False
     _ahead: CandidateSolver | None = None
 
     @classmethod
@@ -214,6 +219,8 @@ class Study:
         job, samples, states = self.job, self.job.samples, SOLVING["Model A"]
         with self.progress.stage("Model A"):
             model = job.model(self.mesh)
+            comparable = len(self.candidates) > 1 and not job.in_time
+            self._estimates = candidates_beside and comparable
             if candidates_beside and job.workers > 1 and not job.in_time:
                 self._ahead = CandidateSolver(
                     job, self.cache, self.mesh, self.candidates, samples[1], whole=True, contest=self.contest
@@ -248,6 +255,21 @@ class Study:
             angles[f"{state.pressure_kPa:.6g}"] = self.bending_angle_deg(state.u)
         if self._ahead is not None:
             self._ahead.reached(state)
+        if self._estimates and state.pressure_kPa == self.job.samples[1].max() > 0.0:
+            self._estimate()
+
+    def _estimate(self) -> None:
+        """Estimate the paths' deviation from the states under pressure, long before they are solved."""
+        assert self.mesh is not None
+        under = [state for state in self.states if state.pressure_MPa > 0.0]
+        try:
+            found = estimated_J_mm(self.job, self.cache, self.mesh, under)
+        except (InputError, IndefiniteError):
+            # No response where Model A is unstable or the mesh is coarse: the paths are solved all the same.
+            return
+        self.estimated_mm = dict(sorted(found.items(), key=lambda one: one[1]))
+        self.context.summary[ESTIMATED] = self.estimated_mm
+        self.progress.update(0.0, estimate_words(self.estimated_mm))
 
     def _keep_partial_motion(self) -> None:
         """Write the motion found before a failure; it is partial in summary.json."""
@@ -297,11 +319,11 @@ class Study:
         if self.job.mesh_check:
             try:
                 self._compare_meshes()
-            except (ConvergenceError, MeshingError) as error:
+            except (ConvergenceError, InputError, MeshingError) as error:
                 self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
             if self.ranking.may_be_tied:
                 with self.progress.stage("candidates"):
-                    self._rank(attrs.evolve(self.contest, margin_mm=self.ranking.uncertainty_mm))
+                    self._rank(attrs.evolve(self.contest, margin_mm=self.ranking.uncertainty_mm or 0.0))
             self._write_ranking()
         return self.ranking.chosen
 
@@ -399,6 +421,12 @@ class Study:
             trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
             found, _ = self.solve_candidates(mesh, trajectory, checked, done=moving)
         self.ranking.uncertainty_mm = mesh_change_mm(self.ranking.evaluations, found, instants)
+
+
+def estimate_words(J_mm: Mapping[str, float]) -> str:
+    """One line on estimates of J_hat in mm by path, the least first."""
+    found = ", ".join(f"{name} {value:.2f}" for name, value in J_mm.items())
+    return f"estimated mean deviation [mm]: {found}"
 
 
 def begin_study(job: Job, folder: Path, context: RunContext) -> None:

@@ -397,7 +397,7 @@ def test_candidates_say_their_rank(study):
     assert modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
     root.mu_unit.study.folder = str(study)
     live.catch_up()  # as when a simulation has ended
-    known = ranking.ranked(root)
+    known = {name: (j, n) for n, (name, j) in enumerate(ranking.known(root).j.items(), 1)}
     assert sorted(rank for _, rank in known.values()) == list(range(1, 11))
     bpy.ops.mu.path(name="alpha4")
     tubes = {name: candidates.candidate(root, name) for name in known}
@@ -441,7 +441,7 @@ def test_candidates_say_their_rank(study):
     marks = dict(path_legend.marks(ranking.known(root)))
     assert {0.0, 1.0} < set(marks)
     root.mu_unit.chambers.wall_mm = 1.0  # stale: they say so, in grey
-    assert ranking.ranked(root) == {}
+    assert ranking.known(root).stale
     label = modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label")
     assert label == f"α1\n#{known['alpha1'][1]}?"
     assert candidates.candidate(root, "alpha1").data.materials[0].name == "MU Candidate"
