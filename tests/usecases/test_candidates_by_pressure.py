@@ -171,10 +171,10 @@ def test_a_candidate_that_cannot_be_among_the_best_is_left_with_a_bound(grasping
     """The three best, their digits and their order are those of a full ranking."""
     every, all_found, solved_all = contested(grasping, tmp_path / "all", Contest(3, every=True))
     some, found, solved = contested(grasping, tmp_path / "some", Contest(3))
-    # All ten at the two pressures above 0; of suction the three best all, four others the weaker one.
+    # All ten above 0; of suction the three best and a near one all, two others the weaker one.
     assert (every.at_least_mm, solved_all, solved) == ({}, 40, 30)
-    assert [*found] == ["path0", "path1", "path2"]
-    assert [*some.at_least_mm] == [one.name for one in TEN[3:]]
+    assert [*found] == ["path0", "path1", "path2", "path3"]
+    assert [*some.at_least_mm] == [one.name for one in TEN[4:]]
     for name, deviation in found.items():
         assert np.array_equal(deviation.delta, all_found[name].delta)
     for name, bound in some.at_least_mm.items():

@@ -167,7 +167,7 @@ def _estimates(r: ReportData) -> str:
     rows = [([label(n), anchors[n], f"{j:.2f}"], False) for n, j in r.estimated_mm.items()]
     words = (
         "<p>No path was solved yet. Estimated by the linear response of the unit under pressure; exact ones "
-        "differ by some 10 to 40 %, and paths close to each other may change places.</p>"
+        "differ by some 5 to 30 %, and paths close to each other may change places.</p>"
     )
     head = [("path", ""), ("anchors", "line"), ("estimated Ĵ [mm]", "n")]
     return words + table("Estimated mean deviation, least first.", head, rows)

@@ -435,6 +435,23 @@ def test_candidates_say_their_rank(study):
     assert path_legend.label(root, known_now, order[1])[-1] == "≈#1"
     assert path_legend.UNDECIDED in path_legend.lines(known_now)
     assert path_legend.UNDECIDED in drawn([path_panel.MU_PT_path])
+    # A path that cannot win has a bound in place of its number, and leaves open the rank of those beyond it.
+    last, worst = order[-2:]
+    solved = {name: j for name, j in found["J_hat_mm"].items() if name != last}
+    bound = 0.5 * (solved[order[2]] + solved[order[3]])
+    summary.write_text(json.dumps({**found, "J_hat_mm": solved, "J_hat_at_least_mm": {last: bound}}))
+    some = ranking.known(root)
+    assert [some.rank(name) for name in (order[2], order[3], last, worst)] == ["#3", "", "", ""]
+    words = drawn([path_panel.MU_PT_path])
+    assert f"≥ {bound:.3f}" in words
+    assert path_panel.BOUND in words
+    assert path_legend.label(root, some, last)[-1] == f"≥ {bound:.3f}"
+    # Before any path is solved there are estimates.
+    estimated = {name: value for name, value in found.items() if name not in ("J_hat_mm", "chosen")}
+    summary.write_text(json.dumps({**estimated, "J_hat_estimated_mm": {order[0]: 0.3, last: 0.8}}))
+    words = drawn([path_panel.MU_PT_path])
+    assert path_legend.ESTIMATED in words
+    assert "~ 0.80" in words
     summary.write_text(json.dumps(found))
     share = ranking.known(root).share
     assert (share(order[0]), share(order[-1])) == (0.0, 1.0)
