@@ -5,8 +5,8 @@
 
 `place` runs in a new folder, then with --all-paths in it: the second run solves only what the first left out,
 so that both together are the cost of solving all, on the same work. Seconds are of the processor, of all
-processes, and by the clock. Columns of a path: J_hat in mm estimated before any path is solved, its lower bound
-where it was left out, and its exact value.
+processes, and by the clock. Columns of a path: J_hat in mm estimated before any path is solved, its lower
+bound where it was left out, and its exact value.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ from ...run.progress import Progress, within
 from ...run.versions import package_versions
 from .analysis_mesh import analysis_mesh
 from .candidates_by_pressure import CandidateSolver, solve_candidates
-from .expected import SOLVING, expected_bytes, expected_nodes
+from .expected import PATHS_CHECKED, SOLVING, expected_bytes, expected_nodes
 from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
@@ -55,9 +55,6 @@ _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen
 # Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
 ESTIMATED = "J_hat_estimated_mm"
-# Paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only paths
-# near the best can be tied with it.
-PATHS_CHECKED = 3
 
 
 @attrs.define
