@@ -89,7 +89,7 @@ def add_place(commands: Commands[Any]) -> None:
 
     from ..placement.settings import BEND, LONGEST, SHORTEST
     from ..sensing.guide import Optics
-    from ..usecases.simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+    from ..usecases.simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
 
     constants = ", ".join(f"{name} {value:g}" for name, value in attrs.asdict(Optics()).items())
     command = commands.add_parser(
@@ -102,6 +102,7 @@ def add_place(commands: Commands[Any]) -> None:
     add_setting(command, WORKERS, "N")
     add_setting(solver, STATIONS, "J")
     add_setting(solver, MESH_CHECK)
+    add_setting(solver, ALL_PATHS)
     search = command.add_argument_group("paths, and limits of --paths graph")
     add_setting(search, PATHS)
     search.add_argument(
@@ -151,6 +152,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
             "stations": options.stations,
             "workers": options.workers,
             "mesh_check": options.mesh_check,
+            "all_paths": options.all_paths,
             "paths": options.paths,
             "limits": Limits(options.shortest_cells, options.longest_cells, options.bend_deg),
             "most_checks": options.checks,

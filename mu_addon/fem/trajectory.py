@@ -89,9 +89,9 @@ def simulate(
 ) -> Trajectory:
     """Quasi-static motion of an elastic body: equilibria at times in s and pressures in kPa, (k,) each.
 
-    Every distinct pressure is solved once, outward from 0. on_state: called with each state. load and store:
-    a cache of states by pressure in MPa. A resumed run finds identical states, since each starts only from
-    earlier ones. The state without pressure is solved for only where the model has a load.
+    Every distinct pressure is solved once, outward from 0, suction last. on_state: called with each state.
+    load and store: a cache of states by pressure in MPa. A resumed run finds identical states, since each
+    starts only from earlier ones. The state without pressure is solved for only where the model has a load.
 
     Raises ConvergenceError if a pressure cannot be reached (on_state was called with all states before it),
     and InputError for a body with friction or a law with history, which need `simulate_in_time`.
@@ -116,7 +116,8 @@ def simulate(
     model = equilibrium.model
     start = rest(model.mesh) if model.load is None else state_at(0.0, equilibrium.at_zero_pressure)
     found = {0.0: start}
-    for side in sides:
+    # Under pressure first: nothing touches there, so that those states are soon known.
+    for side in reversed(sides):
         history = [start]
         for pressure in side:
             found[pressure] = state_at(

@@ -74,10 +74,10 @@ def line_style(path: Path) -> dict[str, Any]:
     }
 
 
-def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: Floats | None = None) -> str:
+def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, means: Sequence[str] = ()) -> str:
     """SVG of the unit's section and, next to it, each path as a line between the heights of its anchors.
 
-    chosen: name of the path drawn in colour; j_hat (paths,): mean deviations in mm, written below the lines.
+    chosen: name of the path drawn in colour; means: mean deviations in mm as text, written below the lines.
     """
     left, right, bottom, top = view.extent
     width, wide = 4.2, 1.85  # inches, of which the section's
@@ -115,9 +115,8 @@ def unit_with_paths(view: SideView, paths: Sequence[Path], chosen: str, j_hat: F
                 "ha": "center",
             }
             lanes.annotate(label(path.name), (x, z[-1]), (0, 7), fontsize=8, **words)
-            if j_hat is not None:
-                value = f"{j_hat[x]:.3f}"
-                lanes.annotate(value, (x, z[0]), (0, -8), va="top", rotation=90, fontsize=7.5, **words)
+            if means:
+                lanes.annotate(means[x], (x, z[0]), (0, -8), va="top", rotation=90, fontsize=7.5, **words)
     return svg()
 
 
@@ -217,11 +216,14 @@ def marginal(values: Floats, paths: Sequence[Path], chosen: str, along: str) -> 
 def ranking(result: RankingResult, paths: Sequence[Path]) -> str:
     """SVG of J_hat in mm of every path as a bar, best first.
 
-    The chosen path is coloured, paths tied with it are hatched; error bars give the mesh uncertainty.
+    The chosen path is coloured, paths tied with it are hatched; error bars give the mesh uncertainty. Paths
+    that were not solved have a pale bar of their lower bound.
     """
     order = np.argsort(np.asarray(result.rank), kind="stable")
-    names = [paths[i].name for i in order]
-    values = np.asarray(result.j_hat)[order]
+    bounds = sorted(result.at_least_mm.items(), key=lambda one: one[1])
+    names = [*(paths[i].name for i in order), *(name for name, _ in bounds)]
+    solved = np.asarray(result.j_hat)[order]
+    values = np.append(solved, [bound for _, bound in bounds])
     with canvas(WIDTH, 0.6 + 0.27 * len(names)) as (figure, svg):
         high = 0.6 + 0.27 * len(names)
         axes = figure.add_axes((0.11, 0.45 / high, 0.85, 1.0 - 0.5 / high))
@@ -232,13 +234,15 @@ def ranking(result: RankingResult, paths: Sequence[Path]) -> str:
                 bar.set_color(CHOSEN)
             elif name in result.tied:
                 bar.set(facecolor="#F3C9A8", edgecolor=CHOSEN, hatch="///", linewidth=0.0)
+            elif name in result.at_least_mm:
+                bar.set(facecolor="#E9EDF1")
         if result.uncertainty_mm is not None:
-            axes.errorbar(
-                values, rows, xerr=result.uncertainty_mm, fmt="none", ecolor=INK, elinewidth=1, capsize=2
-            )
+            style: Any = {"fmt": "none", "ecolor": INK, "elinewidth": 1, "capsize": 2}
+            axes.errorbar(solved, rows[: len(solved)], xerr=result.uncertainty_mm, **style)
         clear = (result.uncertainty_mm or 0.0) + 0.015 * values.max()
         for row, value in zip(rows, values, strict=True):
-            axes.text(value + clear, row, f"{value:.3f}", va="center", fontsize=8, color=INK)
+            text = f"{value:.3f}" if row < len(solved) else f"≥ {value:.3f}"
+            axes.text(value + clear, row, text, va="center", fontsize=8, color=INK)
         axes.set_yticks(rows, [label(name) for name in names], fontsize=9)
         axes.tick_params(axis="y", length=0)
         axes.invert_yaxis()

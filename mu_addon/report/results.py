@@ -54,15 +54,16 @@ class Path:
 
 @attrs.frozen(eq=False)
 class RankingResult:
-    """Result of a placement; paths in the order of `ReportData.paths`."""
+    """Result of a placement; solved paths in the order of `ReportData.solved_paths`."""
 
     delta: Floats  # (paths, k times, j stations) mm
     j_hat: Floats  # (paths,) mm
     j_cont: Floats  # (paths,) mm
-    rank: Sequence[int]  # 1 is best
+    rank: Sequence[int]  # 1 is best, among those solved
     chosen: str  # name of the best path
     tied: Sequence[str] = ()  # paths tied with the chosen one within the mesh uncertainty
     uncertainty_mm: float | None = None  # mesh uncertainty of J_hat
+    at_least_mm: Mapping[str, float] = attrs.field(factory=dict)  # of paths not solved, that cannot be best
 
 
 @attrs.frozen(eq=False)
@@ -220,11 +221,12 @@ class Signals:
     """Predicted optical signal of each path, arrays (paths,) in the order of the study's windows.
 
     errors_per_deg: error of a response's slope, per degree, from the law's own; at_rest: share of the light
-    that arrives at rest; j_hat: mean deviations in mm; checks: of the law, by rays, for the path with the
-    least deviation; front: True for a path that is Pareto-optimal in deviation and signal. sets: pairs, then
-    triples, of paths that together resolve the distribution of bending along the unit best, with the
-    logarithm of their information, best first; differential: pairs read against each other, with the slope of
-    their difference per degree, best first.
+    that arrives at rest; j_hat: mean deviations in mm, or lower bounds of them where not solved; checks: of
+    the law, by rays, for the path with the least deviation; front: True for a path that is Pareto-optimal in
+    deviation and signal, None where a bound leaves that open. sets: pairs, then triples, of paths that
+    together resolve the distribution of bending along the unit best, with the logarithm of their information,
+    best first; differential: pairs read against each other, with the slope of their difference per degree,
+    best first.
     """
 
     optics: Optics
@@ -235,9 +237,10 @@ class Signals:
     at_rest: Floats
     checks: Checks
     j_hat: Floats
-    front: tuple[bool, ...]
+    front: tuple[bool | None, ...]
     sets: tuple[tuple[tuple[str, ...], float], ...]
     differential: tuple[tuple[tuple[str, ...], float], ...]
+    solved: tuple[bool, ...]
 
 
 @attrs.frozen(eq=False)
@@ -275,6 +278,7 @@ class ReportData:
     pictures: Sequence[Picture] = ()
     paths: Sequence[Path] = ()
     ranking: RankingResult | None = None
+    estimated_mm: Mapping[str, float] = attrs.field(factory=dict)  # mean deviation before any path is solved
     search: LatticeSearch | None = None
     search_picture: Picture | None = None
     light: Signals | None = None
@@ -298,6 +302,12 @@ class ReportData:
     seconds: Mapping[str, float] = attrs.field(factory=dict)
     versions: Mapping[str, str] = attrs.field(factory=dict)
     files: Mapping[str, str] = attrs.field(factory=dict)  # name in the run's folder -> its content
+
+    @property
+    def solved_paths(self) -> list[Path]:
+        """The paths without those of which the ranking knows only a lower bound."""
+        without = self.ranking.at_least_mm if self.ranking else {}
+        return [path for path in self.paths if path.name not in without]
 
     @property
     def is_partly_compared(self) -> bool:

@@ -167,17 +167,31 @@ def response(angle_deg: Array, share: Array, rest_deg: float = 0.0) -> Response:
     )
 
 
-def pareto(disturbance: Sequence[float], sensitivity: Sequence[float]) -> list[bool]:
-    """Mask of the Pareto-optimal of n candidates: no other disturbs less and senses more.
+def pareto(
+    disturbance: Sequence[float], sensitivity: Sequence[float], known: Sequence[bool] | None = None
+) -> list[bool | None]:
+    """Whether each of n candidates is Pareto-optimal: no other disturbs less and senses more.
 
     disturbance (n,) and sensitivity (n,): each in one unit of the caller's; the sign of a sensitivity does
-    not matter.
+    not matter. known (n,): False where the disturbance is a lower bound; None is then what it leaves open.
+
+    >>> pareto([1.0, 2.0, 2.5], [1.0, 1.5, 1.2])
+    [True, True, False]
+    >>> pareto([1.0, 2.0, 1.5], [1.0, 1.5, 1.2], [True, True, False])
+    [True, True, None]
     """
-    d, s = np.asarray(disturbance, float), np.abs(np.asarray(sensitivity, float))
-    better = (
-        (d[None] <= d[:, None]) & (s[None] >= s[:, None]) & ((d[None] < d[:, None]) | (s[None] > s[:, None]))
-    )
-    return [not row.any() for row in better]
+    low, s = np.asarray(disturbance, float), np.abs(np.asarray(sensitivity, float))
+    high = low if known is None else np.where(known, low, np.inf)
+
+    def beaten(other: Array, own: Array) -> Array:
+        senses = s[None] >= s[:, None]
+        less = (other[None] < own[:, None]) | (s[None] > s[:, None])
+        found = (other[None] <= own[:, None]) & senses & less
+        np.fill_diagonal(found, False)
+        return found.any(axis=1)
+
+    surely, perhaps = beaten(high, low), beaten(low, high)
+    return [False if out else None if open_ else True for out, open_ in zip(surely, perhaps, strict=True)]
 
 
 def best_sets(signals: Array, noise: float, size: int, most: int = 5) -> list[tuple[tuple[int, ...], float]]:

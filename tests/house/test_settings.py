@@ -159,6 +159,7 @@ def test_nodes_have_the_settings_themselves():
         ("simulate", study.TIMES),
         ("simulate", mesh.SELF_CONTACT),
         ("place", study.MESH_CHECK),
+        ("place", study.ALL_PATHS),
         ("sweep", sweep.POINTS),
         ("grip", grip.DENSITY),
         ("export", design.FINE),

@@ -14,7 +14,7 @@ from .report_data import PATHS, results
 DATA = results()
 RANKING = DATA.ranking
 CHARTS = {
-    "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", RANKING.j_hat),
+    "unit": lambda: plots.unit_with_paths(DATA.view, PATHS, "alpha4", [f"{j:.3f}" for j in RANKING.j_hat]),
     "angle": lambda: plots.angle_against_pressure(DATA.pressure_kPa, DATA.angle_deg),
     "protocol": lambda: plots.protocol(DATA.protocol_s, DATA.protocol_kPa),
     "heatmap": lambda: heatmaps.heatmap(RANKING.delta[0], 1.0, True),

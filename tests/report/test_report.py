@@ -197,3 +197,29 @@ def test_instants_that_are_not_compared_stay_empty():
     html = report_html(results(ranking=attrs.evolve(found.ranking, delta=delta)))
     assert "Empty rows are not compared." in html
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)
+
+
+def test_a_path_that_cannot_win_shows_its_bound_and_no_rank():
+    whole = results().ranking
+    kept = [k for k, path in enumerate(results().paths) if path.name not in ("alpha8", "alpha10")]
+    bound = float(np.sort(whole.j_hat)[5] + 1e-4)
+    order = np.argsort(np.argsort(whole.j_hat[kept])) + 1
+    found = attrs.evolve(
+        whole,
+        delta=whole.delta[kept],
+        j_hat=whole.j_hat[kept],
+        j_cont=whole.j_cont[kept],
+        rank=order.tolist(),
+        at_least_mm={"alpha8": bound, "alpha10": bound},
+    )
+    page = Page(report_html(results(ranking=found, pictures=())))
+    assert page.words.count(f"≥ {bound:.4f}") == 2
+    assert "2 others" in page.words
+    assert "certainly exceeded" in page.words
+
+
+def test_a_run_that_stopped_before_any_path_shows_estimates():
+    page = Page(report_html(brief(status="partial", estimated_mm={"alpha4": 0.31, "alpha1": 0.47})))
+    assert "Ranking of the paths" in page.headings
+    assert "Estimated mean deviation, least first." in page.words
+    assert "0.47" in page.words

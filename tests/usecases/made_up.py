@@ -96,6 +96,7 @@ def place(folder, job):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "solve_model_a", model_a)
         patch.setattr("mu_addon.usecases.simulate_and_place.candidate_pool.PrintedWaveguides", Waveguides)
+        patch.setattr(study_module, "estimated_J_mm", lambda *_: {"alpha1": 1.0})
         # Seeking crossings in made-up states takes minutes.
         patch.setattr(
             "mu_addon.usecases.simulate_and_place.motion_checks.first_self_intersection", lambda *_: None

@@ -7,8 +7,9 @@ import pytest
 from mu_addon.design.anchors import anchor_points, windows
 from mu_addon.errors import ConvergenceError
 from mu_addon.fem.protocol import Protocol
-from mu_addon.placement.candidates import Evaluation, candidate_paths
+from mu_addon.placement.candidates import Candidate, Evaluation, candidate_paths
 from mu_addon.placement.deviation import centreline_deviation, deviation_of
+from mu_addon.placement.elimination import Contest
 from mu_addon.run.cache import Cache
 from mu_addon.usecases.simulate_and_place.candidates_by_pressure import CandidateSolver
 from mu_addon.usecases.simulate_and_place.candidates_in_time import evaluations
@@ -142,6 +143,107 @@ def test_a_path_that_ends_on_its_way_from_rest_ends_the_comparison_there(model_a
     ]
     assert sweep.solved_kPa == pytest.approx([-10, 10])
     assert np.isnan(found).all(axis=(0, 2)).tolist() == [False, False, False, False, True]
+
+
+# Candidate n of the made-up sensors bends the unit by a further hundredth less than the one before.
+TEN = [Candidate(f"path{n}", 1, JOBS[0].points) for n in range(10)]
+GRASP = np.array([0.0, -10.0, -20.0, -10.0, 0.0, 10.0, 20.0, 10.0])
+
+
+@pytest.fixture(scope="module")
+def grasping(model_a):
+    mesh, _ = model_a
+    return mesh, made_up.motion(mesh, np.arange(8.0), GRASP)
+
+
+def contested(grasping, folder, contest, **changes):
+    """A contest of ten candidates, their evaluations by name, and how often each pressure was solved."""
+    mesh, trajectory = grasping
+    sweep = CandidateSolver(attrs.evolve(JOB, **changes), Cache(folder), mesh, TEN, GRASP, contest=contest)
+    for state in trajectory.solved[::-1] if sweep._job.workers > 1 else ():
+        sweep.reached(state)
+    found = {e.name: e.deviation for e in sweep.evaluations(trajectory, lambda _: None, verify=True)}
+    sweep.close()
+    return sweep, found, len(list(folder.glob("sweep-*")))
+
+
+def test_a_candidate_that_cannot_be_among_the_best_is_left_with_a_bound(grasping, tmp_path):
+    """The three best, their digits and their order are those of a full ranking."""
+    every, all_found, solved_all = contested(grasping, tmp_path / "all", Contest(3, every=True))
+    some, found, solved = contested(grasping, tmp_path / "some", Contest(3))
+    # All ten above 0; of suction the three best and a near one all, two others the weaker one.
+    assert (every.at_least_mm, solved_all, solved) == ({}, 40, 30)
+    assert [*found] == ["path0", "path1", "path2", "path3"]
+    assert [*some.at_least_mm] == [one.name for one in TEN[4:]]
+    for name, deviation in found.items():
+        assert np.array_equal(deviation.delta, all_found[name].delta)
+    for name, bound in some.at_least_mm.items():
+        assert found["path2"].J_hat < bound < all_found[name].J_hat
+    assert some.path_difference_mm == every.path_difference_mm
+
+
+def test_what_a_margin_lets_in_again_is_solved_from_what_is_kept(grasping, tmp_path):
+    _, found, _ = contested(grasping, tmp_path, Contest(1))
+    assert [*found] == ["path0"]
+    margin = 0.9 * found["path0"].J_hat
+    wider, found, _ = contested(grasping, tmp_path, Contest(1, margin))
+    limit = found["path0"].J_hat + margin
+    assert len(found) > 1
+    assert all(bound > limit for bound in wider.at_least_mm.values())
+
+
+def test_an_earlier_full_ranking_is_shown_in_full(grasping, tmp_path):
+    _, full, _ = contested(grasping, tmp_path, Contest(3, every=True))
+    again, found, _ = contested(grasping, tmp_path, Contest(3))
+    assert again.at_least_mm == {}
+    assert {n: d.J_hat for n, d in found.items()} == {n: d.J_hat for n, d in full.items()}
+
+
+def test_many_pressures_are_interpolated_and_nothing_is_left_out(grasping, tmp_path, monkeypatch):
+    monkeypatch.setattr("mu_addon.usecases.simulate_and_place.candidates_by_pressure.FEW_PRESSURES", 3)
+    sweep, found, _ = contested(grasping, tmp_path, Contest(1))
+    assert (len(found), sweep.at_least_mm) == (10, {})
+
+
+def test_a_pressure_that_one_of_the_best_does_not_reach_opens_the_contest_anew(
+    grasping, tmp_path, monkeypatch
+):
+    solve = Waveguides.states
+
+    def ended(self, number, way):
+        if number == 1 and way[-1].pressure_MPa < -0.015:
+            raise ConvergenceError("no step lowers the potential")
+        return solve(self, number, way)
+
+    monkeypatch.setattr(Waveguides, "states", ended)
+    sweep, found, _ = contested(grasping, tmp_path, Contest(3))
+    assert sweep.not_reached == ["at -20 kPa and beyond (path1: no step lowers the potential)"]
+    assert {"path0", "path1", "path2"} <= {*found}
+    assert all(np.isnan(deviation.delta[2]).all() for deviation in found.values())
+    least = max(found[f"path{n}"].J_hat for n in range(3))
+    assert all(bound > least for bound in sweep.at_least_mm.values())
+
+
+def test_a_loser_without_a_state_costs_the_others_nothing(grasping, tmp_path, monkeypatch):
+    solve = Waveguides.states
+
+    def ended(self, number, way):
+        if number == 9 and way[-1].pressure_MPa < -0.015:
+            raise ConvergenceError("no step lowers the potential")
+        return solve(self, number, way)
+
+    monkeypatch.setattr(Waveguides, "states", ended)
+    sweep, found, _ = contested(grasping, tmp_path, Contest(3, every=True))
+    assert sweep.ended == ["path9 at -20 kPa and beyond (no step lowers the potential)"]
+    assert ([*sweep.at_least_mm], sweep.not_reached) == (["path9"], [])
+    assert np.isfinite(found["path0"].delta).all()
+
+
+def test_where_states_depend_on_the_path_nothing_is_left_out(grasping, tmp_path, monkeypatch):
+    monkeypatch.setattr(Waveguides, "along", 0.05)
+    sweep, found, _ = contested(grasping, tmp_path, Contest(3))
+    assert not sweep.independent_of_path
+    assert (len(found), sweep.at_least_mm) == (10, {})
 
 
 def test_with_history_instants_count_until_the_first_that_a_path_does_not_reach(

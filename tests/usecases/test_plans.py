@@ -1,5 +1,6 @@
 """Plans of runs: the stages that a command tells at its start are those that come, and its share grows."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -8,7 +9,7 @@ from mu_addon.design.parameters import Unit, load_preset, to_toml
 from mu_addon.meshing.settings import MeshSettings
 from mu_addon.run import progress
 from mu_addon.usecases.simulate_and_place import job as study
-from mu_addon.usecases.simulate_and_place.expected import TOUCHING, work
+from mu_addon.usecases.simulate_and_place.expected import TOUCHING, Size, plan_of, work
 
 STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
 SMALL = load_preset("mu-0.75x").evolve(count=3)
@@ -77,3 +78,24 @@ def test_suction_takes_longest_where_walls_touch(apart, suction):
     job = study.Job(Unit(), study.grasp(), MeshSettings(), self_contact=apart)
     assert [work(job, [p]) for p in (-20.0, 0.0, 40.0)] == [suction, 0.0, 1.0]
     assert work(job, np.unique(job.samples[1])) == suction + max(suction / 4.0, 1.0) + 4
+
+
+def test_a_plan_follows_what_is_asked_for():
+    """Fewer chambers and paths, no contact, a coarser mesh, fewer pressures: each shortens it at once."""
+    base = Size(6, 1.0, True, known=3)
+    assert Size(6, 1.0, True).factor("Model A") == pytest.approx(1.0)
+    assert Size(6, 1.0, True).factor("candidates") == pytest.approx(1.0)
+    for other in (
+        Size(3, 1.0, True, known=3),
+        Size(6, 1.0, False, known=3),
+        Size(6, 0.5, True, known=3),
+        Size(6, 1.0, True, (10.0, 20.0), known=3),
+    ):
+        for stage in ("Model A", "candidates"):
+            assert other.factor(stage) < 0.8 * base.factor(stage)
+    # Three of ten paths are solved in suction, which is most of the work.
+    left_out = 0.7 * (TOUCHING * 1.25) / (TOUCHING * 1.25 + 4)
+    assert base.factor("candidates") == pytest.approx(1.0 - left_out)
+    job = study.Job(Unit(), study.grasp(), MeshSettings(), self_contact=True)
+    every = attrs.evolve(job, all_paths=True)
+    assert dict(plan_of(job))["candidates"] < dict(plan_of(every))["candidates"]

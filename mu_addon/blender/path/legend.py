@@ -21,6 +21,7 @@ from .candidates import CANDIDATE
 
 BETTER = "Mean deviation [mm], smaller is better"
 """Note on a ranking's numbers, next to the lattice and in the panel."""
+ESTIMATED = "Mean deviation [mm], estimated: no path is solved yet"
 UNDECIDED = "≈: undecided, closer than the mesh's error"
 BESIDE = 190
 """Pixels taken by the legend of a field, to the left of this one."""
@@ -30,12 +31,14 @@ def lines(known: ranking.Known) -> list[str]:
     """Lines above the ramp: its quantity and, if the ranking is stale, a note."""
     if known.stale:
         return ["Mean deviation", "stale (grey): ranked with other parameters"]
+    if known.estimated:
+        return [ESTIMATED]
     return [BETTER, *([UNDECIDED] if known.tied else [])]
 
 
 def marks(known: ranking.Known) -> list[tuple[float, str]]:
     """Share of the ramp's height and text of the smallest, the largest and round values of J between."""
-    low, high = min(known.j.values()), max(known.j.values())
+    low, high = min(known.numbers.values()), max(known.numbers.values())
     if not high > low:
         return [(0.0, f"{low:.3g}")]
     between = [v for v in legend.ticks(low, high) if 0.12 < known.share_of(v) < 0.9]
@@ -45,8 +48,8 @@ def marks(known: ranking.Known) -> list[tuple[float, str]]:
 def label(root: Any, known: ranking.Known, name: str) -> list[str]:
     """Name and rank of a path, with a question mark where the ranking is stale."""
     found = [path_symbol(name)]
-    if name in known.j:
-        found.append(known.rank(name))
+    if below := known.rank(name) or known.mean(name):
+        found.append(below)
     return found
 
 
@@ -68,7 +71,7 @@ def _draw() -> None:
             blf.size(0, size)
             width = blf.dimensions(0, text)[0]
             legend.write(text, end.x - width / 2.0, end.y - 1.3 * size * line - 0.3 * size, size)
-    if known.j and root.mu_motion.legend:
+    if known.numbers and root.mu_motion.legend:
         _legend(context, root, known)
 
 

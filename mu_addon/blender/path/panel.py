@@ -9,9 +9,10 @@ from ...design.anchors import windows
 from ..shared.wording import anchors_of, path_symbol
 from ..unit.base_classes import DONE, UnitPanel, parameters
 from . import ranking
-from .legend import BETTER, UNDECIDED
+from .legend import BETTER, ESTIMATED, UNDECIDED
 from .picking import selected_candidate
 
+BOUND = "≥: cannot be the best, not solved further"
 ORDERS = (
     ("name", "By Name", "As they stand beside the unit"),
     ("deviation", "By Deviation", "The one that disturbs the motion least first"),
@@ -44,18 +45,19 @@ class MU_PT_path(UnitPanel, bpy.types.Panel):
 
 def _list(layout, context, root) -> None:
     """Draw every path: its anchors and, once ranked, its mean deviation and rank."""
-    ranked = ranking.ranked(root)
+    known = ranking.known(root)
+    ranked = bool(known.numbers) and not known.stale
     row = layout.row(align=True)
     row.use_property_split = False
-    row.enabled = bool(ranked)
+    row.enabled = ranked
     row.prop(context.window_manager, "mu_path_order", expand=True)
     # Same height in both cases, so that a click on a run without a ranking moves nothing.
-    layout.label(text=BETTER if ranked else "Simulate to rank them")
-    known = ranking.known(root)
+    words = ESTIMATED if known.estimated else BETTER
+    layout.label(text=words if ranked else "Simulate to rank them")
     if ranked and known.tied:
         layout.label(text=UNDECIDED)
     column = layout.column(align=True)
-    for window in in_order(root, ranked, context.window_manager.mu_path_order):
+    for window in in_order(root, known, context.window_manager.mu_path_order):
         chosen = root.mu_unit.path == window.name
         row = column.split(factor=0.34, align=True)
         icon = "RADIOBUT_ON" if chosen else "RADIOBUT_OFF"
@@ -63,17 +65,21 @@ def _list(layout, context, root) -> None:
         button.name = "none" if chosen else window.name
         row = row.split(factor=0.45)
         row.label(text=anchors_of(window))
-        if window.name in ranked:
-            row.label(text=f"{ranked[window.name][0]:.3f}  {known.rank(window.name)}")
+        if ranked and known.mean(window.name):
+            row.label(text=f"{known.mean(window.name)}  {known.rank(window.name)}".rstrip())
+    if ranked and known.at_least:
+        layout.label(text=BOUND)
 
 
-def in_order(root, ranked, order: str):
-    """Windows of a unit by their names or, if ranked and wanted, the best first."""
+def in_order(root, known: ranking.Known, order: str):
+    """Windows of a unit by their names or, if ranked and wanted, the best first and lower bounds last."""
     found = windows(root.mu_unit.chambers.count)
-    if order == "name":
+    if order == "name" or known.stale:
         return found
+    numbers = {name: (0, j) for name, j in known.numbers.items()}
+    numbers |= {name: (1, bound) for name, bound in known.at_least.items()}
     # Sorting is stable.
-    return sorted(found, key=lambda window: ranked.get(window.name, (float("inf"), 0))[0])
+    return sorted(found, key=lambda window: numbers.get(window.name, (2, 0.0)))
 
 
 CLASSES = (MU_PT_path,)

@@ -19,26 +19,54 @@ class Known:
     """Candidate paths of the shown run: J_hat in mm by name, the best first.
 
     stale: True if it is of a unit with other parameters; tied: paths that differ from the best by less than
-    the error of the mesh, and the best with them.
+    the error of the mesh, and the best with them; at_least: lower bound of J_hat in mm of paths that were not
+    solved further, since they cannot be the best; estimated: J_hat in mm by name before any path is solved.
     """
 
     j: dict[str, float]
     stale: bool = False
     tied: frozenset[str] = frozenset()
+    at_least: dict[str, float] = attrs.field(factory=dict)
+    estimated: dict[str, float] = attrs.field(factory=dict)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """J_hat in mm by name, or else its estimate: what colours show."""
+        return self.j or self.estimated
 
     def rank(self, name: str) -> str:
-        """Rank of a path as text: "#2"; "≈#1" if undecided among the best; "#2?" if stale."""
+        """Rank of a path as text: "#2"; "≈#1" if undecided among the best; "#2?" if stale.
+
+        Empty where a lower bound leaves it open.
+        """
         doubt = "?" if self.stale else ""
-        return f"≈#1{doubt}" if name in self.tied else f"#{list(self.j).index(name) + 1}{doubt}"
+        if name in self.tied:
+            return f"≈#1{doubt}"
+        if name not in self.j or self.j[name] > min(self.at_least.values(), default=np.inf):
+            return ""
+        return f"#{list(self.j).index(name) + 1}{doubt}"
+
+    def mean(self, name: str) -> str:
+        """J_hat of a path in mm as text, or its lower bound; empty without either."""
+        if name in self.j:
+            return f"{self.j[name]:.3f}"
+        if name in self.at_least:
+            return f"≥ {self.at_least[name]:.3f}"
+        return f"~ {self.estimated[name]:.2f}" if name in self.estimated else ""
 
     def share(self, name: str) -> float:
         """Position of a path's J between the smallest, 0, and the largest, 1, shown by its colour."""
-        return self.share_of(self.j[name])
+        return self.share_of(self.numbers[name])
 
     def share_of(self, j: float) -> float:
         """Position of a J in mm, as `share`. Its root, which separates the best paths most."""
+<<<<<<< HEAD
         low, high = min(self.j.values()), max(self.j.values())
         return float(np.sqrt(max(j - low, 0.0) / (high - low))) if high > low else 0.0
+=======
+        low, high = min(self.numbers.values()), max(self.numbers.values())
+        return float(np.sqrt((j - low) / (high - low))) if high > low else 0.0
+>>>>>>> rank
 
 
 def known(root: Any) -> Known:
@@ -47,13 +75,13 @@ def known(root: Any) -> Known:
     if found is None:
         return Known({})
     tied = found.summary.get("tied_with_chosen") or ()
-    return Known(dict(found.ranking), found.stale, frozenset([found.ranking[0][0], *tied] if tied else ()))
-
-
-def ranked(root: Any) -> dict[str, tuple[float, int]]:
-    """J_hat in mm and rank, from 1, of every path by name; empty without results or if they are stale."""
-    found = known(root)
-    return {} if found.stale else {name: (j, rank) for rank, (name, j) in enumerate(found.j.items(), 1)}
+    return Known(
+        dict(found.ranking),
+        found.stale,
+        frozenset([found.ranking[0][0], *tied] if tied else ()),
+        found.run.at_least_mm,
+        found.run.estimated_mm,
+    )
 
 
 def free(root: Any) -> tuple[str, float, Any] | None:
@@ -66,18 +94,28 @@ def free(root: Any) -> tuple[str, float, Any] | None:
 def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
     """Colour and label candidate tubes, objects by path.
 
-    Stale ones are grey, their rank with a question mark.
+    Stale ones are grey, their rank with a question mark; so are those of which only a bound is known.
     """
     found = known(root)
-    for name in found.j:
+    for name in (*found.numbers, *found.at_least):
         if name not in candidates:
             continue
         tube = candidates[name]
         modifier = tube.modifiers[0]
         # Below the name: the tubes are too close for more beside it.
+<<<<<<< HEAD
         set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
         if not found.stale:
             _colour(root, found, name, tube, found.j[name])
+=======
+        below = found.rank(name) or found.mean(name)
+        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{below}")
+        if name in found.numbers and name != root.mu_unit.path and not found.stale:
+            j_colour = field_colours.of_map(found.share(name))
+            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
+            tube.data.materials[0] = colour
+            set_modifier_input(modifier, "Material", colour)
+>>>>>>> rank
         write_colour(tube)
 
 

@@ -32,21 +32,23 @@ def announced(root: Any) -> tuple[float, bool]:
 
 def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
     """The plan, and True if all its long stages were measured: for this unit, else another one."""
-    from ...usecases.simulate_and_place.expected import SOLVED, of_mesh, seconds_of, stage_names
+    from ...usecases.simulate_and_place.expected import PATHS_CHECKED, SOLVED, Size, seconds_of, stage_names
 
     settings = root.mu_unit.study
-    refine = exact(settings.refine)
+    known = 0 if settings.all_paths else PATHS_CHECKED
+    size = Size(root.mu_unit.chambers.count, exact(settings.refine), settings.self_contact, known=known)
+    detail = timings.of_size(size)
     names = stage_names(settings.command == "place", True, settings.paths == "graph")
-    runs = (run for run in studies.runs_of(root) if run.refine == refine)
+    runs = (run for run in studies.runs_of(root) if timings.of_run(run) == detail)
     alike = (run.summary.get("seconds") for run in runs)
     own = next((s for s in alike if isinstance(s, dict) and {*names} - {"report"} <= {*s}), {})
-    taken = {**timings.measured(f"{refine:g}"), **own}
+    taken = {**timings.measured(detail), **own}
 
     def seconds(name: str) -> float:
         value = taken.get(name)
         if isinstance(value, int | float) and value >= 0.0:
             return float(value)
-        return seconds_of(name, of_mesh(refine))
+        return seconds_of(name, size.factor(name))
 
     return [(name, seconds(name)) for name in names], all(name in taken for name in names if name in SOLVED)
 
@@ -76,7 +78,7 @@ def job_of(root: Any) -> Job:
     stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
     extra: dict[str, Any] = {}
     if settings.command == "place":
-        extra["paths"] = settings.paths
+        extra |= {"paths": settings.paths, "all_paths": settings.all_paths}
     if settings.self_contact:
         extra["self_friction"] = round(settings.self_friction, 6)
     body = envelope.envelope_in(root, unit)

@@ -43,6 +43,7 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         layout.prop(study, "command")
         if study.command == "place":
             layout.prop(study, "paths")
+            layout.prop(study, "all_paths")
         layout.prop(study, "refine")
         layout.prop(study, "self_contact")
         if study.self_contact:

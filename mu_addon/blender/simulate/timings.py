@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import MuError
 from ...files import write_text
@@ -16,13 +16,30 @@ from ..jobs import start_child
 from ..shared.compat import user_folder
 from ..shared.file_cache import UNREADABLE, FileCache
 
+if TYPE_CHECKING:
+    from ...usecases.simulate_and_place.expected import Size
+
 LEAST_SHARE = 0.05
 """A stage that took less than this share of its earlier time was cached, and is not a measurement."""
 
 
+def of_size(size: Size) -> str:
+    """Detail under which a simulation's seconds are kept: those of another unit or mesh are other ones."""
+    contact = "contact" if size.self_contact else "no contact"
+    return f"{size.chambers} chambers, refine {size.refine:g}, {contact}"
+
+
+def of_run(run: unit_runs.Run) -> str:
+    """Detail of a run's seconds, as `of_size`."""
+    from ...usecases.simulate_and_place.expected import Size
+
+    contact = bool(run.tables.get("simulate", {}).get("self_contact"))
+    return of_size(Size(run.unit.chambers.count, run.refine, contact))
+
+
 def _of_simulation(folder: Path) -> tuple[str, dict[str, Any]]:
     run = unit_runs.read_run(folder)
-    return f"{run.refine:g}", run.summary["seconds"]
+    return of_run(run), run.summary["seconds"]
 
 
 READERS: dict[str, Callable[[Path], tuple[str, dict[str, Any]]]] = {"simulate": _of_simulation}
@@ -36,7 +53,7 @@ def _file() -> Path:
 
 
 def _every() -> dict[str, Any]:
-    """Content of the file, by detail: of a simulation, the refinement of its mesh."""
+    """Content of the file, by detail: of a simulation, see `of_size`."""
     path = _file()
     return _kept.read([path], lambda: parse_json(file_bytes(path), path.name)) or {}
 

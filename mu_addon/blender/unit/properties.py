@@ -23,7 +23,7 @@ from ...design.parameters import SECTIONS, Unit
 from ...design.quantity import Description, describe
 from ...fem.device import DEVICE
 from ...meshing.settings import REFINE, SELF_CONTACT
-from ...usecases.simulate_and_place.settings import ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
+from ...usecases.simulate_and_place.settings import ALL_PATHS, ORIENTATION, PATHS, PROTOCOL, SELF_FRICTION
 from ..shared.blender_property import blender_property, exact
 from ..shared.registration import property_group_factory
 from ..shared.updates import Signal
@@ -80,6 +80,7 @@ class MU_PG_study(bpy.types.PropertyGroup):
             ),
         ],
     )
+    all_paths: blender_property(ALL_PATHS, name="All Paths in Full")
     # The shipped default takes place an hour; at this one it takes a quarter of an hour.
     refine: blender_property(REFINE._replace(default=0.5), name="Refinement", precision=2, step=5)
     self_contact: blender_property(SELF_CONTACT, name="Self-Contact")

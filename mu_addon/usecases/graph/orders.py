@@ -73,6 +73,7 @@ def _placed(call: Call) -> Job:
         stages=("design", "simulate", "place"),
         stations=s["stations"],
         mesh_check=s["mesh_check"],
+        all_paths=s["all_paths"],
         paths=s["paths"],
         most_checks=s["checks"],
         workers=s["workers"],

@@ -9,7 +9,12 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
+<<<<<<< HEAD
 from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+=======
+from ..grip.settings import COARSE, CUBES, DENSITY
+from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+>>>>>>> rank
 from .parts import refuse_body
 from .shared_settings import (
     ORIENTATION,
@@ -106,7 +111,7 @@ def study_nodes() -> tuple[Definition, ...]:
             "sensor paths, ranked by how much each disturbs the motion",
             (_TAKES_STUDY,),
             (Output("study", "study", "motion and ranking"),),
-            (*(Setting(d) for d in (STATIONS, MESH_CHECK, PATHS, CHECKS, WORKERS)),),
+            (*(Setting(d) for d in (STATIONS, MESH_CHECK, ALL_PATHS, PATHS, CHECKS, WORKERS)),),
             order=of_orders("place_order"),
             read=of_orders("study_of"),
             muting="the study passes on without a ranking",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, as_completed
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
@@ -48,6 +47,17 @@ class Moved(NamedTuple):
     whole: Array
 
 
+class Solved(NamedTuple):
+    """A candidate's results by pressure in MPa; missed: the first that it does not reach, and the reason."""
+
+    found: dict[float, Moved]
+    missed: tuple[float, str] | None = None
+
+
+Ways = Sequence[Sequence[State]]
+"""For each state that a candidate is solved at: Model A's states from rest to it, in order of pressure."""
+
+
 class Evaluator:
     """Solves candidates of a setting at states of Model A, having built the last one's model once."""
 
@@ -65,19 +75,24 @@ class Evaluator:
             job.body,
         )
 
-    def __call__(self, way: Sequence[State], candidate: int) -> list[Moved]:
-        """Results of a candidate, by number, at the last of some states of Model A, or at each of them.
+    def __call__(self, candidate: int, ways: Ways) -> Solved:
+        """Results of a candidate, by number, at the last of the states of each way.
 
-        At each where the candidate had to be followed from rest, see `PrintedWaveguides.states`. Raises
-        ConvergenceError.
+        And at those before it where it had to be followed through them, see `PrintedWaveguides.states`.
         """
-        states = self.printed.states(candidate, way)
-        points = self.printed.points(states)
-        found = []
-        for state, own, anchors in zip(way[-len(states) :], states, points, strict=True):
-            whole = self.printed.of_unit(candidate, own) - state.u if self._whole else np.empty((0, 3))
-            found.append(Moved(anchors, whole.astype(np.float32)))
-        return found
+        found: dict[float, Moved] = {}
+        for way in ways:
+            if way[-1].pressure_MPa in found:
+                continue
+            try:
+                states = self.printed.states(candidate, way)
+            except ConvergenceError as error:
+                return Solved(found, (way[-1].pressure_MPa, error.what))
+            points = self.printed.points(states)
+            for state, own, anchors in zip(way[-len(states) :], states, points, strict=True):
+                whole = self.printed.of_unit(candidate, own) - state.u if self._whole else np.empty((0, 3))
+                found.setdefault(state.pressure_MPa, Moved(anchors, whole.astype(np.float32)))
+        return Solved(found)
 
 
 _evaluator: Evaluator | None = None
@@ -88,9 +103,9 @@ def _start(setting: CandidateProblem) -> None:
     _evaluator = Evaluator(setting, threads=1)
 
 
-def _work(way: Sequence[State], candidate: int) -> list[Moved]:
+def _work(candidate: int, ways: Ways) -> Solved:
     assert _evaluator is not None
-    return _evaluator(way, candidate)
+    return _evaluator(candidate, ways)
 
 
 def _work_alone(candidate: int, pressures_MPa: Array) -> Array:
@@ -103,13 +118,6 @@ def _work_in_time(candidate: int, time_s: Array, pressure_kPa: Array) -> Array:
     return _evaluator.printed.simulated_in_time(candidate, time_s, pressure_kPa)
 
 
-def _found_or_why(solve: Callable[[], list[Moved]]) -> list[Moved] | ConvergenceError:
-    try:
-        return solve()
-    except ConvergenceError as error:
-        return error
-
-
 class CandidatePool:
     """Processes that solve a setting's candidates at states of Model A; started on demand, until closed."""
 
@@ -117,7 +125,7 @@ class CandidatePool:
         self.setting, self.workers = setting, workers
         self._here: Evaluator | None = None
         self._pool = Pool(workers, "candidates", _start, (setting,))
-        self._submitted: dict[tuple[float, int], Future[list[Moved]]] = {}
+        self._submitted: dict[tuple[int, float], Future[Solved]] = {}
 
     @property
     def _evaluator(self) -> Evaluator:
@@ -125,18 +133,18 @@ class CandidatePool:
         self._here = self._here or Evaluator(self.setting, threads=1)
         return self._here
 
-    def submit(self, way: Sequence[State], candidate: int) -> Future[list[Moved]]:
-        """Submit a task of `solve` to a process unless it was; needs two workers or more."""
-        name = way[-1].pressure_MPa, candidate
-        if name not in self._submitted:
-            self._submitted[name] = self._pool.submit(_work, way, candidate)
-        return self._submitted[name]
+    def submit(self, candidate: int, ways: Ways) -> list[Future[Solved]]:
+        """Submit a task of `solve` to a process, without what was; needs two workers or more."""
+        new = [way for way in ways if (candidate, way[-1].pressure_MPa) not in self._submitted]
+        if new:
+            done = self._pool.submit(_work, candidate, new)
+            self._submitted |= {(candidate, way[-1].pressure_MPa): done for way in new}
+        return list(dict.fromkeys(self._submitted[candidate, way[-1].pressure_MPa] for way in ways))
 
     def leave_out(self, pressure_MPa: float) -> None:
         """Drop submitted tasks at a pressure that no process has begun."""
-        for (pressure, _), done in self._submitted.items():
-            if pressure == pressure_MPa:
-                done.cancel()
+        dropped = {done for (_, p), done in self._submitted.items() if p == pressure_MPa and done.cancel()}
+        self._submitted = {one: done for one, done in self._submitted.items() if done not in dropped}
 
     def alone(self, tasks: Sequence[tuple[int, Array]]) -> list[Array]:
         """Anchors (s, p, 3) in mm that candidates, by number, move along their paths through pressures (s,).
@@ -166,23 +174,18 @@ class CandidatePool:
         for done in as_completed(waiting):
             yield waiting[done], self._pool.result(done)
 
-    def solve(
-        self, tasks: Sequence[tuple[Sequence[State], int]]
-    ) -> Iterator[tuple[int, list[Moved] | ConvergenceError]]:
-        """Number of each finished task, and the results of its candidate, or the reason of its failure.
+    def solve(self, tasks: Sequence[tuple[int, Ways]]) -> Iterator[tuple[int, Solved]]:
+        """Number of a candidate and its results, of each part of some tasks that is finished.
 
-        A task: Model A's states on one side of rest, in order of pressure, and a candidate's number. It is
-        solved at the last of these, and possibly at all before it. The same for any `workers`.
+        A task: a candidate's number, and the ways of the states to solve it at. The same for any `workers`.
         """
         if self.workers == 1:
-            for number, (way, candidate) in enumerate(tasks):
-                yield number, _found_or_why(partial(self._evaluator, way, candidate))
+            for candidate, ways in tasks:
+                yield candidate, self._evaluator(candidate, ways)
             return
-        for task in tasks:
-            self.submit(*task)
-        numbers = {self._submitted[way[-1].pressure_MPa, one]: n for n, (way, one) in enumerate(tasks)}
-        for done in as_completed(numbers):
-            yield numbers[done], _found_or_why(partial(self._pool.result, done))
+        candidates = {done: candidate for candidate, ways in tasks for done in self.submit(candidate, ways)}
+        for done in as_completed(candidates):
+            yield candidates[done], self._pool.result(done)
 
     def close(self) -> None:
         """End the processes at once, without waiting for their results."""

@@ -26,14 +26,16 @@ def front_chart(found: Signals, chosen: str) -> str:
     sense = 100 * np.abs([r.sensitivity_per_deg for r in found.responses])
     with canvas(WIDTH, 3.0) as (figure, svg):
         axes = figure.add_axes((0.13, 0.17, 0.83, 0.79))
-        on = np.flatnonzero(found.front)
+        # A path of which only a lower bound is known lies to the right of its ring.
+        on = np.flatnonzero([bool(f) and s for f, s in zip(found.front, found.solved, strict=True)])
         on = on[np.argsort(found.j_hat[on])]
         axes.plot(found.j_hat[on], sense[on], "-", color=QUIET, lw=1, zorder=1)
         for k, name in enumerate(found.names):
             color = CHOSEN if name == chosen else INK if found.front[k] else QUIET
-            axes.plot(found.j_hat[k], sense[k], "o", ms=5, color=color, zorder=2)
+            fill = "full" if found.solved[k] else "none"
+            axes.plot(found.j_hat[k], sense[k], "o", ms=5, color=color, fillstyle=fill, zorder=2)
             axes.annotate(
-                label(name),
+                label(name) if found.solved[k] else f"{label(name)} →",
                 (found.j_hat[k], sense[k]),
                 (5, 3),
                 textcoords="offset points",

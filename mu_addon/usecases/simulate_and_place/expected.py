@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import attrs
 import numpy as np
 
 if TYPE_CHECKING:
@@ -28,6 +29,9 @@ SOLVING = {"Model A": 0.88, "candidates": 0.97}
 """Share of a stage's time until its last equilibrium."""
 TOUCHING = 6.0
 """Factor on the seconds of a state at -20 kPa where walls touch; by the square of that."""
+# The best paths, which the coarser mesh solves too: each costs as much there as on the fine one, and only
+# paths near the best can be tied with it.
+PATHS_CHECKED = 3
 # Pressures in kPa other than 0 of the shipped protocol at the default number of times.
 _SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
@@ -63,7 +67,42 @@ def stage_names(place: bool, mesh_check: bool, graph: bool, simulate: bool = Tru
     return [*names, "report"]
 
 
-def work(job: Job, pressures_kPa: Iterable[float]) -> float:
+@attrs.frozen
+class Size:
+    """What a study's seconds depend on: chambers, refinement, self-contact, pressures (s,) in kPa, paths.
+
+    known: number of paths that are solved at all pressures, where the others may drop out before; 0: all.
+    """
+
+    chambers: int
+    refine: float
+    self_contact: bool
+    pressures_kPa: tuple[float, ...] = _SHIPPED
+    known: int = 0
+
+    @classmethod
+    def of(cls, job: Job) -> Size:
+        """Of a study."""
+        pressure = job.samples[1]
+        states = pressure if job.in_time else np.unique(pressure)
+        known = 0 if job.in_time or job.all_paths else PATHS_CHECKED if job.mesh_check else 1
+        count = job.unit.dimensions.count
+        return cls(count, job.mesh.refine, job.self_contact, tuple(states.tolist()), known)
+
+    def factor(self, stage: str) -> float:
+        """Work of a stage by that of the shipped protocol on the default mesh of six chambers, in contact."""
+        shipped = Size(6, 1.0, True)
+        states = max(work(self, self.pressures_kPa), 1.0) / work(shipped, _SHIPPED)
+        body = of_mesh(self.refine) * self.chambers / 6
+        if stage != "candidates":
+            return body * states
+        paths = (self.chambers - 1) * (self.chambers - 2) / 2
+        suction = work(self, [p for p in self.pressures_kPa if p < 0]) / work(shipped, _SHIPPED)
+        left = suction * max(paths - self.known, 0) if self.known else 0.0
+        return body * (states * paths - left) / 10
+
+
+def work(job: Job | Size, pressures_kPa: Iterable[float]) -> float:
     """Work of the states at these pressures, in units of one under pressure; none at 0 kPa."""
     touches = job.self_contact
     return sum(max(TOUCHING * (p / 20.0) ** 2, 1.0) if touches and p < 0 else 1.0 for p in pressures_kPa if p)
@@ -88,8 +127,5 @@ def plan_of(job: Job) -> Plan:
         names.insert(1, f"solid with {job.path}")
     if not simulates:
         return [*((name, seconds_of(name)) for name in names[:-1]), (names[-1], UNSOLVED_REPORT_S)]
-    _, pressure = job.samples
-    states = work(job, np.unique(pressure)) if not job.in_time else len(pressure)
-    shipped = work(job, _SHIPPED)
-    factor = of_mesh(job.mesh.refine) * max(states, 1) / shipped
-    return [(name, seconds_of(name, factor)) for name in names]
+    size = Size.of(job)
+    return [(name, seconds_of(name, size.factor(name))) for name in names]

@@ -135,7 +135,7 @@ def search_graph(study: Study) -> LatticeSearch:
         paths = {n: graph.nodes[list(chains[n])] for n in numbers.tolist()}
         made = [n for n, points in paths.items() if _is_printable(study, points)]
         candidates = [Candidate(f"path{n}", 0, paths[n]) for n in made]
-        solved = study.solve_candidates(mesh, trajectory, candidates) if candidates else []
+        solved = study.solve_candidates(mesh, trajectory, candidates)[0] if candidates else []
         found = dict(zip(made, (e.deviation.J_hat for e in solved), strict=True))
         return np.array([found.get(n, np.nan) for n in paths])
 

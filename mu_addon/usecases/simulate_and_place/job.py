@@ -33,7 +33,7 @@ from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.guide import Optics
 from .named_effects import NamedEffects
-from .settings import CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
+from .settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
 from .study_file import FILES, FILES_OF, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
@@ -62,6 +62,8 @@ class Job:
     workers: int = WORKERS.field()
     mesh_check: bool = MESH_CHECK.field()
     paths: str = PATHS.field()
+    # Decides no figure, only how many there are.
+    all_paths: bool = ALL_PATHS.field()
     limits: Limits = attrs.field(factory=Limits)
     # Optical constants of the resin, for the signal beside each path's disturbance.
     optics: Optics = attrs.field(factory=Optics)
@@ -186,7 +188,10 @@ class Job:
     @property
     def _run(self) -> dict[str, Any]:
         """The table [run] of study.toml, whose keys decide no figure."""
-        return {"path": self.path} if self.path else {}
+        return {
+            **({"path": self.path} if self.path else {}),
+            **({ALL_PATHS.name: True} if self.all_paths else {}),
+        }
 
     def materials(self, mesh: Mesh) -> Materials:
         """Materials of the unit's mesh, effects and all."""
@@ -320,7 +325,8 @@ def job_of(tables: Mapping[str, Mapping[str, Any]], folder: Path) -> Job:
         if "obstacles" in tables["simulate"]:
             friction = tables["simulate"].get("friction")
             job["obstacles"] = read_rigid_bodies(folder / FILES["obstacles"], friction)
-    job["path"] = read_run(folder).get("path", "")
+    run = read_run(folder)
+    job |= {"path": run.get("path", ""), ALL_PATHS.name: run.get(ALL_PATHS.name, False)}
     return job_with(tables, where, **job)
 
 

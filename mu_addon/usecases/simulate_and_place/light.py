@@ -75,8 +75,9 @@ def _signals(study: Study, optics: Optics) -> Signals:
             errors.append(law.error(ends[1] - ends[0]) / float(np.ptp(angle)))
             slopes.append(_by_cell(law, bar, study.anchors))
         names = tuple(bars)
-        J = np.array([study.ranking.evaluations[name].deviation.J_hat for name in names])
-        best = names[int(J.argmin())]
+        solved, bounds = study.ranking.J_hat_mm, study.ranking.at_least_mm
+        J, known = np.array([solved.get(n, bounds.get(n)) for n in names]), [name in solved for name in names]
+        best = names[int(np.where(known, J, np.inf).argmin())]
         has_gravity = study.job.effects.has_gravity
         checks = _checked(bars[best][1], own[best], angle, optics, has_gravity)
     sizes = [size for size in (2, 3) if size <= len(names)]
@@ -91,7 +92,8 @@ def _signals(study: Study, optics: Optics) -> Signals:
         at_rest=np.array([s.transmitted[0] if has_gravity else s.at_rest for s in found.values()]),
         checks=checks,
         j_hat=J,
-        front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses])),
+        front=tuple(pareto(J.tolist(), [r.sensitivity_per_deg for r in responses], known)),
+        solved=tuple(known),
         sets=_named(names, sets),
         differential=_named(names, pairs),
     )
@@ -172,14 +174,14 @@ def _write(study: Study, found: Signals) -> None:
         rows.append(
             (
                 name,
-                f"{found.j_hat[k]:.9g}",
+                f"{found.j_hat[k]:.9g}" if found.solved[k] else "",
                 f"{r.sensitivity_per_deg:.6g}",
                 f"{found.errors_per_deg[k]:.3g}",
                 f"{r.monotonic_deg[0]:.4g}",
                 f"{r.monotonic_deg[1]:.4g}",
                 f"{r.span:.6g}",
                 f"{found.at_rest[k]:.6g}",
-                int(found.front[k]),
+                "" if found.front[k] is None else int(bool(found.front[k])),
             )
         )
     columns = [

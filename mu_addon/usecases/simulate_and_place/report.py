@@ -64,7 +64,7 @@ def _headline(r: ReportData) -> str:
     html = ""
     if found is not None:
         best = _index(r, found.chosen)
-        path = r.paths[best]
+        path = r.solved_paths[best]
         html += (
             f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
             f"{path.anchors}: of {len(r.paths)} candidates it has the smallest mean deviation, "
@@ -76,7 +76,7 @@ def _headline(r: ReportData) -> str:
     chosen = found.chosen if found is not None else ""
     sensor = f" and the sensor along {_name(chosen)}" if chosen else ""
     section = figure(
-        plots.unit_with_paths(r.view, r.paths, chosen, found.j_hat if found is not None else None),
+        plots.unit_with_paths(r.view, r.paths, chosen, _means(r)),
         "Left: the unit cut open along the plane in which it bends, inlet below, with anchors P1 to "
         f"P{len(r.view.anchors)}{sensor}. Right: every candidate path at its true height"
         + (", with its mean deviation in mm." if found is not None else "."),
@@ -103,7 +103,11 @@ def _key_figures(r: ReportData, found: RankingResult) -> str:
     facts = [("mean deviation Ĵ", f"{found.j_hat[order[0]]:.3f} mm")]
     if len(order) > 1:
         second = order[1]
-        facts.append(("runner-up", f"{_name(r.paths[second].name)}, {found.j_hat[second]:.3f} mm"))
+        facts.append(("runner-up", f"{_name(r.solved_paths[second].name)}, {found.j_hat[second]:.3f} mm"))
+    if found.at_least_mm:
+        least = min(found.at_least_mm.values())
+        facts.append((f"{len(found.at_least_mm)} others", f"at least {least:.3f} mm"))
+    elif len(order) > 1:
         worst = order[-1]
         facts.append(("worst", f"{_name(r.paths[worst].name)}, {found.j_hat[worst]:.3f} mm"))
     if len(r.angle_deg):
@@ -116,7 +120,7 @@ def _key_figures(r: ReportData, found: RankingResult) -> str:
 def _ranking(r: ReportData) -> str:
     found = r.ranking
     if found is None:
-        return ""
+        return _estimates(r)
     over = "the compared part of the pressure cycle" if r.is_partly_compared else "the whole pressure cycle"
     tied = f" Hatched: tied with {_name(found.chosen)}." if found.tied else ""
     whiskers = (
@@ -128,18 +132,45 @@ def _ranking(r: ReportData) -> str:
         "<p>Ĵ is the mean distance between the unit with the sensor and the unit without it, over the line "
         f"of anchors and {over}. Smaller is better.</p>"
     )
+    if found.at_least_mm:
+        words += (
+            "<p>A path marked ≥ was solved no further once its deviation certainly exceeded that of the best "
+            "paths: Ĵ is a mean of distances, so that the part already solved bounds it from below.</p>"
+        )
+    light = " Pale: lower bound." if found.at_least_mm else ""
     bars = figure(
-        plots.ranking(found, r.paths),
-        f"Mean deviation of every path, best first.{tied}{whiskers}",
+        plots.ranking(found, r.solved_paths),
+        f"Mean deviation of every path, best first.{tied}{whiskers}{light}",
         f"Bar chart of the mean deviation; {found.chosen} is best.",
     )
     head = [("path", ""), ("anchors", "line"), ("rank", "n"), ("Ĵ [mm]", "n"), ("J cont [mm]", "n")]
     rows = []
-    for i, path in enumerate(r.paths):
-        figures = found.rank[i], f"{found.j_hat[i]:.4f}", f"{found.j_cont[i]:.4f}"
+    least = min(found.at_least_mm.values(), default=np.inf)
+    solved = [path.name for path in r.solved_paths]
+    for path in r.paths:
+        if path.name in found.at_least_mm:
+            figures = "", f"≥ {found.at_least_mm[path.name]:.4f}", ""
+        else:
+            i = solved.index(path.name)
+            rank = str(found.rank[i]) if found.j_hat[i] <= least else ""
+            figures = rank, f"{found.j_hat[i]:.4f}", f"{found.j_cont[i]:.4f}"
         rows.append(([label(path.name), path.anchors, *figures], path.name == found.chosen))
     every = table("Every path. J cont: root mean square instead of mean.", head, rows)
     return f'{words}<div class="pair">{bars}<div>{every}</div></div>'
+
+
+def _estimates(r: ReportData) -> str:
+    """Estimated deviations, of a run that solved no path."""
+    if not r.estimated_mm:
+        return ""
+    anchors = {path.name: path.anchors for path in r.paths}
+    rows = [([label(n), anchors[n], f"{j:.2f}"], False) for n, j in r.estimated_mm.items()]
+    words = (
+        "<p>No path was solved yet. Estimated by the linear response of the unit under pressure; exact ones "
+        "differ by some 5 to 30 %, and paths close to each other may change places.</p>"
+    )
+    head = [("path", ""), ("anchors", "line"), ("estimated Ĵ [mm]", "n")]
+    return words + table("Estimated mean deviation, least first.", head, rows)
 
 
 def _search(r: ReportData) -> str:
@@ -189,6 +220,7 @@ def _light(r: ReportData) -> str:
     low, high = mine.monotonic_deg
     front = (
         "The line joins the Pareto-optimal paths: no path has both a smaller deviation and a larger signal."
+        + ("" if all(s.solved) else " Rings: at least so large a deviation.")
     )
     caption = (
         "Chosen path in colour; dots: ray tracing through the bent waveguide, bars: two standard errors."
@@ -214,13 +246,13 @@ def _light(r: ReportData) -> str:
         (
             [
                 label(name),
-                f"{s.j_hat[k]:.4f}",
+                f"{'' if s.solved[k] else '≥ '}{s.j_hat[k]:.4f}",
                 signed(f"{100 * s.responses[k].sensitivity_per_deg:.2f}"),
                 f"{100 * s.errors_per_deg[k]:.2f}",
                 signed(f"{s.responses[k].monotonic_deg[0]:.1f}"),
                 f"{s.responses[k].monotonic_deg[1]:.1f}",
                 f"{100 * s.at_rest[k]:.1f}",
-                "yes" if s.front[k] else "",
+                {True: "yes", False: "", None: "open"}[s.front[k]],
             ],
             name == chosen,
         )
@@ -378,7 +410,7 @@ def _heatmaps(r: ReportData) -> str:
             f"Deviation of {path.name} over length and time, at most {np.nanmax(found.delta[i]):.2f} mm.",
             "best" if path.name == found.chosen else "",
         )
-        for i, path in enumerate(r.paths)
+        for i, path in enumerate(r.solved_paths)
     )
     bar = figure(heatmaps.color_bar(top), "", f"Colour scale from 0 to {top:.2f} mm.", "bar")
     return (
@@ -395,11 +427,11 @@ def _marginals(r: ReportData) -> str:
         return ""
     along_length, over_time = np.nanmean(found.delta, axis=1), found.delta.mean(axis=2)
     charts = figure(
-        plots.marginal(along_length, r.paths, found.chosen, "length"),
+        plots.marginal(along_length, r.solved_paths, found.chosen, "length"),
         "Deviation along the length, averaged over time.",
         "Mean deviation of every path against length.",
     ) + figure(
-        plots.marginal(over_time, r.paths, found.chosen, "time"),
+        plots.marginal(over_time, r.solved_paths, found.chosen, "time"),
         "Deviation over time, averaged over the length.",
         "Mean deviation of every path against time.",
     )
@@ -462,7 +494,16 @@ def _name(path: str) -> str:
 
 
 def _index(r: ReportData, name: str) -> int:
-    return next(i for i, path in enumerate(r.paths) if path.name == name)
+    return next(i for i, path in enumerate(r.solved_paths) if path.name == name)
+
+
+def _means(r: ReportData) -> list[str]:
+    """Mean deviation of every path in mm as text, or its lower bound; empty without a ranking."""
+    if r.ranking is None:
+        return []
+    known = dict(zip((path.name for path in r.solved_paths), r.ranking.j_hat, strict=True))
+    bounds = r.ranking.at_least_mm
+    return [f"{known[p.name]:.3f}" if p.name in known else f"≥ {bounds[p.name]:.3f}" for p in r.paths]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -130,7 +130,8 @@ def report_data(
     """Data of the report of a study, complete or stopped early for a reason."""
     job, d = study.job, study.job.unit.dimensions
     windows = study.windows
-    complete = all(w.name in study.ranking.evaluations for w in windows)
+    known = {**study.ranking.evaluations, **study.ranking.at_least_mm}
+    complete = all(w.name in known for w in windows)
     moved_kPa, angle_deg = study.motion_in_order()
     ranking = _ranking(study) if complete else None
     return ReportData(
@@ -143,6 +144,7 @@ def report_data(
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
         ranking=ranking,
+        estimated_mm={} if ranking else study.estimated_mm,
         search=study.search,
         search_picture=search_picture,
         light=study.light,
@@ -172,7 +174,8 @@ def report_data(
 def _ranking(study: Study) -> RankingResult:
     from ...placement.deviation import rank
 
-    found = [study.ranking.evaluations[w.name].deviation for w in study.windows]
+    solved = study.ranking.evaluations
+    found = [solved[w.name].deviation for w in study.windows if w.name in solved]
     j_hat = np.array([d.J_hat for d in found])
     return RankingResult(
         delta=np.array([d.delta for d in found]),
@@ -182,6 +185,7 @@ def _ranking(study: Study) -> RankingResult:
         chosen=study.ranking.chosen,
         tied=study.ranking.tied,
         uncertainty_mm=study.ranking.uncertainty_mm,
+        at_least_mm=study.ranking.at_least_mm,
     )
 
 

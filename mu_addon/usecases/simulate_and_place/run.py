@@ -15,7 +15,7 @@ from .graph_search import chains_within, search_graph, sensitivity_map
 from .job import Job, read_job
 from .light import signals
 from .report_data import write_report
-from .study import Study, begin_study
+from .study import ESTIMATED, Study, begin_study, estimate_words
 from .study_file import LAYOUT
 
 
@@ -86,10 +86,15 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
         # Without a sign on what rounds to nothing.
         ends = [(p, round(a, 1) + 0.0) for p, a in (ends[0], ends[-1])]
         lines.append("angle: " + ", ".join(f"{a:+.1f} deg at {p:g} kPa" for p, a in ends))
+    if (estimated := summary.get(ESTIMATED)) and not summary.get("chosen"):
+        lines.append(estimate_words(estimated))
     if name := summary.get("chosen"):
         tied = summary["tied_with_chosen"]
         equal = f", tied with {', '.join(tied)}" if tied else ""
         lines.append(f"best path: {name}, J_hat {summary['J_hat_mm'][name]:.4f} mm{equal}")
+        if bounds := summary.get("J_hat_at_least_mm"):
+            paths = ", ".join(f"{name} {bound:.3f}" for name, bound in bounds.items())
+            lines.append(f"not solved further, J_hat at least [mm]: {paths}; --all-paths solves them")
     search = summary.get("search")
     if isinstance(search, dict):
         best = search["best"]

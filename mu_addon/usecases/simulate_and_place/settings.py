@@ -28,6 +28,12 @@ PATHS = described(
     "included",
     choices=("windows", "graph"),
 )
+ALL_PATHS = described(
+    "all_paths",
+    False,
+    "solve every path at every pressure; else a path is left, with a lower bound, once it certainly deviates "
+    "more than the best",
+)
 CHECKS = described(
     "checks", 100, "largest number of paths of the lattice solved by the full model", low=2, high=100_000
 )

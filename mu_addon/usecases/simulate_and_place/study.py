@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ...design.solid import Solid, build_solid
 from ...design.stl_and_nodes import write_nodes, write_stl
 from ...errors import ConvergenceError, InputError, MeshingError
 from ...fem.bending_angle import TipSection
+from ...fem.factor import IndefiniteError
 from ...fem.model import Model
 from ...fem.state import State, rest
 from ...fem.trajectory import Trajectory
@@ -25,6 +26,7 @@ from ...materials.library import load_material
 from ...meshing.mesh import Mesh
 from ...meshing.quality import Quality, mesh_quality
 from ...placement.candidates import Candidate, Evaluation, candidate_paths
+from ...placement.elimination import Contest
 from ...reading import file_bytes, parse_json
 from ...report.motion_files import write_model_a
 from ...report.results import CONTACT_COLUMNS, ContactHistory, LatticeSearch, Signals, nearest_to_break
@@ -36,11 +38,12 @@ from ...run.progress import Progress, within
 from ...run.versions import package_versions
 from .analysis_mesh import analysis_mesh
 from .candidates_by_pressure import CandidateSolver, solve_candidates
-from .expected import SOLVING, expected_bytes, expected_nodes
+from .expected import PATHS_CHECKED, SOLVING, expected_bytes, expected_nodes
 from .job import Job
 from .model_a import history_of_wall, solve_model_a
 from .motion_checks import doubts_of_job, doubts_of_motion
 from .motion_tables import Row, in_order, instants, write_motion, write_self_contact, write_stretch
+from .path_estimate import estimated_J_mm
 from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES
 from .study_file import LAYOUT, NAME
@@ -51,9 +54,7 @@ Array = np.ndarray[Any, Any]
 _FIGURE_OF_STAGE = {"design": "gates", "simulate": "angle_deg", "place": "chosen"}
 # Refinement of a coarser mesh, to estimate the mesh uncertainty of a ranking.
 COARSER = 0.7
-# Paths that the coarser mesh solves, the best ones: each costs as much as on the fine mesh, and only paths
-# near the best can be tied with it.
-PATHS_CHECKED = 3
+ESTIMATED = "J_hat_estimated_mm"
 
 
 @attrs.define
@@ -75,6 +76,8 @@ class Study:
     self_contact: list[Row] = attrs.field(factory=list)
     search: LatticeSearch | None = None
     light: Signals | None = None
+    estimated_mm: dict[str, float] = attrs.field(factory=dict)
+    _estimates: bool = False
     _ahead: CandidateSolver | None = None
 
     @classmethod
@@ -213,9 +216,11 @@ class Study:
         job, samples, states = self.job, self.job.samples, SOLVING["Model A"]
         with self.progress.stage("Model A"):
             model = job.model(self.mesh)
+            comparable = len(self.candidates) > 1 and not job.in_time
+            self._estimates = candidates_beside and comparable
             if candidates_beside and job.workers > 1 and not job.in_time:
                 self._ahead = CandidateSolver(
-                    job, self.cache, self.mesh, self.candidates, samples[1], whole=True
+                    job, self.cache, self.mesh, self.candidates, samples[1], whole=True, contest=self.contest
                 )
             try:
                 self.trajectory, self.contact = solve_model_a(
@@ -247,6 +252,21 @@ class Study:
             angles[f"{state.pressure_kPa:.6g}"] = self.bending_angle_deg(state.u)
         if self._ahead is not None:
             self._ahead.reached(state)
+        if self._estimates and state.pressure_kPa == self.job.samples[1].max() > 0.0:
+            self._estimate()
+
+    def _estimate(self) -> None:
+        """Estimate the paths' deviation from the states under pressure, long before they are solved."""
+        assert self.mesh is not None
+        under = [state for state in self.states if state.pressure_MPa > 0.0]
+        try:
+            found = estimated_J_mm(self.job, self.cache, self.mesh, under)
+        except (InputError, IndefiniteError):
+            # No response where Model A is unstable or the mesh is coarse: the paths are solved all the same.
+            return
+        self.estimated_mm = dict(sorted(found.items(), key=lambda one: one[1]))
+        self.context.summary[ESTIMATED] = self.estimated_mm
+        self.progress.update(0.0, estimate_words(self.estimated_mm))
 
     def _keep_partial_motion(self) -> None:
         """Write the motion found before a failure; it is partial in summary.json."""
@@ -291,18 +311,38 @@ class Study:
         assert self.mesh is not None
         assert self.trajectory is not None
         with self.progress.stage("candidates"):
-            found = self.solve_candidates(
-                self.mesh, self.trajectory, self.candidates, self._ahead, verify=True, to_look_at=True
-            )
-        self.ranking = Ranking({e.name: e for e in found})
+            self._rank(self.contest, self._ahead)
         self._write_ranking()
         if self.job.mesh_check:
             try:
                 self._compare_meshes()
-            except (ConvergenceError, MeshingError) as error:
+            except (ConvergenceError, InputError, MeshingError) as error:
                 self.warn(f"The mesh uncertainty is not known: on the coarser mesh, {error.what}.")
+            if self.ranking.may_be_tied:
+                with self.progress.stage("candidates"):
+                    self._rank(attrs.evolve(self.contest, margin_mm=self.ranking.uncertainty_mm or 0.0))
             self._write_ranking()
         return self.ranking.chosen
+
+    @property
+    def contest(self) -> Contest:
+        """The paths whose deviation is to be known exactly: the best one, or those of the mesh check."""
+        return Contest(PATHS_CHECKED if self.job.mesh_check else 1, every=self.job.all_paths)
+
+    def _rank(self, contest: Contest, under_way: CandidateSolver | None = None) -> None:
+        """Solve the candidates as far as a contest needs; the ranking keeps its mesh uncertainty."""
+        assert self.mesh is not None
+        assert self.trajectory is not None
+        found, at_least_mm = self.solve_candidates(
+            self.mesh,
+            self.trajectory,
+            self.candidates,
+            under_way,
+            verify=True,
+            to_look_at=True,
+            contest=contest,
+        )
+        self.ranking = Ranking({e.name: e for e in found}, self.ranking.uncertainty_mm, at_least_mm)
 
     def _write_ranking(self) -> None:
         self.context.summary |= self.ranking.write(self.folder, self.job, self.candidates)
@@ -316,8 +356,11 @@ class Study:
         verify: bool = False,
         to_look_at: bool = False,
         done: float = 0.0,
-    ) -> list[Evaluation]:
-        """Evaluation of every candidate on a mesh against its Model A; see `candidates_by_pressure`.
+        contest: Contest | None = None,
+    ) -> tuple[list[Evaluation], dict[str, float]]:
+        """Evaluation of candidates on a mesh against its Model A; see `candidates_by_pressure`.
+
+        And lower bounds of J_hat in mm, by name, of those that a contest does without.
 
         to_look_at: also keep the paths' motion; of the study's own mesh or the whole body's. done: share of
         the stage that is done before.
@@ -327,8 +370,20 @@ class Study:
         update = within(self.progress.update, done, 1.0)
         solving = SOLVING["candidates"] if shown else 1.0
         found, figures = solve_candidates(
-            self.job, self.cache, mesh, trajectory, candidates, update, solving, under_way, verify, shown
+            self.job,
+            self.cache,
+            mesh,
+            trajectory,
+            candidates,
+            update,
+            solving,
+            under_way,
+            verify,
+            shown,
+            contest,
         )
+        at_least_mm = figures.pop("at_least_mm", {})
+        self.warn(*(f"No deviation is known of {path}." for path in figures.pop("ended", ())))
         if not figures.pop("independent_of_path", True):
             self.warn(
                 "A candidate started from Model A's states does not lie on its own equilibrium path from "
@@ -338,7 +393,7 @@ class Study:
         paths = "Paths" if mesh is self.mesh else "On the coarser mesh, paths"
         self.warn(*(f"{paths} are not compared {where}." for where in figures["not_reached"]))
         self.context.summary.setdefault("sweep", {})[f"{len(mesh.nodes)} nodes"] = figures
-        return found
+        return found, at_least_mm
 
     def _compare_meshes(self) -> None:
         """Find the ranking's mesh uncertainty: both meshes at the protocol's extreme pressures.
@@ -361,9 +416,14 @@ class Study:
             mesh = analysis_mesh(job, coarse, self.cache, within(update, 0.0, meshing))
             model = job.model(mesh)
             trajectory, _ = solve_model_a(job, self.cache, model, samples, within(update, meshing, moving))
-            found = self.solve_candidates(mesh, trajectory, checked, done=moving)
-        fine = self.ranking.evaluations
-        self.ranking = Ranking(fine, mesh_change_mm(fine, found, instants))
+            found, _ = self.solve_candidates(mesh, trajectory, checked, done=moving)
+        self.ranking.uncertainty_mm = mesh_change_mm(self.ranking.evaluations, found, instants)
+
+
+def estimate_words(J_mm: Mapping[str, float]) -> str:
+    """One line on estimates of J_hat in mm by path, the least first."""
+    found = ", ".join(f"{name} {value:.2f}" for name, value in J_mm.items())
+    return f"estimated mean deviation [mm]: {found}"
 
 
 def begin_study(job: Job, folder: Path, context: RunContext) -> None:

@@ -153,6 +153,18 @@ class Run:
         numbers = ((name, j) for name, j in found.items() if isinstance(j, int | float))
         return sorted(((name, float(j)) for name, j in numbers), key=lambda pair: pair[1])
 
+    @property
+    def estimated_mm(self) -> dict[str, float]:
+        """Estimate of J_hat in mm by path, the best first, of a run that ranked none yet."""
+        found = {} if self.ranking else self.summary.get("J_hat_estimated_mm") or {}
+        return {name: float(value) for name, value in sorted(found.items(), key=lambda one: one[1])}
+
+    @property
+    def at_least_mm(self) -> dict[str, float]:
+        """Lower bound of J_hat in mm of each path that was not solved further."""
+        found = self.summary.get("J_hat_at_least_mm") or {}
+        return {name: float(bound) for name, bound in found.items()}
+
 
 def design_key(
     unit: Unit, body: str, obstacles: Iterable[tuple[str, float]], effects: Mapping[str, Any]

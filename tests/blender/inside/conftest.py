@@ -100,6 +100,7 @@ PLACE = {
     "times": 7,
     "stations": 51,
     "mesh_check": False,
+    "all_paths": True,
     "paths": "graph",
     "limits": Limits(longest_cells=2.0),
     "most_checks": 2,

@@ -165,12 +165,19 @@ def test_the_button_says_what_it_will_take_by_what_was_measured_here(tmp_path, m
     root.mu_unit.study.command = "simulate"
     assert not announced(root)[1]
     assert start_words(root).startswith("Simulate, perhaps ")
-    timings.note("0.5", {"solid": 2.0, "mesh": 8.0, "Model A": 500.0, "report": 30.0})
+    # It follows what is changed: the chambers, and suction without contact.
+    whole, _ = announced(root)
+    root.mu_unit.study.self_contact = False
+    assert announced(root)[0] < 0.7 * whole
+    root.mu_unit.study.self_contact = True
+    timings.note(
+        "6 chambers, refine 0.5, contact", {"solid": 2.0, "mesh": 8.0, "Model A": 500.0, "report": 30.0}
+    )
     assert announced(root) == (540.0, True)
     assert start_words(root) == "Simulate, about 9 min"
     assert dict(plan_of(root))["Model A"] == 500.0, "and the bar counts by the same figure"
     # Found in the cache: that is no time that a new one takes.
-    timings.note("0.5", {"Model A": 1.0})
+    timings.note("6 chambers, refine 0.5, contact", {"Model A": 1.0})
     assert announced(root) == (540.0, True)
     assert [rounded(s) for s in (3, 41, 95, 1500, 7200, 12600)] == [
         "10 s", "40 s", "2 min", "25 min", "2 h", "3 h 30 min",

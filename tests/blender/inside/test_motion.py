@@ -400,7 +400,7 @@ def test_candidates_say_their_rank(study):
     assert modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label") == "α1"
     root.mu_unit.study.folder = str(study)
     live.catch_up()  # as when a simulation has ended
-    known = ranking.ranked(root)
+    known = {name: (j, n) for n, (name, j) in enumerate(ranking.known(root).j.items(), 1)}
     assert sorted(rank for _, rank in known.values()) == list(range(1, 11))
     bpy.ops.mu.path(name="alpha4")
     tubes = {name: candidates.candidate(root, name) for name in known}
@@ -413,8 +413,10 @@ def test_candidates_say_their_rank(study):
     assert width["alpha4"] == pytest.approx(candidates.THICKER * width["alpha1"])
     # The list of the panel is sorted either way, and says what its numbers are.
     by_rank = sorted(known, key=lambda name: known[name][1])
-    assert [w.name for w in path_panel.in_order(root, known, "deviation")] == by_rank
-    assert [w.name for w in path_panel.in_order(root, known, "name")] == [f"alpha{k}" for k in range(1, 11)]
+    assert [w.name for w in path_panel.in_order(root, ranking.known(root), "deviation")] == by_rank
+    assert [w.name for w in path_panel.in_order(root, ranking.known(root), "name")] == [
+        f"alpha{k}" for k in range(1, 11)
+    ]
     words = drawn([path_panel.MU_PT_path])
     assert "Mean deviation [mm], smaller is better" in words.replace("  ", " ")
     assert f"{known['alpha4'][0]:.3f}  #{known['alpha4'][1]}" in words
@@ -443,13 +445,30 @@ def test_candidates_say_their_rank(study):
     assert path_legend.label(root, known_now, order[1])[-1] == "≈#1"
     assert path_legend.UNDECIDED in path_legend.lines(known_now)
     assert path_legend.UNDECIDED in drawn([path_panel.MU_PT_path])
+    # A path that cannot win has a bound in place of its number, and leaves open the rank of those beyond it.
+    last, worst = order[-2:]
+    solved = {name: j for name, j in found["J_hat_mm"].items() if name != last}
+    bound = 0.5 * (solved[order[2]] + solved[order[3]])
+    summary.write_text(json.dumps({**found, "J_hat_mm": solved, "J_hat_at_least_mm": {last: bound}}))
+    some = ranking.known(root)
+    assert [some.rank(name) for name in (order[2], order[3], last, worst)] == ["#3", "", "", ""]
+    words = drawn([path_panel.MU_PT_path])
+    assert f"≥ {bound:.3f}" in words
+    assert path_panel.BOUND in words
+    assert path_legend.label(root, some, last)[-1] == f"≥ {bound:.3f}"
+    # Before any path is solved there are estimates.
+    estimated = {name: value for name, value in found.items() if name not in ("J_hat_mm", "chosen")}
+    summary.write_text(json.dumps({**estimated, "J_hat_estimated_mm": {order[0]: 0.3, last: 0.8}}))
+    words = drawn([path_panel.MU_PT_path])
+    assert path_legend.ESTIMATED in words
+    assert "~ 0.80" in words
     summary.write_text(json.dumps(found))
     share = ranking.known(root).share
     assert (share(order[0]), share(order[-1])) == (0.0, 1.0)
     marks = dict(path_legend.marks(ranking.known(root)))
     assert {0.0, 1.0} < set(marks)
     root.mu_unit.chambers.wall_mm = 1.0  # stale: they say so, in grey
-    assert ranking.ranked(root) == {}
+    assert ranking.known(root).stale
     label = modifier_input(candidates.candidate(root, "alpha1").modifiers[0], "Label")
     assert label == f"α1\n#{known['alpha1'][1]}?"
     assert candidates.candidate(root, "alpha1").data.materials[0].name == "MU Candidate"
