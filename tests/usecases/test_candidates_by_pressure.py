@@ -224,6 +224,23 @@ def test_a_pressure_that_one_of_the_best_does_not_reach_opens_the_contest_anew(
     assert all(bound > least for bound in sweep.at_least_mm.values())
 
 
+def test_a_pressure_missed_under_pressure_is_said_once_and_the_lower_ones_are_kept(
+    grasping, tmp_path, monkeypatch
+):
+    solve = Waveguides.states
+
+    def ended(self, number, way):
+        if number in (1, 4) and way[-1].pressure_MPa > 0.015:
+            raise ConvergenceError("no step lowers the potential")
+        return solve(self, number, way)
+
+    monkeypatch.setattr(Waveguides, "states", ended)
+    sweep, found, _ = contested(grasping, tmp_path, Contest(3))
+    assert sweep.not_reached == ["at 20 kPa and beyond (path1: no step lowers the potential)"]
+    assert {"path0", "path1", "path2"} <= {*found}
+    assert np.isfinite(found["path1"].over_time).tolist() == [True] * 6 + [False, True]
+
+
 def test_a_loser_without_a_state_costs_the_others_nothing(grasping, tmp_path, monkeypatch):
     solve = Waveguides.states
 

@@ -48,10 +48,10 @@ class Moved(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """A candidate's results by pressure in MPa; missed: the first that it does not reach, and the reason."""
+    """A candidate's results by pressure in MPa; missed: why it does not reach others."""
 
     found: dict[float, Moved]
-    missed: tuple[float, str] | None = None
+    missed: dict[float, str]
 
 
 Ways = Sequence[Sequence[State]]
@@ -80,19 +80,20 @@ class Evaluator:
 
         And at those before it where it had to be followed through them, see `PrintedWaveguides.states`.
         """
-        found: dict[float, Moved] = {}
+        found, missed = dict[float, Moved](), dict[float, str]()
         for way in ways:
             if way[-1].pressure_MPa in found:
                 continue
             try:
                 states = self.printed.states(candidate, way)
             except ConvergenceError as error:
-                return Solved(found, (way[-1].pressure_MPa, error.what))
+                missed[way[-1].pressure_MPa] = error.what
+                continue
             points = self.printed.points(states)
             for state, own, anchors in zip(way[-len(states) :], states, points, strict=True):
                 whole = self.printed.of_unit(candidate, own) - state.u if self._whole else np.empty((0, 3))
                 found.setdefault(state.pressure_MPa, Moved(anchors, whole.astype(np.float32)))
-        return Solved(found)
+        return Solved(found, missed)
 
 
 _evaluator: Evaluator | None = None

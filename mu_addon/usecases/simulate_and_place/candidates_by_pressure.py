@@ -409,9 +409,10 @@ class CandidateSolver:
         on_progress(done / total)
         for candidate, solved in self._sweeper.solve(tasks):
             self._keep(candidate, solved)
-            if solved.missed is not None:
-                pressure, why = solved.missed
-                raise _NotReachedError(pressure, self._candidates[candidate].name, why)
+            # A process may have begun before a pressure was left out.
+            if unmet := sorted(states.keys() & solved.missed, key=abs):
+                path = self._candidates[candidate].name
+                raise _NotReachedError(unmet[0], path, solved.missed[unmet[0]])
             done = min(total, done + sum(weight.get(p, 0.0) for p in solved.found))
             on_progress(done / total)
         return {
