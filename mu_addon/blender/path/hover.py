@@ -110,7 +110,6 @@ class MU_GT_candidate(bpy.types.Gizmo):
 
     def draw(self, context):
         root = unit_object.active_root(context)
-<<<<<<< HEAD
         pointed = (self.path if self.is_highlight else "") or _listed
         for name in dict.fromkeys([root.mu_unit.path if root is not None else "", pointed]):
             if name:
@@ -141,38 +140,10 @@ def _draw_path(context: Any, root: Any, name: str, named: bool) -> None:
         return
     size, known = round(13 * scale), ranking.known(root)
     words = path_symbol(name)
-    if name in known.j:
-        words += f": {known.j[name]:.3f} mm{', stale' if known.stale else ''}"
+    if mean := known.mean(name):
+        words += f": {mean} mm{', stale' if known.stale else ''}"
     x, y = line[-1]
     legend.write(words, x + 1.2 * size, y, size)
-=======
-        if not self.is_highlight or not self.path or root is None:
-            return
-        line = None
-        with suppress(InputError):
-            line = _on_screen(context, true_place(root, self.path))
-        tube = candidates.candidate(root, self.path)
-        if line is None or tube is None:
-            return
-        scale = context.preferences.system.ui_scale
-        pairs = np.repeat(line, 2, axis=0)[1:-1].tolist()
-        shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-        batch = batch_for_shader(shader, "LINES", {"pos": [(x, y, 0.0) for x, y in pairs]})
-        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-        for width, colour in (
-            (WIDTH + 2.0 * EDGE, legend.TEXT),
-            (WIDTH, tuple(legend.display(np.array([tube.data.materials[0].diffuse_color]))[0])),
-        ):
-            shader.uniform_float("lineWidth", width * scale)
-            shader.uniform_float("color", colour)
-            batch.draw(shader)
-        size, known = round(13 * scale), ranking.known(root)
-        words = path_symbol(self.path)
-        if mean := known.mean(self.path):
-            words += f": {mean} mm{', stale' if known.stale else ''}"
-        x, y = line[-1]
-        legend.write(words, x + 1.2 * size, y, size)
->>>>>>> rank
 
 
 class MU_GGT_candidates(bpy.types.GizmoGroup):

@@ -54,19 +54,13 @@ class Known:
             return f"≥ {self.at_least[name]:.3f}"
         return f"~ {self.estimated[name]:.2f}" if name in self.estimated else ""
 
-    def share(self, name: str) -> float:
-        """Position of a path's J between the smallest, 0, and the largest, 1, shown by its colour."""
-        return self.share_of(self.numbers[name])
-
     def share_of(self, j: float) -> float:
-        """Position of a J in mm, as `share`. Its root, which separates the best paths most."""
-<<<<<<< HEAD
-        low, high = min(self.j.values()), max(self.j.values())
-        return float(np.sqrt(max(j - low, 0.0) / (high - low))) if high > low else 0.0
-=======
+        """Position of a J in mm between the smallest, 0, and the largest, 1, shown by its colour.
+
+        Its root, which separates the best paths most.
+        """
         low, high = min(self.numbers.values()), max(self.numbers.values())
-        return float(np.sqrt((j - low) / (high - low))) if high > low else 0.0
->>>>>>> rank
+        return float(np.sqrt(max(j - low, 0.0) / (high - low))) if high > low else 0.0
 
 
 def known(root: Any) -> Known:
@@ -103,19 +97,10 @@ def colour_and_label(root: Any, candidates: dict[str, Any]) -> None:
         tube = candidates[name]
         modifier = tube.modifiers[0]
         # Below the name: the tubes are too close for more beside it.
-<<<<<<< HEAD
-        set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{found.rank(name)}")
-        if not found.stale:
-            _colour(root, found, name, tube, found.j[name])
-=======
         below = found.rank(name) or found.mean(name)
         set_modifier_input(modifier, "Label", f"{path_symbol(name)}\n{below}")
-        if name in found.numbers and name != root.mu_unit.path and not found.stale:
-            j_colour = field_colours.of_map(found.share(name))
-            colour = _material(f"MU J {root.mu_unit.uuid[:8]} {name}", j_colour)
-            tube.data.materials[0] = colour
-            set_modifier_input(modifier, "Material", colour)
->>>>>>> rank
+        if name in found.numbers and not found.stale:
+            _colour(root, found, name, tube, found.numbers[name])
         write_colour(tube)
 
 

@@ -9,12 +9,7 @@ from ...design.rigid_body import RigidBody
 from ...design.settings import FRICTION
 from ...errors import InputError
 from ...graph.definition import FILE, Call, Definition, Input, Output, Outputs, Setting, setting
-<<<<<<< HEAD
-from ..simulate_and_place.settings import CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
-=======
-from ..grip.settings import COARSE, CUBES, DENSITY
 from ..simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
->>>>>>> rank
 from .parts import refuse_body
 from .shared_settings import (
     ORIENTATION,
