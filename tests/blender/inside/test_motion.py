@@ -463,8 +463,8 @@ def test_candidates_say_their_rank(study):
     assert path_legend.ESTIMATED in words
     assert "~ 0.80" in words
     summary.write_text(json.dumps(found))
-    share = ranking.known(root).share
-    assert (share(order[0]), share(order[-1])) == (0.0, 1.0)
+    shown = ranking.known(root)
+    assert [shown.share_of(shown.numbers[name]) for name in (order[0], order[-1])] == [0.0, 1.0]
     marks = dict(path_legend.marks(ranking.known(root)))
     assert {0.0, 1.0} < set(marks)
     root.mu_unit.chambers.wall_mm = 1.0  # stale: they say so, in grey
