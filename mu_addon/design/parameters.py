@@ -348,16 +348,8 @@ class Material:
         "kPa",
         0.1,
         10000.0,
-        "effective Young's modulus of the lattice",
+        "effective Young's modulus of the lattice as a block, as measured: no simulation uses it",
         "paper: measured 21.70, 18.34 and 16.38 kPa at 0.75x, 1.0x and 1.5x",
-    )
-    lattice_poisson: float = quantity(
-        0.3,
-        "",
-        0.0,
-        0.495,
-        "effective Poisson's ratio of the lattice",
-        "assumed: the paper prints none; a customary value for an open-cell foam",
     )
     membrane_modulus_kPa: float = quantity(
         2500.0,
@@ -374,14 +366,6 @@ class Material:
         HIGHEST_POISSON,
         "Poisson's ratio of the membrane",
         "assumed: the paper prints none; nearly incompressible, yet free of volumetric locking",
-    )
-    sensor_modulus_kPa: float = quantity(
-        2500.0,
-        "kPa",
-        10.0,
-        1e6,
-        "Young's modulus E_sens of a virtual inclusion",
-        "assumed: the paper says bulk-like and prints none; that of the membrane",
     )
     elongation_at_break: float = quantity(
         1.6,
@@ -401,19 +385,9 @@ class Material:
         return tuple(every)
 
     @property
-    def lattice_modulus_MPa(self) -> float:
-        """Effective Young's modulus of the lattice in MPa."""
-        return in_MPa(self.lattice_modulus_kPa)
-
-    @property
     def membrane_modulus_MPa(self) -> float:
         """Young's modulus of the membrane in MPa."""
         return in_MPa(self.membrane_modulus_kPa)
-
-    @property
-    def sensor_modulus_MPa(self) -> float:
-        """Young's modulus of a virtual inclusion in MPa."""
-        return in_MPa(self.sensor_modulus_kPa)
 
 
 def _printable(unit: Any, field: Any, value: Any) -> None:

@@ -21,8 +21,6 @@ SELF_CONTACT = described(
 )
 OF_CONTINUUM = {
     "material.lattice_modulus_kPa": "material.membrane_modulus_kPa",
-    "material.lattice_poisson": "material.membrane_poisson",
-    "material.sensor_modulus_kPa": "material.membrane_modulus_kPa",
 }
 """Parameters that struts and sensor have not as printed, and those of the resin, which they have."""
 

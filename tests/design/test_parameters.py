@@ -136,7 +136,7 @@ def test_assumptions_are_listed_with_their_reasons():
     listed = {a.path: a for a in assumed(load_preset("mu-1.0x"))}
     for path in ("chambers.wall_mm", "chambers.neck_diameter_mm", "lattice.cells_y_plus", "waveguide.row"):
         assert "paper" in listed[path].reason
-    assert listed["material.sensor_modulus_kPa"].unit == "kPa"
+    assert listed["material.membrane_modulus_kPa"].unit == "kPa"
     assert "chambers.cell_mm" not in listed
     changed = {a.path: a for a in assumed(Unit(chambers=Chambers(wall_mm=0.8)))}
     assert changed["chambers.wall_mm"].value == 0.8

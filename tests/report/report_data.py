@@ -91,7 +91,7 @@ def results(**changes):
             ),
             Parameter("material.lattice_modulus_kPa", 18.34, "kPa", "paper, compression of cubic specimens"),
             Parameter(
-                "material.sensor_modulus_kPa", 3000.0, "kPa", "bulk elastomer at 50 Shore A", assumed=True
+                "material.membrane_modulus_kPa", 3000.0, "kPa", "bulk elastomer at 50 Shore A", assumed=True
             ),
         ),
         "mesh": {

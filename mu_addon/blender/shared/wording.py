@@ -27,7 +27,6 @@ _NAMES = {
     "lattice_modulus_kPa": "Lattice E (kPa)",
     "membrane_modulus_kPa": "Wall E (kPa)",
     "membrane_poisson": "Wall Poisson",
-    "sensor_modulus_kPa": "Sensor E (kPa)",
     "elongation_at_break": "Break Strain",
     "offset_xy_mm": "Offset XY",
     "inclusion_radius_mm": "Inclusion R",

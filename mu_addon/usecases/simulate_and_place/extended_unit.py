@@ -167,7 +167,6 @@ def _all_moduli(unit: Unit, factor: float) -> tuple[Unit, str]:
         m,
         lattice_modulus_kPa=m.lattice_modulus_kPa * factor,
         membrane_modulus_kPa=m.membrane_modulus_kPa * factor,
-        sensor_modulus_kPa=m.sensor_modulus_kPa * factor,
     )
     return attrs.evolve(unit, material=scaled), f"all moduli are {factor:.4g} times as large"
 

@@ -367,11 +367,11 @@ def test_the_sidebar_of_a_unit_that_follows_edits_the_trees_fields():
     assert abs(root.mu_unit.chambers.wall_mm - 1.15) < 1e-6
     assert abs(root.mu_unit.lattice.junction_diameter_mm - 1.5) < 1e-6
     # Material, path and scale, and what operators set.
-    root.mu_unit.material.sensor_modulus_kPa = 900.0
+    root.mu_unit.material.membrane_modulus_kPa = 900.0
     root.mu_unit.scale = 1.5
     bpy.ops.mu.path(name="alpha5")
     assert (tree.nodes["Path"].path, tree.nodes["Profile"].scale) == ("alpha5", 1.5)
-    assert tree.nodes["Assemble Unit"].material_sensor_modulus_kPa == 900.0
+    assert tree.nodes["Assemble Unit"].material_membrane_modulus_kPa == 900.0
     state.refresh(tree)
     assert root.mu_unit.path == "alpha5", "the waveguide is linked with its path"
     bpy.ops.mu.path(name="none")
