@@ -14,7 +14,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2]
 WITHOUT_SOLVER = (
-    "presets", "design", "check", "export", "specimens", "ports", "stream", "record", "replay", "calibrate",
+    "presets", "design", "export", "specimens", "ports", "stream", "record", "replay", "calibrate",
     "prepare",
 )  # fmt: skip
 """Commands for design, the printer and the sensor on the bench, which need no solver."""

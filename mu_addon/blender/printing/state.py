@@ -35,7 +35,7 @@ from ..unit.properties import shape_hash, to_unit
 from .properties import FORMATS, OWN_PRINTER
 
 NEEDED = ("scipy", "manifold3d", "matplotlib")
-"""Modules that these jobs need; STEP also needs gmsh, and reports that itself."""
+"""Modules that these jobs need; a check also needs Warp for its pictures; STEP needs gmsh, and says so."""
 OWN = "own.json"
 """Unit and body of the STL that a check was given."""
 ORDER = ("error", "warning", "info", "pass")
@@ -247,7 +247,8 @@ def errors(found: study_job.Found) -> list[dict[str, Any]]:
 def _job(name: str, given: Any, where: str = "", **more: Any) -> study_job.StudyJob:
     """A study for the printer; where: its folder, if it has not its name."""
     place = partial(folder_of, command=where or name)
-    return study_job.StudyJob(name, PRINTING, place, given, "mu_print", needed=NEEDED, **more)
+    needed = (*NEEDED, "warp") if name == "check" else NEEDED
+    return study_job.StudyJob(name, PRINTING, place, given, "mu_print", needed=needed, **more)
 
 
 CHECK = _job(

@@ -2,7 +2,8 @@
 
 Gestures ignore units. After each gesture this module checks all units, once, and repairs faults. It writes
 nothing without a fault, so that its changes cause only one further check. Undo and redo restore states from
-before a repair; the same check follows them.
+before a repair; the same check follows them. What it has to remember is with the objects, so that undo and
+redo take it along: nothing here has to follow them.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ from ..shared.registration import add_handlers, remove_handlers
 from ..unit import broken, preview_update
 from ..unit import object as unit_object
 
-_holders: dict[str, int] = {}
-"""By UUID: number, kept through undo, of the object that had it before any duplicate."""
-_given: dict[tuple[str, int], str] = {}
-"""UUIDs given to duplicates, by the original's and their own number: a redo gives them again."""
-_hidden: dict[str, bool] = {}
-"""By UUID: True if the unit was hidden at the last check."""
+HOLDER = "mu_holder"
+"""On a root: its number in this session, which undo keeps. A duplicate has that of its original."""
+HIDDEN = "mu_hidden"
+"""On a root: 1 if it was hidden at the last check."""
+_SESSION = uuid.uuid4()
+"""Names of duplicates follow from it: a redo gives them again, and no other session does."""
 _looking = False
 
 
@@ -56,8 +57,7 @@ def look() -> None:
                 found.append(obj)
             elif found is roots and obj.override_library is not None:
                 overrides.append(obj)
-        known = set(_holders.values())
-        new = {root for root in roots if root.session_uid not in known}
+        new = {root for root in roots if not _is_known(root)}
         copies = _separate(roots)
         _follow(shown)
         _bring_into_view(new & _true_sizes([*roots, *overrides], touched))
@@ -72,13 +72,22 @@ def look() -> None:
 
 def own(root: Any) -> None:
     """Give a copied root an identity: a new UUID and a separate folder."""
-    key = displays.uuid_of(root), root.session_uid
-    fresh = _given.setdefault(key, uuid.uuid4().hex)
+    fresh = uuid.uuid5(_SESSION, f"{displays.uuid_of(root)} {root.session_uid}").hex
     with updates.paused():
         if root.mu_unit.uuid:
             root.mu_unit.uuid, root.mu_unit.study.folder = fresh, ""
         else:
             root.mu_gripper.uuid, root.mu_gripper.folder = fresh, ""
+
+
+def _number(root: Any) -> str:
+    """A root's number, of this session alone."""
+    return f"{_SESSION.hex[:8]} {root.session_uid}"
+
+
+def _is_known(root: Any) -> bool:
+    """Return True if a root was there at an earlier check, and is no duplicate of it."""
+    return bool(root.get(HOLDER) == _number(root))
 
 
 def _separate(roots: list[Any]) -> list[Any]:
@@ -87,16 +96,16 @@ def _separate(roots: list[Any]) -> list[Any]:
     by_uuid: dict[str, list[Any]] = {}
     for root in roots:
         by_uuid.setdefault(displays.uuid_of(root), []).append(root)
-    for name, same in by_uuid.items():
-        first = min(same, key=lambda root: (root.session_uid != _holders.get(name), root.name))
-        _holders[name] = first.session_uid
+    for same in by_uuid.values():
+        first = min(same, key=lambda root: (not _is_known(root), root.name))
         for root in same:
             if root != first:
                 own(root)
-                _holders[displays.uuid_of(root)] = root.session_uid
                 if root.mu_unit.uuid:
                     unit_object.separate(root)
                 copies.append(root)
+            if not _is_known(root):
+                root[HOLDER] = _number(root)
     return copies
 
 
@@ -117,8 +126,8 @@ def _follow(shown: list[Any]) -> None:
     changed = {}
     for name, root in roots.items():
         hidden = root.hide_viewport or (layer.objects.get(root.name) == root and root.hide_get())
-        if _hidden.get(name, False) != hidden:
-            changed[name] = _hidden[name] = hidden
+        if bool(root.get(HIDDEN)) != hidden:
+            changed[name] = root[HIDDEN] = hidden
     for obj, root in own_displays:
         if set(obj.users_collection) != set(root.users_collection):
             for collection in obj.users_collection:
@@ -230,8 +239,6 @@ def _after_undo(*_: Any) -> None:
 
 @persistent
 def _after_load(*_: Any) -> None:
-    for kept in (_holders, _given, _hidden):
-        kept.clear()
     broken.forget()
     look()
 
@@ -285,5 +292,3 @@ def register() -> None:
 def unregister() -> None:
     """Unregister them."""
     remove_handlers(_HANDLERS, _CONNECTIONS)
-    for kept in (_holders, _given, _hidden):
-        kept.clear()

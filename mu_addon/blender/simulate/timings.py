@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,14 +66,10 @@ def measured(detail: str) -> dict[str, float]:
     return {str(k): float(v) for k, v in found.items() if isinstance(v, int | float) and v >= 0.0}
 
 
-def announced(detail: str, stages: Iterable[str] = ()) -> float | None:
-    """Expected seconds of the stages of a job of that detail, without any of all of its last one.
-
-    None unless each was measured here.
-    """
+def announced(detail: str) -> float | None:
+    """Expected seconds of a job of that detail: those of all stages of its last one here; None without."""
     taken = measured(detail)
-    every = [taken.get(name) for name in stages or taken]
-    return sum(s for s in every if s is not None) if every and None not in every else None
+    return sum(taken.values()) if taken else None
 
 
 def note(detail: str, seconds: dict[str, float]) -> None:
