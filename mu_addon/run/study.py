@@ -458,8 +458,11 @@ class Study:
         """Seconds of each stage on two cores by the title of its progress, in order."""
         found = {}
         for one in self.stages().values():
-            for member in (one.over.members(self) if one.over else [None]) * bool(one.title):
-                if one.wanted(self) and (title := one.title_of(member)) not in found:
+            if not (one.title and one.wanted(self)):
+                continue
+            members = [] if one.over is None or one.over.grows else one.over.members(self)
+            for title in map(one.title_of, members) if members else (one.title,):
+                if title not in found:
                     found[title] = one.seconds(self, title)
         return found
 

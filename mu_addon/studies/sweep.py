@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -221,7 +221,7 @@ class Sweep(Study):
                 effect = main_effect(x, y)
                 shares[name].append("-" if np.isnan(effect.share) else f"{effect.share:.0%}")
                 alt = f"{output} against {name}: one dot per study, and the mean."
-                drawn.append(Chart(lambda of=(effect, x, y, name, output): effect_chart(*of), "", alt))
+                drawn.append(Chart(partial(effect_chart, effect, x, y, name, output), "", alt))
             yield Beside(drawn, across=3)
         caption = "First-order share of each result's variance due to one input, corrected for chance."
         head = [("input", ""), *((output, "n") for output in outputs)]
@@ -250,7 +250,7 @@ class Sweep(Study):
             alt = (
                 f"{goals[j][0]} against {goals[i][0]}; {len(front)} of {len(own)} studies are Pareto-optimal."
             )
-            drawn.append(Chart(lambda of=(own, goals[i], goals[j], front): front_chart(*of), "", alt))
+            drawn.append(Chart(partial(front_chart, own, goals[i], goals[j], front), "", alt))
         yield Beside(drawn)
         best = pareto(costs)
         columns = [*(name for name, _ in goals), *self.varied]
