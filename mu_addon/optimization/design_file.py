@@ -92,11 +92,11 @@ class Design:
     def simulated(self) -> Design:
         """The design with what decides the values of its units alone: no bound, goal, search or check."""
         asked = tuple(Target("", "", "", t.quantity) for t in self.targets)
-        scatter = {} if self.robust else {"print_tolerance_mm": 0.0, "modulus_tolerance": 0.0}
+        scatter = (self.print_tolerance_mm, self.modulus_tolerance) if self.robust else (0.0, 0.0)
         return attrs.evolve(
             self, unit=attrs.evolve(self.unit, name="unit"), targets=asked, settings=MeshSettings(),
-            check_refine=0.0, search=SearchSettings(), printer="",
-            resin="", document={}, **scatter,
+            check_refine=0.0, search=SearchSettings(), printer="", resin="", document={},
+            print_tolerance_mm=scatter[0], modulus_tolerance=scatter[1],
         )  # fmt: skip
 
     def texts(self) -> dict[str, str]:

@@ -200,7 +200,9 @@ class Search:
         inside = []
         for f, v in zip(self.freedoms, start, strict=True):
             inside.append(
-                (v if v in f.values else f.values[0]) if f.discrete else f.at(np.clip(f.place(v), 0, 1))
+                (v if v in f.values else f.values[0])
+                if f.discrete
+                else f.at(np.clip(f.place(float(v)), 0, 1))
             )
         first = [tuple(inside)]
         for i in self.discrete:

@@ -458,10 +458,12 @@ class Study:
         """Seconds of each stage on two cores by the title of its progress, in order."""
         found: dict[str, float] = {}
         for one in self.stages().values():
-            if not one.title or not one.wanted(self):
+            if not (one.title and one.wanted(self)):
                 continue
-            for title in map(one.title_of, one.over.members(self) if one.over else [None]):
-                found[title] = one.seconds(self, title)
+            members = [] if one.over is None or one.over.grows else one.over.members(self)
+            for title in map(one.title_of, members) if members else (one.title,):
+                if title not in found:
+                    found[title] = one.seconds(self, title)
         return found
 
     def detail(self) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from math import isnan
-from typing import Any
+from typing import Any, TypeAlias
 
 import attrs
 
@@ -40,6 +41,9 @@ NO_UNIT = "breaks a rule of units"
 
 Units = Mapping[Any, "optimization.Evaluated"]
 """Simulated units by values of the freedoms, refinement and whether slopes were asked for."""
+Results: TypeAlias = "optimization.Found"
+Checked = Mapping[int, "optimization.Verified"]
+"""Proposed units on the finer mesh, by their place."""
 
 
 def expected_s(
@@ -204,13 +208,11 @@ class Optimize(Study):
         return f"{len(self.design.targets)} targets, {len(self.design.freedoms)} freedoms"
 
     @section()
-    def answer(
-        self, found: optimization.Found, design: optimization.Design, units: Units,
-        checked: Mapping[int, optimization.Verified] | None = None,
-    ) -> Iterator[Part]:  # fmt: skip
+    def answer(self, found: Results, units: Units, checked: Checked | None = None) -> Iterator[Part]:
         """The outcome, and the proposed units in a line each."""
         from ..optimization.words import changes, outcome, reasons, verdict
 
+        design = self.design
         verified = checked or {}
         words = f"{outcome(found, design.targets)} {verdict([*verified.values()])}".strip()
         yield Sentence(words, terminal=True)
@@ -249,20 +251,18 @@ class Optimize(Study):
         yield Fact("robust", robust_ones, str(robust_ones))
 
     @section()
-    def of_the_model(
-        self, design: optimization.Design, model: evidence.ExtendedModel | None
-    ) -> Iterator[Part]:
+    def of_the_model(self, model: evidence.ExtendedModel | None) -> Iterator[Part]:
         """What of an extended model is left out."""
-        for words in mechanics_of(design, model)[1] if model is not None else ():
+        for words in mechanics_of(self.design, model)[1] if model is not None else ():
             yield Warn(f"the model's {words}", MODEL, repeated=False)
             yield Sentence(f"Of the extended model: {words}.", note=True)
 
     @section()
     def table(
-        self, units: Units, design: optimization.Design, found: optimization.Found | None = None,
-        checked: Mapping[int, optimization.Verified] | None = None,
-    ) -> Iterator[Part]:  # fmt: skip
+        self, units: Units, found: Results | None = None, checked: Checked | None = None
+    ) -> Iterator[Part]:
         """designs.csv: a row for every unit, failed ones included."""
+        design = self.design
         judged = [(i, t) for i, t in enumerate(design.targets) if t.quantity is not None]
         head = ["design", *(f.name for f in design.freedoms)]
         head += [f"{t.name} [{t.unit}]" if t.unit else t.name for _, t in judged]
@@ -279,13 +279,11 @@ class Optimize(Study):
         yield csv("designs.csv", [*head, "meets_all", "proposed", "what"], rows)
 
     @section("front", "Front")
-    def front(
-        self, found: optimization.Found, design: optimization.Design,
-        checked: Mapping[int, optimization.Verified] | None = None,
-    ) -> Iterator[Part]:  # fmt: skip
+    def front(self, found: Results, checked: Checked | None = None) -> Iterator[Part]:
         """Units by two targets, and the course of the search."""
         from ..report import design_charts as charts
 
+        design = self.design
         if not any(o.sound for o in found.observed):
             return
         proposed = found.some(MOST_CHECKED)[: len(checked or ())]
@@ -306,29 +304,23 @@ class Optimize(Study):
         yield Beside([*columns, Chart(lambda: charts.course(design, found), words, alt)])
 
     @section("units", "Proposed units")
-    def proposals(
-        self, found: optimization.Found, checked: Mapping[int, optimization.Verified],
-        design: optimization.Design,
-    ) -> Iterator[Part]:  # fmt: skip
+    def proposals(self, found: Results, checked: Checked) -> Iterator[Part]:
         """Files, pictures and freedoms of the proposed units."""
         from ..optimization.words import shown
         from ..report import design_charts as charts
 
+        design = self.design
         observed = _proposed(found, checked)
         body = design.body
         own = {p: attrs.evolve(design.unit_of(o.design), name=f"proposed-{p}") for p, o in observed.items()}
         for place, unit in own.items():
-            yield File(f"proposed-{place}.toml", lambda path, unit=unit: designs.to_toml(unit))
-            yield File(f"proposed-{place}.png", lambda path, unit=unit: charts.picture(unit, body))
+            yield File(f"proposed-{place}.toml", _made(designs.to_toml, unit))
+            yield File(f"proposed-{place}.png", _made(charts.picture, unit, body))
         titles = {f"{place}: {_state(checked[place])}": unit for place, unit in own.items()}
         size = charts.sizes([design.unit, *own.values()], body)
         yield Beside(
             [
-                Chart(
-                    lambda unit=unit: charts.thumbnail(unit, *size, body),
-                    title,
-                    f"Half section of unit {title}.",
-                )
+                Chart(partial(charts.thumbnail, unit, *size, body), title, f"Half section of unit {title}.")
                 for title, unit in {"start": design.unit, **titles}.items()
             ],
             across=3,
@@ -341,11 +333,9 @@ class Optimize(Study):
         yield Table("Each is saved as proposed-N.toml.", head, rows)
 
     @section("targets", "Targets and errors")
-    def targets(
-        self, found: optimization.Found, checked: Mapping[int, optimization.Verified], units: Units,
-        design: optimization.Design,
-    ) -> Iterator[Part]:  # fmt: skip
+    def targets(self, found: Results, checked: Checked, units: Units) -> Iterator[Part]:
         """Every target of the proposed units, with its errors."""
+        design = self.design
         yield Sentence(
             "Standard errors: the mesh's is the difference to a mesh of refinement "
             f"{design.check_refine:g}; a print's surfaces are off by {design.print_tolerance_mm:g} mm, the "
@@ -373,13 +363,11 @@ class Optimize(Study):
                 yield Sentence(words)
 
     @section("why", "Changes and reasons")
-    def why(
-        self, found: optimization.Found, checked: Mapping[int, optimization.Verified],
-        design: optimization.Design,
-    ) -> Iterator[Part]:  # fmt: skip
+    def why(self, found: Results, checked: Checked) -> Iterator[Part]:
         """What changed from the start, and what moved each target; slopes of the first unit."""
         from ..optimization.words import changes, reasons, sensitivities
 
+        design = self.design
         rows = []
         for place, o in _proposed(found, checked).items():
             changed = changes(design.freedoms, design.start, o.design)
@@ -405,11 +393,9 @@ class Optimize(Study):
             )
 
     @section("inputs", "Inputs")
-    def inputs_shown(
-        self, design: optimization.Design, model: evidence.ExtendedModel | None
-    ) -> Iterator[Part]:
+    def inputs_shown(self, model: evidence.ExtendedModel | None) -> Iterator[Part]:
         """Targets, freedoms and settings."""
-        d = design
+        d = self.design
         yield Table("", [("target", ""), ("asked", "")], [[t.name, t.words] for t in d.targets])
         ranges = [
             [f.name, ", ".join(map(str, f.values)) if f.discrete else f"{f.low:g} to {f.high:g} {f.unit}"]
@@ -428,6 +414,11 @@ class Optimize(Study):
             "extended model": model is not None,
         }
         yield Table("", [("setting", ""), ("", "")], list(facts.items()))
+
+
+def _made(make: Callable[..., Any], *arguments: Any) -> Callable[[Any], Any]:
+    """What makes a file, without its path."""
+    return lambda path: make(*arguments)
 
 
 def _proposed(

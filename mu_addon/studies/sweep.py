@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,8 @@ BEGIN_S = 2.0
 """What the process of a point takes before its first stage and after its last."""
 USUAL = ("angle_range_deg", "mass_g", "J_hat_mm", "J_hat_mm lattice")
 """Figures whose effects are shown by default."""
-FEWEST, MOST_ROWS = 4, 200
-"""Points that say something about an effect, and rows of a table of the page."""
+FEWEST, MOST_ROWS, SAMPLED = 4, 200, 64
+"""Points that say something about an effect, rows of a table of the page, points whose time is expected."""
 Row = dict[str, Any]
 Points = Mapping[int, "parameter_study.Outcome"]
 
@@ -70,9 +70,11 @@ class PlanInput(Input):
 def _expected_s(study: Sweep) -> float:
     from ..usecases.simulate_and_place.expected import plan_of
 
-    jobs = [study.plan.point(number).job for number in range(1, study.plan.size + 1)]
-    stages = [plan_of(job)[:-1] for job in jobs if job is not None]
-    return sum(BEGIN_S + sum(s for _, s in one) for one in stages) / min(max(study.workers, 1), 2)
+    # Some of many points tell enough.
+    numbers = range(1, study.plan.size + 1)[:: -(-study.plan.size // SAMPLED)]
+    jobs = [study.plan.point(number).job for number in numbers]
+    seconds = [BEGIN_S + sum(s for _, s in plan_of(job)[:-1]) for job in jobs if job is not None]
+    return study.plan.size / len(numbers) * sum(seconds) / min(max(study.workers, 1), 2)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -141,17 +143,19 @@ class Sweep(Study):
     def _row(self, number: int, found: parameter_study.Outcome | None) -> Row:
         from ..usecases.parameter_study.results import figures
 
+        inputs = self.plan.values[number - 1]
         if found is None:
-            point = self.plan.point(number)
-            row: Row = {"point": number, "status": "waiting", **point.values}
-            e = point.error
+            e, row = self.plan.error(number), {"point": number, "status": "waiting", **inputs}
             failed = (
                 {"status": "failed", "what": e.what, "where": e.where, "what_to_do": e.remedy} if e else {}
             )
             return row | failed
-        row = {"point": number, "status": found.status, **self.plan.values[number - 1]}
         figured = figures(dict(parse_json(found.summary, TABLE)), self.density)
-        return row | figured | {name: getattr(found, name) for name in LAST}
+        return (
+            {"point": number, "status": found.status, **inputs}
+            | figured
+            | {name: getattr(found, name) for name in LAST}
+        )
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -221,7 +225,7 @@ class Sweep(Study):
                 effect = main_effect(x, y)
                 shares[name].append("-" if np.isnan(effect.share) else f"{effect.share:.0%}")
                 alt = f"{output} against {name}: one dot per study, and the mean."
-                drawn.append(Chart(lambda of=(effect, x, y, name, output): effect_chart(*of), "", alt))
+                drawn.append(Chart(partial(effect_chart, effect, x, y, name, output), "", alt))
             yield Beside(drawn, across=3)
         caption = "First-order share of each result's variance due to one input, corrected for chance."
         head = [("input", ""), *((output, "n") for output in outputs)]
@@ -250,7 +254,7 @@ class Sweep(Study):
             alt = (
                 f"{goals[j][0]} against {goals[i][0]}; {len(front)} of {len(own)} studies are Pareto-optimal."
             )
-            drawn.append(Chart(lambda of=(own, goals[i], goals[j], front): front_chart(*of), "", alt))
+            drawn.append(Chart(partial(front_chart, own, goals[i], goals[j], front), "", alt))
         yield Beside(drawn)
         best = pareto(costs)
         columns = [*(name for name, _ in goals), *self.varied]

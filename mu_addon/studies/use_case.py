@@ -20,7 +20,15 @@ REPORT_S = 5.0
 def use_case(name: str) -> UseCase[Study]:
     """The use case of a study's command."""
     kind = study(name)
-    return UseCase(name, kind.layout(), kind.read, run, console_summary=lambda summary: [], plan_in=plan)
+    return UseCase(
+        name,
+        kind.layout(),
+        kind.read,
+        run,
+        console_summary=lambda summary: [],
+        plan=lambda study: [*study.expected().items(), ("report", REPORT_S)],
+        plan_in=plan,
+    )
 
 
 def run(job: Study, folder: Path, context: RunContext) -> Execution:

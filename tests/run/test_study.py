@@ -19,6 +19,7 @@ from mu_addon.cli.options import add_setting
 from mu_addon.design.parameters import load_preset
 from mu_addon.design.quantity import described
 from mu_addon.errors import ConvergenceError, InputError, OutputError
+from mu_addon.run import execution
 from mu_addon.run.context import RunContext
 from mu_addon.run.execution import Execution
 from mu_addon.run.parts import Fact, File, Sentence, Warn, csv
@@ -410,6 +411,73 @@ def test_a_set_grows_from_its_results_and_a_resumed_one_alike(tmp_path):
     first = raced(tmp_path, sprints=True)
     assert first["times"]["1"]["4"] == 10.0
     assert raced(tmp_path, sprints=True) == first
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Throws(Study):
+    """Throw at marks; those at the same place have one result."""
+
+    name = "throws"
+    files = MappingProxyType({})
+    marks: str = setting(described("marks", "2 5 2 -1", "places"))
+    retry: bool = setting(described("retry", False, "throw again where it missed"), decides=False)
+    scheduler: str = ""
+
+    def title(self):
+        return "Throws"
+
+    @stage(
+        "throws",
+        over=Over(
+            ("mark",),
+            lambda s: range(len(s.marks.split())),
+            gives=lambda s, number: {"mark": int(s.marks.split()[number])},
+        ),
+        again=lambda s, hit: s.retry and not hit,
+        parallel=True,
+    )
+    def hits(self, mark: int) -> bool:
+        THROWN.append(mark)
+        return mark > 0
+
+    @section()
+    def result(self, hits):
+        yield Fact("hits", [*hits.values()], key="hits")
+
+
+THROWN = []
+
+
+def thrown(folder, **given):
+    THROWN.clear()
+    context = RunContext(Progress())
+    Execution(Throws(**given), folder, context).run()
+    return context.summary["hits"], [*THROWN]
+
+
+def test_a_result_depends_on_what_its_member_gives_and_is_made_again_on_request(tmp_path):
+    assert thrown(tmp_path) == ([True, True, True, False], [2, 5, -1])
+    assert thrown(tmp_path, marks="5 -1") == ([True, False], [])
+    assert thrown(tmp_path, marks="5 -1", retry=True) == ([True, False], [-1])
+
+
+def test_a_scheduler_makes_what_is_parallel_and_not_kept(tmp_path, monkeypatch):
+    class Cluster:
+        def __init__(self, address):
+            assert address == "tcp://there:1"
+
+        def results(self, tasks, work, warn):
+            # In another order.
+            yield from ((number, work(*tasks[number])) for number in reversed(range(len(tasks))))
+
+        def close(self):
+            THROWN.append("closed")
+
+    monkeypatch.setattr(execution, "Cluster", Cluster)
+    hits, made = thrown(tmp_path, scheduler="tcp://there:1")
+    assert hits == [True, True, True, False]
+    assert made == [-1, 2, 5, 2, "closed"]
+    assert thrown(tmp_path, scheduler="tcp://there:1") == (hits, [])
 
 
 def test_an_error_in_a_process_is_that_of_the_stage(tmp_path):

@@ -65,8 +65,9 @@ def simulated(monkeypatch):
     return made
 
 
-def started(study, folder):
+def started(study, folder, report=True):
     context = RunContext(Progress([]))
+    context.wants_report = report
     use_case("optimize").start(study, folder, context)
     context.unlock()
     return context.summary, (folder / "designs.csv").read_text()
@@ -91,23 +92,23 @@ def test_it_is_resumed_with_the_same_digits_and_nothing_computed_twice(robust, s
     assert all(words in report for words in ("Optimisation of", "wall_mm", "Targets and errors", "<img"))
 
     simulated.clear()
-    assert started(Optimize.read(tmp_path), tmp_path)[1] == table
+    assert started(Optimize.read(tmp_path), tmp_path, False)[1] == table
     assert simulated == []
     # Killed: some of what was computed is lost, and comes back the same.
     lost = sorted((tmp_path / "cache").glob("units-*.npz"))[::3]
     for path in lost:
         path.unlink()
-    again, same = started(Optimize.read(tmp_path), tmp_path)
+    again, same = started(Optimize.read(tmp_path), tmp_path, False)
     assert same == table
     assert len(simulated) == len(lost)
     assert again["proposed"] == summary["proposed"]
 
 
 def test_a_bound_that_moves_makes_no_simulated_unit_stale(simulated, tmp_path):
-    started(Optimize(design=design_of()), tmp_path)
+    started(Optimize(design=design_of()), tmp_path, False)
     first = {*simulated}
     simulated.clear()
-    started(Optimize(design=design_of(TEXT.replace("low = 1.0", "low = 0.9"))), tmp_path)
+    started(Optimize(design=design_of(TEXT.replace("low = 1.0", "low = 0.9"))), tmp_path, False)
     assert simulated
     assert not {(wall, refine) for wall, refine in simulated if refine == 0.2} & first
 
@@ -127,11 +128,9 @@ def test_scatter_of_the_modulus_moves_an_angle_as_a_pressure_does():
     design = design_of("robust = true\n" + only_angle)
     mechanics, _ = mechanics_of(design, None)
     raw = evaluate(SMALL, design.targets, (), mechanics, uncertainty=design.uncertainty)
-    sides = []
-    for pressure in (2.25, 2.75):
-        other = design_of(only_angle.replace("pressure_kPa = 2.5", f"pressure_kPa = {pressure}"))
-        sides.append(evaluate(SMALL, other.targets, (), mechanics).values[0])
-    assert raw.by_resin[0] == pytest.approx((sides[1] - sides[0]) / 2, rel=0.02)
+    lower = design_of(only_angle.replace("pressure_kPa = 2.5", "pressure_kPa = 2.25"))
+    less = raw.values[0] - evaluate(SMALL, lower.targets, (), mechanics).values[0]
+    assert raw.by_resin[0] == pytest.approx(less, rel=0.05)
     assert raw.by_print[0] > 0
 
 

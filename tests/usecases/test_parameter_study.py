@@ -97,16 +97,6 @@ def test_every_point_is_a_row_whatever_became_of_it(tmp_path, by_formula):
     assert "<script" not in report
 
 
-def test_a_report_of_all_points_says_that_its_run_was_stopped(tmp_path, by_formula):
-    with run_to_end(Progress([])) as context:
-        use_case("sweep").start(Sweep(plan=parse_plan(TEXT, tmp_path), workers=1), tmp_path, context)
-        assert "is partial" not in (tmp_path / "report.html").read_text()
-        raise KeyboardInterrupt
-    page = (tmp_path / "report.html").read_text()
-    assert page.count("This run is partial: stopped by Ctrl-C") == 1
-    assert "chambers.wall_mm" in page
-
-
 def test_what_is_done_stays_done_and_more_can_be_added(tmp_path, by_formula):
     first, _ = swept(TEXT, tmp_path)
     assert len(asked) == 6
@@ -138,16 +128,6 @@ def test_another_range_is_another_sweep_but_shares_its_equal_points(tmp_path, by
     rows, _ = swept(text.replace("steps = 3", "steps = 5"), tmp_path)
     assert (len(first), len(rows), len(asked)) == (3, 5, 2)
     assert (tmp_path / "stale" / "points.csv").is_file()
-
-
-def test_a_damaged_point_is_made_again(tmp_path, by_formula):
-    first, _ = swept(TEXT, tmp_path)
-    path = sorted((tmp_path / "cache").glob("points-*"))[0]
-    whole = bytearray(path.read_bytes())
-    whole[len(whole) // 2] ^= 1
-    path.write_bytes(whole)
-    again, _ = swept(TEXT, tmp_path)
-    assert (again, len(asked)) == (first, 1)
 
 
 def test_a_grid_cannot_be_added_to(tmp_path):

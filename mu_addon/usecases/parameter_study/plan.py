@@ -96,6 +96,8 @@ class Plan:
     maximize: tuple[str, ...] = ()
     counts: tuple[int, ...] = attrs.field(default=attrs.Factory(lambda self: (self.count,), takes_self=True))
 
+    _errors: dict[int, MuError | None] = attrs.field(factory=dict, init=False, repr=False)
+
     def __attrs_post_init__(self) -> None:
         if self.size > MOST_POINTS:
             raise InputError(
@@ -148,6 +150,12 @@ class Plan:
             return Point(number, values, job)
         except MuError as error:
             return Point(number, values, None, error)
+
+    def error(self, number: int) -> MuError | None:
+        """Why there is no study of a point, None of one that breaks no rule; found once."""
+        if number not in self._errors:
+            self._errors[number] = self.point(number).error
+        return self._errors[number]
 
     def task(self, number: int) -> Task | None:
         """The study of a point, None of one that breaks a rule."""

@@ -77,10 +77,10 @@ def run_point(task: Task) -> Outcome:
     if stopped is None and child.result is not None and child.error is None:
         return Outcome("done", *cost, json.dumps(plain(child.result.get("summary", {}))))
     error = stopped or child.error or {}
-    words = {
-        name: str(error.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
-    }
-    return Outcome("failed", *cost, **words)
+    what, where, remedy = (
+        str(error.get(name, "")).replace(str(folder), "") for name in ("what", "where", "what_to_do")
+    )
+    return Outcome("failed", *cost, what=what, where=where, what_to_do=remedy)
 
 
 def _worker() -> str:
