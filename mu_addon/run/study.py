@@ -456,11 +456,12 @@ class Study:
 
     def expected(self) -> dict[str, float]:
         """Seconds of each stage on two cores by the title of its progress, in order."""
-        found = {}
+        found: dict[str, float] = {}
         for one in self.stages().values():
-            for member in (one.over.members(self) if one.over else [None]) * bool(one.title):
-                if one.wanted(self) and (title := one.title_of(member)) not in found:
-                    found[title] = one.seconds(self, title)
+            if one.title and one.wanted(self):
+                for member in one.over.members(self) if one.over else [None]:
+                    title = one.title_of(member)
+                    found[title] = found.get(title) or one.seconds(self, title)
         return found
 
     def detail(self) -> str:
