@@ -35,8 +35,8 @@ def moments(states: Sequence[ChainState]) -> list[tuple[str, int]]:
 
 def pictures(
     shape: Shape, states: Sequence[ChainState], target: Sequence[float], hangs: bool, height: int = 620
-) -> dict[str, Picture]:
-    """Pictures, all to one scale, of the chain at its `moments`, by name of the file's stem.
+) -> list[tuple[str, Picture]]:
+    """Names of files and pictures, all to one scale, of the chain at its `moments`.
 
     target (3,) in mm, or empty; hangs: the base is above.
     """
@@ -59,15 +59,14 @@ def pictures(
     up = _UP if hangs else (0.0, 0.0, 1.0)
     aspect = _aspect(every, up)
     camera = fit(every, _TOWARDS, up, aspect, margin=0.03)
-    found = {}
+    found = []
     for scene, (name, number) in zip(scenes, moments(states), strict=True):
         state = states[number]
         image = render(scene, camera, round(height * aspect), height, background=WHITE)
         p = ", ".join(f"{v:.3g}" for v in state.pressures_kPa)
         caption = f"{name}: {p} kPa, tip turned by {state.angle_deg:.1f}°"
-        found[f"chain_{name.replace(' ', '_')}"] = Picture(
-            png(image), caption, f"The chain of {len(shape.meshes)} units, {name}"
-        )
+        words = f"The chain of {len(shape.meshes)} units, {name}"
+        found.append((f"chain_{name.replace(' ', '_')}.png", Picture(png(image), caption, words)))
     return found
 
 

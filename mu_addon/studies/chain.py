@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from .. import chain, design, meshing
+from .. import chain, design, fem, meshing
 from ..chain.settings import GRAVITY, ORIENTATION, REFINE, TIMES, TIP_MASS
 from ..design.quantity import described
 from ..design.settings import USUAL_RESIN
@@ -209,7 +209,9 @@ class Chain(Study):
     tip_mass_g: float = setting(TIP_MASS, metavar="G")
     tip_force_N: tuple[float, ...] = given(NumbersInput(), default=())
     tip_couple_N_mm: tuple[float, ...] = given(NumbersInput(), default=())
-    resin: str = setting(described("resin", USUAL_RESIN, "resin of the library, for the units' weight"))
+    resin: str = setting(
+        described("resin", USUAL_RESIN, "resin of the library, for the units' weight"), metavar="NAME"
+    )
     times: int = setting(TIMES, metavar="N")
     mesh: MeshTable = given(TableInput(of=lambda: MeshTable), factory=MeshTable)
     joint: chain.Sampling = given(TableInput(of=lambda: chain.Sampling), factory=lambda: chain.Sampling())
@@ -410,22 +412,15 @@ class Chain(Study):
         self, shape: chain.Shape, motion: chain.Motion, reach: tuple[float, ...], orientation_deg: float
     ) -> Iterator[Part]:
         """The chain at its start, most bent and at its end."""
-
-        def draw() -> list[tuple[str, Any]]:
-            from ..report.chain_charts import pictures
-
-            found = pictures(shape, motion.states, reach, abs(orientation_deg) <= 90)
-            return [(f"{name}.png", picture) for name, picture in found.items()]
+        from ..report import chain_charts, vtk
 
         def write(path: Path) -> None:
-            from ..fem import State
-            from ..report.vtk import write_trajectory
-
             mesh = shape.mesh()
-            moved = [State(0.0, shape.places(state) - mesh.nodes) for state in motion.states]
-            write_trajectory(path, mesh, list(zip(motion.time_s.tolist(), moved, strict=True)))
+            moved = [fem.State(0.0, shape.places(state) - mesh.nodes) for state in motion.states]
+            vtk.write_trajectory(path, mesh, list(zip(motion.time_s.tolist(), moved, strict=True)))
 
-        yield Pictures(draw)
+        hangs = abs(orientation_deg) <= 90
+        yield Pictures(lambda: chain_charts.pictures(shape, motion.states, reach, hangs))
         yield File("chain.pvd", write, of=motion)
 
     @section("tip", "The tip")
@@ -434,6 +429,8 @@ class Chain(Study):
     ) -> Iterator[Part]:
         """The way of the tip."""
         import numpy as np
+
+        from ..report import chain_charts as charts
 
         columns = ["time_s", *(f"pressure_{k}_kPa" for k in range(1, len(units) + 1))]
         columns += ["x_mm", "y_mm", "z_mm", "x_error95_mm", "y_error95_mm", "z_error95_mm"]
@@ -454,30 +451,24 @@ class Chain(Study):
             page=False,
         )
 
-        def way() -> str:
-            from ..report.chain_charts import tip_way
-
-            return tip_way(motion.states, reach)
-
-        def angle() -> str:
-            from ..report.chain_charts import over_time
-
-            angles = np.array([state.angle_deg for state in motion.states])
-            error = np.array([state.angle_error_deg for state in motion.states])
-            return over_time(motion.time_s, {"tip against base": angles}, "angle [deg]", error)
-
-        def pressures() -> str:
-            from ..report.chain_charts import over_time
-
-            values = np.array([state.pressures_kPa for state in motion.states]).T
-            named = {f"unit {n}": column for n, column in enumerate(values, 1)}
-            return over_time(motion.time_s, named, "pressure [kPa]")
-
+        angles = {"tip against base": np.array([state.angle_deg for state in motion.states])}
+        error = np.array([state.angle_error_deg for state in motion.states])
+        values = np.array([state.pressures_kPa for state in motion.states]).T
+        named = {f"unit {n}": column for n, column in enumerate(values, 1)}
+        time_s = motion.time_s
         yield Beside(
             [
-                Chart(way, "Grey: lines through the plates; bar: 95 % at the end.", "path of the tip"),
-                Chart(angle, "Band: 95 % by the joints' errors.", "angle of the tip over time"),
-                Chart(pressures, "", "pressures over time"),
+                Chart(
+                    lambda: charts.tip_way(motion.states, reach),
+                    "Grey: lines through the plates; bar: 95 % at the end.",
+                    "path of the tip",
+                ),
+                Chart(
+                    lambda: charts.over_time(time_s, angles, "angle [deg]", error),
+                    "Band: 95 % by the joints' errors.",
+                    "angle of the tip over time",
+                ),
+                Chart(lambda: charts.over_time(time_s, named, "pressure [kPa]"), "", "pressures over time"),
             ]
         )
 

@@ -340,7 +340,7 @@ class Grip(Study):
         """The part, and which cubes it lifts."""
         import numpy as np
 
-        from ..design.surface import stl_bytes
+        from ..report import grasp_charts as charts
 
         x, y, z = *gripper.size_mm, float(np.ptp(part.vertices[:, 2]))
         yield recorded("size_mm", [x, y, z])
@@ -349,7 +349,7 @@ class Grip(Study):
             yield recorded("grasps", {f"{s:g}": figures_of(g) for s, g in grasps.items()})
         size = f"{x:g} x {y:g} x {z:.4g} mm"
         yield Sentence(f"one part of {size}, {part.gates.inner_shells} chambers", terminal=True, page=False)
-        yield File("gripper.stl", lambda path: stl_bytes(part.vertices, part.triangles))
+        yield File("gripper.stl", lambda path: design.stl_bytes(part.vertices, part.triangles))
         yield File("gripper.3mf", lambda path: _threemf(gripper.name, part))
         shown = [Fact("part", size, size), Fact("resin", 0, f"{part.gates.volume_mm3 / 1e3:.3g} ml")]
         words = []
@@ -370,12 +370,8 @@ class Grip(Study):
             )
         answer = " ".join(words) or "The printable part passed every geometry check."
 
-        def picture() -> list[tuple[str, Any]]:
-            from ..report.grasp_charts import part_picture
-
-            return [("gripper.png", part_picture(gripper, part))]
-
-        yield Beside([[Sentence(answer, answer=True), *shown], Pictures(picture)])
+        picture = Pictures(lambda: [("gripper.png", charts.part_picture(gripper, part))])
+        yield Beside([[Sentence(answer, answer=True), *shown], picture])
 
     @section()
     def motions(
@@ -425,25 +421,20 @@ class Grip(Study):
         self, gripper: design.Gripper, mesh: meshing.Mesh, grasps: Mapping[float, grasp.Grasp]
     ) -> Iterator[Part]:
         """Fingers and cube in each phase."""
+        from ..report import grasp_charts as charts
+
         meaning = "; ".join(f"{name}: {words}" for name, words in grasp.MEANING.items())
         yield Sentence(f"{meaning}. The gripper hangs, tips down; fingers are cut open.")
         for side, g in grasps.items():
 
             def pictures(g: grasp.Grasp = g, side: float = side) -> list[tuple[str, Any]]:
-                from ..report.grasp_charts import frames
-
-                named = zip(grasp.NAMES, frames(gripper, mesh, g), strict=True)
+                named = zip(grasp.NAMES, charts.frames(gripper, mesh, g), strict=True)
                 return [(f"frame_{side:g}_{name}.png", picture) for name, picture in named]
 
             yield Sentence(f"Cube of {side:g} mm")
             yield Pictures(pictures)
-
-        def shapes() -> str:
-            from ..report.grasp_charts import shapes
-
-            return shapes(gripper, grasps)
-
-        yield Beside([Chart(shapes, "Lines of anchors; thin lines: the cubes.", "shapes of the fingers")])
+        words = "Lines of anchors; thin lines: the cubes."
+        yield Beside([Chart(lambda: charts.shapes(gripper, grasps), words, "shapes of the fingers")])
 
     @section("force", "Forces")
     def forces(
@@ -473,7 +464,12 @@ class Grip(Study):
             "down_N": "force of a finger along z, down [N]",
             "angle_deg": "bending angle [deg]",
         }
-        yield Beside([_over_time(grasps, name, words) for name, words in labels.items()])
+        yield Beside(
+            [
+                _over_time(grasps, {side: getattr(g, name) for side, g in grasps.items()}, words)
+                for name, words in labels.items()
+            ]
+        )
         yield Table(
             "Values of one whole finger. Slip: largest accumulated slip of any contact point. Gap error: "
             "largest penetration of the finger into the cube, which the penalty method admits.",
@@ -487,18 +483,15 @@ class Grip(Study):
     @section("lift", "Lifting")
     def lifts(self, grasps: Mapping[float, grasp.Grasp]) -> Iterator[Part]:
         """What friction carries."""
+        from ..report import grasp_charts as charts
+
         yield Sentence(
             "A closing finger also elongates and pushes the cube onto its support. The gripper must rise by "
             "some millimetres until friction has reversed and carries the weight; then the cube leaves its "
             "support."
         )
-
-        def chart() -> str:
-            from ..report.grasp_charts import pulling
-
-            return pulling(grasps)
-
-        yield Beside([Chart(chart, "Dots: friction equals the weight.", "force against displacement")])
+        words = "Dots: friction equals the weight."
+        yield Beside([Chart(lambda: charts.pulling(grasps), words, "force against displacement")])
         head = [("cube [mm]", ""), ("mass [g]", "n"), ("weight [N]", "n"), ("held", ""), ("rise [mm]", "n")]
         head += [("friction capacity [N]", "n"), ("capacity / weight", "n"), ("2 mu N / weight", "n")]
         rows = []
@@ -532,14 +525,8 @@ class Grip(Study):
             "and relative to the light at rest. Both fingers have the same model, so their signals are "
             "equal. The optical constants of the resin are assumed: no published values were found."
         )
-
-        def chart() -> str:
-            from ..report.grasp_charts import over_time
-
-            lost = {side: 100.0 * signal.delta for side, signal in light.items()}
-            return over_time({side: grasps[side] for side in light}, lost, "light lost, ΔV/Vf [%]")
-
-        yield Beside([Chart(chart, "", "light over the phases")])
+        lost = {side: 100.0 * signal.delta for side, signal in light.items()}
+        yield Beside([_over_time({side: grasps[side] for side in light}, lost, "light lost, ΔV/Vf [%]")])
 
     @section("assumed", "Assumptions")
     def assumed(
@@ -612,13 +599,10 @@ def _threemf(name: str, part: design.GripperSolid) -> bytes:
     return packed
 
 
-def _over_time(grasps: Mapping[float, grasp.Grasp], name: str, words: str) -> Chart:
-    def draw() -> str:
-        from ..report.grasp_charts import over_time
+def _over_time(grasps: Mapping[float, grasp.Grasp], values: Mapping[float, Any], words: str) -> Chart:
+    from ..report import grasp_charts as charts
 
-        return over_time(grasps, {side: getattr(g, name) for side, g in grasps.items()}, words)
-
-    return Chart(draw, "", words)
+    return Chart(lambda: charts.over_time(grasps, values, words), "", words)
 
 
 def _compared(at_hold: Mapping[float, float], error: Mapping[float, float]) -> str:

@@ -108,7 +108,7 @@ def test_another_resin_brings_its_moduli_its_density_and_its_elongation(tmp_path
     for name, content in found.texts().items():
         (tmp_path / name).write_text(content)
     (tmp_path / "mine.toml").unlink()
-    again = read_design(tmp_path / "design.toml", found.texts()["design.toml"])
+    again = read_design(tmp_path / "design.toml")
     assert again.texts() == found.texts()
     assert again.unit_of((0.9, "resin-1.toml")) == found.unit_of((0.9, "mine.toml"))
 
@@ -134,7 +134,7 @@ def test_a_body_of_ones_own_bounds_the_lattice_and_what_leaves_it_breaks_a_rule(
     for name, content in found.texts().items():
         (tmp_path / name).write_text(content)
     (tmp_path / "box.obj").unlink()
-    assert read_design(tmp_path / "design.toml", found.texts()["design.toml"]).texts() == found.texts()
+    assert read_design(tmp_path / "design.toml").texts() == found.texts()
 
 
 def read(found):
