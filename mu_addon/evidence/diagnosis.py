@@ -14,6 +14,7 @@ from .acceptance import too_far
 from .detection_limits import at_bounds, with_true_limits
 from .drive import denoised_drives
 from .effect import Effect
+from .effects import LEVEL
 from .fit import Fit, Fitter, interval, interval_by_curvature
 from .fitted_zeros import fitted_zeros
 from .found_causes import FALSE_ALARM_RATE, Selection
@@ -56,18 +57,6 @@ OPEN = ("unexplained", "unidentifiable")
 STRAINED = 5.0
 # Noise around the causes larger or smaller than around the base model by this factor replaces it.
 RENEWED = 1.5
-# What is off by as much in a whole record, or wanders in it, as slow noise does.
-ZEROS = frozenset(
-    (
-        "pressure_offset",
-        "pressure_drift",
-        "angle_offset",
-        "angle_drift",
-        "force_drift",
-        "led_drift",
-        "ambient_light",
-    )
-)
 # Times that causes are selected anew under noise that is quieter around those found before.
 QUIETER = 2
 # Number of times that isolated outliers are set aside.
@@ -388,7 +377,7 @@ def _of_no_size(fitter: Fitter, found: Selection) -> str:
     at rest, nor alternates.
     """
     left = fitter.record.values - fitter.predict(found.base.values)
-    drifting = all((c.effect.whose or c.effect.among) and c.effect.name in ZEROS for c in found.causes)
+    drifting = all((c.effect.whose or c.effect.among) and c.effect.name in LEVEL for c in found.causes)
     as_large = {ALTERNATION, BY_TURN} & {*structure(found.table)}
     if not drifting or as_large or not within_scatter(fitter.record, left):
         return ""

@@ -14,7 +14,8 @@ from ..files import write_text
 from ..homogenize.offset_response import OffsetResponse
 from ..reading import file_text, is_number, parse_toml
 from ..toml_writer import Commented, toml_text
-from .effect import LIBRARY, SLIP, Parameter
+from .effect import SLIP, Parameter
+from .effects import DECLARED
 from .verdict import Verdict
 
 
@@ -64,7 +65,7 @@ class ExtendedModel:
     def text(self) -> str:
         """The text of model.toml: each value with sd, low95, high95 and unit; nan is left out."""
         effects = {
-            name: Commented({p: _numbers(f) for p, f in parameters.items()}, (LIBRARY[name][0],))
+            name: Commented({p: _numbers(f) for p, f in parameters.items()}, (DECLARED[name].mechanism,))
             for name, parameters in self.effects.items()
         }
         nuisances = {name: _numbers(f) for name, f in self.nuisances.items()}
@@ -135,7 +136,7 @@ def load_model(path: Path) -> ExtendedModel:
     """Read a model.toml.
 
     Raises InputError if the file cannot be read, is not TOML or lacks a verdict; for a table of another type,
-    an effect that `LIBRARY` lacks, a parameter without a finite value and an unusable table [lattice].
+    an effect that is not declared, a parameter without a finite value and an unusable table [lattice].
     """
     try:
         text = file_text(path)
@@ -158,8 +159,8 @@ def load_model(path: Path) -> ExtendedModel:
         )
     effects = {}
     for name, parameters in document.get("effect", {}).items():
-        if name not in LIBRARY:
-            raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(LIBRARY))
+        if name not in DECLARED:
+            raise InputError(f"no effect {name!r} is known", f"{path}, [effect.{name}]", ", ".join(DECLARED))
         if not isinstance(parameters, dict):
             raise InputError(f"effect.{name} is not a table", str(path), f"write [effect.{name}.PARAMETER]")
         effects[name] = {p: _fitted(path, f"effect.{name}.{p}", table) for p, table in parameters.items()}

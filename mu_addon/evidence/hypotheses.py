@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from .effect import CAMERA, Effect
+from .effect import Effect
+from .effects import CAMERA
 from .fit import Fit, Fitter
 from .found_causes import RIVAL_DELTA_CHI2
 from .plausibility import at_a_bound

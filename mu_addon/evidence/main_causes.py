@@ -7,6 +7,7 @@ import attrs
 from .acceptance import JUMP, bounded_by, doubts, loss, share_by_experiment, sudden
 from .curved_reading import curved_reading
 from .effect import STEP
+from .effects import MEMORY
 from .fit import Fit, Fitter
 from .found_causes import LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import by_search, ranked
@@ -17,8 +18,7 @@ from .rivals import causes_of, nearest, not_chosen, promising_rivals, with_rival
 from .scatter import ALONE
 from .significance import by_count
 
-# Effects by which a specimen remembers its drive, and tests against that drive as it is now.
-MEMORY = frozenset(("viscoelasticity", "rate_independent_hysteresis", "mullins_softening", "fatigue_drift"))
+# Tests against the drive as it is now.
 OF_THE_DRIVE = frozenset(("pressure", "angle", "strain", "added_mass"))
 # Share of a misfit that one effect must take to be named although structure is left, and the factor by which
 # any other one's residual must exceed its own.

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import MuError
 from ..measured import Experiment
-from .effect import BATCH, GEOMETRY, LIBRARY, OF, THICKNESS
+from .effect import BATCH, GEOMETRY, OF, THICKNESS
+from .effects import DECLARED
 from .fit import Fit, Fitter
 from .found_causes import Selection
 from .noise import Whitening
@@ -70,7 +71,9 @@ def propose_experiment(fitter: Fitter, found: Selection, seen: Sequence[Sensitiv
         specimens = BATCH, GEOMETRY
         tied = [n for n in ((THICKNESS, *specimens) if len(drawn) > 1 else specimens) if n in plain]
         asked = tied[:1] or list(plain)
-        words = "; or ".join(dict.fromkeys(own.get(n, LIBRARY.get(n, ("", n))[1]) for n in asked))
+        words = "; or ".join(
+            dict.fromkeys(own.get(n, DECLARED[n].reveals if n in DECLARED else n) for n in asked)
+        )
         return Proposal(words, names, best.expected if best else 0.0)
     return best
 

@@ -8,48 +8,10 @@ import attrs
 import numpy as np
 
 from ..measured import Experiment
-from .effect import (
-    BATCH,
-    CAMERA,
-    FORCE_SCALE,
-    GEOMETRY,
-    HEATING,
-    SLIP,
-    STEP,
-    SUPPLY_LIMIT,
-    SUPPLY_RATE,
-    THICKNESS,
-    Effect,
-    Parameter,
-    factor,
-)
+from .effect import BATCH, FORCE_SCALE, GEOMETRY, HEATING, STEP, THICKNESS, Effect, Parameter, factor
+from .effects import DECLARED
+from .effects.declaration import ALL, BENCH, EITHER
 
-# Instruments and clamps may fail in one experiment, independent of the specimen.
-OF_THE_BENCH = CAMERA.union(
-    (
-        "pressure_offset",
-        "pressure_gain",
-        "pressure_nonlinearity",
-        "pressure_drift",
-        FORCE_SCALE,
-        "force_nonlinearity",
-        "force_drift",
-        "force_lag",
-        "line_lag",
-        SUPPLY_LIMIT,
-        SUPPLY_RATE,
-        "clock_offset",
-        "angle_offset",
-        "angle_drift",
-        "led_drift",
-        "ambient_light",
-        "contact",
-    )
-)
-# Effects of the specimen or of the way it was clamped once.
-OF_EITHER = frozenset(("leak", "seating", "temperature_drift"))
-# Numerics and a machine's frame are the same for all, and a marker's slip has its owner by its moment.
-OF_NONE = frozenset(("mesh_error", "gravity", "frame_compliance", SLIP))
 CHANGE = factor("change", 0.1, "batches differ by 5 to 20 %, struts by more")
 # Elastomers soften by some 0.5 % a kelvin, and double their modulus over some decades of rate at most.
 WARMED = factor("change", 0.1, "self-heating by some 10 K, stiffening by rate", (-0.3, 1.0))
@@ -73,7 +35,7 @@ def owned_effects(effects: Sequence[Effect], experiments: Sequence[Experiment]) 
     """
     found = [] if not experiments else list(coincident_effects(experiments))
     for effect in (*effects, *of_specimens(experiments)):
-        if effect.name in OF_NONE:
+        if DECLARED[effect.name].of == ALL:
             continue
         own = [e for e in experiments if e.kind in effect.kinds]
         for whose, members in owners(effect.name, own).items():
@@ -146,13 +108,14 @@ def strain_rate(experiment: Experiment) -> float:
 def owners(name: str, experiments: Sequence[Experiment]) -> dict[str, list[str]]:
     """Names of experiments by owner: "specimen B", "session 2" or "experiment hold 2"."""
     found: dict[str, list[str]] = {}
-    if name not in OF_THE_BENCH:
+    of = DECLARED[name].of
+    if of != BENCH:
         for e in experiments:
             if e.specimen:
                 found.setdefault(f"specimen {e.specimen}", []).append(e.name)
-    if name in OF_THE_BENCH or name in OF_EITHER:
+    if of in (BENCH, EITHER):
         for e in experiments:
-            if e.session and name in OF_THE_BENCH:
+            if e.session and of == BENCH:
                 found.setdefault(f"session {e.session}", []).append(e.name)
         alone = {members[0] for members in found.values() if len(members) == 1}
         found |= {f"experiment {e.name}": [e.name] for e in experiments if e.name not in alone}

@@ -11,8 +11,10 @@ import numpy as np
 
 from ..measured import Experiment
 from .effect import OF, Effect, Parameter
+from .effects import DECLARED
+from .effects.declaration import ALL, BENCH
 from .fit import Fit, Fitter
-from .owned import OF_NONE, OF_THE_BENCH, of_specimens, scaled_by
+from .owned import of_specimens, scaled_by
 
 Array = np.ndarray[Any, Any]
 
@@ -102,7 +104,7 @@ def pooled_effects(effects: Sequence[Effect], experiments: Sequence[Experiment])
     found = []
     for effect in (*effects, *of_specimens(experiments)):
         size, *shape = effect.parameters
-        if effect.name in OF_NONE:
+        if DECLARED[effect.name].of == ALL:
             continue
         own = [e for e in experiments if e.kind in effect.kinds]
         for among, owners in _groups(effect.name, own).items():
@@ -125,7 +127,7 @@ def sizes_of(effect: Effect) -> tuple[tuple[str, Parameter], ...]:
 def _groups(name: str, experiments: Sequence[Experiment]) -> dict[str, tuple[str, ...]]:
     """Names of owners by group: specimens, or sessions and experiments for instruments."""
     named = {"specimen": [e.specimen for e in experiments]}
-    if name in OF_THE_BENCH:
+    if DECLARED[name].of == BENCH:
         named = {"session": [e.session for e in experiments]}
         named["experiment"] = [e.name for e in experiments]
     # Where some of a group have no name, their owners are unknown.

@@ -63,6 +63,36 @@ class Dependence:
     dof: int = 1
 
 
+def _by_gain(against: str, gain: float, dof: int, spare: float, where: str, tried: float = 1.0) -> Dependence:
+    """Test by a gain in chi squared, less what the noise spares; the best of so many that were tried."""
+    from scipy.stats import chi2
+
+    return Dependence(against, gain, min(1.0, tried * float(chi2.sf(gain - spare, dof))), where, dof)
+
+
+def _by_deviate(against: str, z: float, where: str, tried: float = 1.0) -> Dependence:
+    """Test by a normal deviate, for more than 0; the largest of so many that were tried."""
+    from scipy.stats import norm
+
+    return Dependence(against, z, min(1.0, tried * float(norm.sf(z))), where)
+
+
+def _by_products(against: str, products: Sequence[Array], where: str) -> list[Dependence]:
+    """Test whether two lists of deviates correlate, by their products (n,) in parts; nothing without any."""
+    count = sum(map(len, products))
+    return (
+        [_by_deviate(against, sum(float(p.sum()) for p in products) / math.sqrt(count), where)]
+        if count
+        else []
+    )
+
+
+def _likelier(together: Dependence, single: Dependence) -> Dependence:
+    """The likelier of two tests of one thing, each at half of the false-alarm rate."""
+    found = together if together.p_value < single.p_value else single
+    return attrs.evolve(found, p_value=min(1.0, 2.0 * found.p_value))
+
+
 def _rate(e: Experiment) -> Array:
     p = e["pressure_kPa"]
     return np.gradient(p, e["time_s"])
@@ -122,15 +152,12 @@ def strict_table(fitter: Fitter, fit: Fit) -> list[Dependence]:
 
 
 def _fitted_tests(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
-    from scipy.stats import chi2
-
     record, r = fitter.record, fit.residual
     found = []
     if any(s.group == KNOWN for s in record.series):
         rows = np.concatenate([np.arange(s.at.start, s.at.stop) for s in record.series if s.group == KNOWN])
         dof = max(len(rows) - len(fit.keys), 1)
-        value = float(r[rows] @ r[rows])
-        found.append(Dependence("spread", value, float(chi2.sf(value, dof)), "all", dof))
+        found.append(_by_gain("spread", float(r[rows] @ r[rows]), dof, 0.0, "all"))
     if all(s.group == KNOWN for s in record.series):
         return found
     fitted = _fitted(fitter, fit)
@@ -285,18 +312,13 @@ def _cut(misfits: Sequence[Array]) -> Array:
 
 def _turned_alike(record: Record, r: Array) -> list[Dependence]:
     """Test whether records leave the same residual (N,) at the same orientations, by normal scores."""
-    from scipy.stats import norm
-
     scores: list[dict[float, float]] = []
     for s in record.series:
         if _turned(record, s) and s.at.stop - s.at.start > 2:
             turned = np.round(s.mean(record.experiments[s.experiment][TURN]) % 360.0, 6).tolist()
             scores.append(dict(zip(turned, _scores(r[s.at]).tolist(), strict=True)))
-    products = [a[o] * b[o] for a, b in combinations(scores, 2) for o in a.keys() & b.keys()]
-    if not products:
-        return []
-    z = sum(products) / math.sqrt(len(products))
-    return [Dependence(BY_TURN, z, float(norm.sf(z)), "all records alike")]
+    products = [np.array([a[o] * b[o] for o in a.keys() & b.keys()]) for a, b in combinations(scores, 2)]
+    return _by_products(BY_TURN, products, "all records alike")
 
 
 def _alternating(record: Record, r: Array) -> list[Dependence]:
@@ -304,18 +326,9 @@ def _alternating(record: Record, r: Array) -> list[Dependence]:
 
     Without a clock the noise is the scatter from one to the next, so that such a misfit is as large as it.
     """
-    from scipy.stats import norm
-
-    products: list[float] = []
-    for s in record.series:
-        own = r[s.at]
-        if math.isnan(s.sample_s) and s.group != KNOWN and len(own) >= FEWEST_IN_A_ROW:
-            scores = _scores(own)
-            products += (scores[1:] * scores[:-1]).tolist()
-    if not products:
-        return []
-    z = -sum(products) / math.sqrt(len(products))
-    return [Dependence(ALTERNATION, z, float(norm.sf(z)), "readings without a clock")]
+    own = [r[s.at] for s in record.series if math.isnan(s.sample_s) and s.group != KNOWN]
+    scores = [_scores(x) for x in own if len(x) >= FEWEST_IN_A_ROW]
+    return _by_products(ALTERNATION, [-z[1:] * z[:-1] for z in scores], "readings without a clock")
 
 
 def _scores(values: Array) -> Array:
@@ -373,8 +386,6 @@ def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, flo
     A chamber that bends unlike the rest moves the markers beyond it, and none before it. `where` names the
     marker that deviates most, and its position at rest in chambers from the inlet.
     """
-    from scipy.stats import chi2
-
     record = fitter.record
     place = _marker_places(record)
     levels = np.unique(list(place.values()))
@@ -396,10 +407,10 @@ def _chambers(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, flo
     if not dof:
         return []
     groups = {s.group for s in record.series if s.channel in place}
-    p = float(chi2.sf(gain - sum(spare[g] for g in groups), dof))
     most = levels[int(np.argmax(np.abs(each.T @ fit.residual)))]
     named = next(c for c, level in place.items() if level == most).partition("_")[0]
-    return [Dependence("chamber", gain, p, f"{named}, {most:g} chambers from the inlet", dof)]
+    where = f"{named}, {most:g} chambers from the inlet"
+    return [_by_gain("chamber", gain, dof, sum(spare[g] for g in groups), where)]
 
 
 def _marker_places(record: Record) -> dict[str, float]:
@@ -424,34 +435,32 @@ def _tested(
 
     columns (N, d): of all channels, each with separate sizes.
     """
-    from scipy.stats import chi2
-
     if columns is None:
         return []
     # Series are whitened separately, so one pass serves all channels.
     every = fitted.fitter.whitened(columns)
-    joint, total, best, groups = [], 0, (1.0, "", 0.0, 0), set()
+    singles, groups = [], set()
     for channel, rows in fitted.rows.items():
         white, q = _unit(every[rows]), fitted.own[channel]
         onto = q.T @ white
         gain, dof = _gained(
             white.T @ white - onto.T @ onto, white.T @ fitted.residual[rows] - onto.T @ fitted.along
         )
-        if not dof:
-            continue
-        p = float(chi2.sf(gain - spare[fitted.groups[channel]], dof))
-        joint.append(gain)
-        groups.add(fitted.groups[channel])
-        total += dof
-        if p <= best[0]:
-            best = (p, channel, gain, dof)
-    if not joint:
+        if dof:
+            group = fitted.groups[channel]
+            singles.append(_by_gain(name, gain, dof, spare[group], channel))
+            groups.add(group)
+    return _jointly(name, singles, sum(spare[g] for g in groups), "all channels")
+
+
+def _jointly(name: str, singles: Sequence[Dependence], spare: float, where: str) -> list[Dependence]:
+    """All of some tests together, or the last of the best ones alone; nothing without any."""
+    if not singles:
         return []
-    together = float(chi2.sf(sum(joint) - sum(spare[g] for g in groups), total))
-    single = min(1.0, len(joint) * best[0])
-    if together < single:
-        return [Dependence(name, sum(joint), min(1.0, 2.0 * together), "all channels", total)]
-    return [Dependence(name, best[2], min(1.0, 2.0 * single), best[1], best[3])]
+    gain, dof = sum(d.statistic for d in singles), sum(d.dof for d in singles)
+    best = min(reversed(singles), key=lambda d: d.p_value)
+    single = attrs.evolve(best, p_value=min(1.0, len(singles) * best.p_value))
+    return [_likelier(_by_gain(name, gain, dof, spare, where), single)]
 
 
 def _gained(gram: Array, along: Array) -> tuple[float, int]:
@@ -490,9 +499,7 @@ def _clocked(record: Record) -> list[Series]:
 
 def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Dependence]:
     """Test for structure that repeats in every cycle: its harmonics, by channel and experiment."""
-    from scipy.stats import chi2
-
-    gains, groups, worst = [], set(), (1.0, "", 0.0, 0)
+    singles, groups = [], set()
     bases: dict[Any, Array | None] = {}
     for s in _clocked(fitter.record):
         key = s.experiment, s.group, s.clock
@@ -502,21 +509,15 @@ def _phase(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depende
             if columns is not None and columns.shape[1] > 1:
                 bases[key] = _basis(fitter.whitening.series(s, columns))
         b = bases[key]
-        if b is None:
-            continue
-        gain = float(np.sum((b.T @ fit.residual[s.at]) ** 2))
-        gains.append((gain, b.shape[1]))
-        groups.add(s.group)
-        p = float(chi2.sf(gain - spare[s.group], b.shape[1]))
-        if p <= worst[0]:
-            worst = (p, f"{fitter.record.experiments[s.experiment].name}, {s.channel}", gain, b.shape[1])
-    if not gains:
-        return []
-    saved = sum(spare[g] for g in groups)
-    together = float(chi2.sf(sum(g for g, _ in gains) - saved, sum(d for _, d in gains)))
-    single = min(1.0, len(gains) * worst[0])
-    p = min(1.0, 2.0 * min(together, single))
-    return [Dependence("phase_of_cycle", worst[2], p, worst[1], worst[3])]
+        if b is not None:
+            gain = float(np.sum((b.T @ fit.residual[s.at]) ** 2))
+            where = f"{fitter.record.experiments[s.experiment].name}, {s.channel}"
+            singles.append(_by_gain("phase_of_cycle", gain, b.shape[1], spare[s.group], where))
+            groups.add(s.group)
+    found = _jointly("phase_of_cycle", singles, sum(spare[g] for g in groups), "")
+    best = min(reversed(singles), key=lambda d: d.p_value, default=None)
+    # Where it is strongest is told in either case.
+    return [attrs.evolve(best, p_value=d.p_value) for d in found if best]
 
 
 def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
@@ -526,8 +527,6 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
     stays between two steps readings alternate by a whole one. Both are expected in a band in addition to the
     noise.
     """
-    from scipy.stats import chi2
-
     bands: dict[tuple[str, float], list[tuple[Array, Array, Array]]] = {}
     for s in _clocked(fitter.record):
         x = fit.residual[s.at]
@@ -537,7 +536,7 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
         saw, flips = _rounding(fitter, fit, s)
         rounded = _power(fitter.whitening.series(s, saw)) + flips / fitter.sources[s.group].white ** 2
         bands.setdefault((s.group, s.sample_s), []).append((f, _power(x), rounded))
-    tests: list[tuple[float, str, float, int]] = []
+    tests: list[Dependence] = []
     for (group, _), members in bands.items():
         f, power, rounded = (np.concatenate(column) for column in zip(*members, strict=True))
         edges = np.quantile(f, np.linspace(0.0, 1.0, BANDS + 1))
@@ -547,11 +546,10 @@ def _spectrum(fitter: Fitter, fit: Fit) -> list[Dependence]:
             value, dof = 2.0 * float(power[inside].sum()), 2 * int(inside.sum())
             if dof:
                 value /= 1.0 + 2.0 * float(rounded[inside].sum()) / dof
-                tests.append((float(chi2.sf(value, dof)), f"{group}, {low:.3g} to {high:.3g} Hz", value, dof))
-    if not tests:
-        return []
-    p, where, value, dof = min(tests)
-    return [Dependence("frequency", value, min(1.0, p * len(tests)), where, dof)]
+                where = f"{group}, {low:.3g} to {high:.3g} Hz"
+                tests.append(_by_gain("frequency", value, dof, 0.0, where))
+    worst = sorted(tests, key=lambda d: (d.p_value, d.where))[:1]
+    return [attrs.evolve(d, p_value=min(1.0, d.p_value * len(tests))) for d in worst]
 
 
 def _power(x: Array) -> Array:
@@ -580,9 +578,7 @@ def _rounding(fitter: Fitter, fit: Fit, series: Series) -> tuple[Array, float]:
 
 def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
     """Test whether the whitened residuals of successive cycles correlate."""
-    from scipy.stats import norm
-
-    sums, count = 0.0, 0
+    products = []
     for s in _clocked(record):
         e = record.experiments[s.experiment]
         period = cycle_s(e) if record.driven(s.experiment, "pressure_kPa") else None
@@ -591,37 +587,19 @@ def _cycles_alike(record: Record, r: Array) -> list[Dependence]:
         lag = round(period / (s.sample_s * float(np.median(s.count))))
         x = r[s.at]
         if 4 < lag < len(x):
-            sums += float(x[lag:] @ x[:-lag])
-            count += len(x) - lag
-    if not count:
-        return []
-    z = sums / math.sqrt(count)
-    return [Dependence("phase_of_cycle", z, float(norm.sf(z)), "all cyclic records")]
+            products.append(x[lag:] * x[:-lag])
+    return _by_products("phase_of_cycle", products, "all cyclic records")
 
 
 def _repeats_alike(record: Record, r: Array) -> list[Dependence]:
     """Test whether repeats of a protocol leave the same residual; their difference is noise."""
-    from scipy.stats import norm
-
-    sums, count = 0.0, 0
-    clocked = _clocked(record)
-    for k, s in enumerate(clocked):
-        for o in clocked[k + 1 :]:
-            if repeats(record, s, o):
-                a, b = r[s.at], r[o.at]
-                n = min(len(a), len(b))
-                sums += float(a[:n] @ b[:n])
-                count += n
-    if not count:
-        return []
-    z = sums / math.sqrt(count)
-    return [Dependence("repeat", z, float(norm.sf(z)), "all repeats")]
+    pairs = [(r[s.at], r[o.at]) for s, o in combinations(_clocked(record), 2) if repeats(record, s, o)]
+    products = [a[: len(b)] * b[: len(a)] for a, b in pairs]
+    return _by_products("repeat", products, "all repeats")
 
 
 def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
     """Test whether a channel jumped once, in an experiment or between two: every position is tried."""
-    from scipy.stats import norm
-
     r = fit.residual
     best, tried = (0.0, ""), 0
     known: dict[Any, Array] = {}
@@ -642,11 +620,7 @@ def _steps(fitter: Fitter, fit: Fit) -> list[Dependence]:
             best = (float(z[at]), f"{name}, {s.channel}, {s.time_s[at + 4]:.4g} s")
     # Jumps at neighbouring places are nearly the same test, yet no fewer than a third are independent.
     both = [(*best, tried), *([_moved(fitter, fit)] if len(fitter.record.experiments) > 1 else [])]
-    found = [
-        Dependence("jump", z, min(1.0, 2.0 * len(both) * many * float(norm.sf(z))), where)
-        for z, where, many in both
-        if many
-    ]
+    found = [_by_deviate("jump", z, where, 2.0 * len(both) * many) for z, where, many in both if many]
     return sorted(found, key=lambda d: d.p_value)[:1]
 
 
@@ -698,8 +672,6 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
 
     Each channel has a separate size, and its zero and the fitted parameters are free in each.
     """
-    from scipy.stats import chi2
-
     record = fitter.record
     # Experiment, time, words, and which eighth.
     moments: list[tuple[int, float, str, int]] = []
@@ -745,8 +717,7 @@ def _breaks(fitter: Fitter, fit: Fit, response: Array, spare: Mapping[str, float
         gains += np.where(resolved, gain, 0.0)
         dof += 1
     best = int(np.argmax(gains))
-    p = min(1.0, len(moments) * float(chi2.sf(gains[best] - saved, dof)))
-    return [Dependence("break", float(gains[best]), p, moments[best][2], dof)]
+    return [_by_gain("break", float(gains[best]), dof, saved, moments[best][2], len(moments))]
 
 
 def _beyond(v: Array) -> Array:
@@ -760,8 +731,6 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
     The residual is tested along the motion of a mass that the fitted model drives, by the largest of many
     modes.
     """
-    from scipy.stats import chi2
-
     record = fitter.record
     driven = [
         s for s in _clocked(record) if record.driven(s.experiment, "pressure_kPa") and len(s.time_s) > 16
@@ -793,13 +762,11 @@ def _ringing(fitter: Fitter, fit: Fit, spare: Mapping[str, float]) -> list[Depen
     gains = np.where(resolved, swings.T @ fit.residual / np.where(resolved, length, 1.0), 0.0) ** 2
     best = int(np.argmax(gains))
     saved = sum(spare[g] for g in {s.group for s in driven})
-    p = min(1.0, len(hertz) * float(chi2.sf(gains[best] - saved, 1)))
-    return [Dependence("ringing", float(gains[best]), p, f"{hertz[best]:.3g} Hz, after changes of pressure")]
+    where = f"{hertz[best]:.3g} Hz, after changes of pressure"
+    return [_by_gain("ringing", float(gains[best]), 1, saved, where, len(hertz))]
 
 
 def _outliers(record: Record, r: Array) -> list[Dependence]:
-    from scipy.stats import norm
-
     clocked = _clocked(record)
     if not clocked:
         return []
@@ -812,4 +779,4 @@ def _outliers(record: Record, r: Array) -> list[Dependence]:
             at = int(np.argmax(z))
             name = record.experiments[s.experiment].name
             worst, where = float(z[at]), f"{name}, {s.channel}, {s.time_s[at]:.4g} s"
-    return [Dependence("outlier", worst, min(1.0, 2.0 * tried * float(norm.sf(worst))), where)]
+    return [_by_deviate("outlier", worst, where, 2.0 * tried)]

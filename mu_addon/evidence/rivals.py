@@ -9,7 +9,8 @@ from itertools import combinations
 import attrs
 import numpy as np
 
-from .effect import CAMERA, CURVED_CELL, FORCE_SCALE, GRIPS, NUMERICS, Effect
+from .effect import CURVED_CELL, FORCE_SCALE, NUMERICS, Effect
+from .effects import CAMERA, GRIPS
 from .fit import Fit, Fitter
 from .found_causes import LAW, RIVAL_DELTA_CHI2, TOGETHER, Cause, Selection, not_distinguished
 from .hypotheses import HALF_WAY, PROMISING, SEEDS, beside, by_search, cost, promise, ranked, refined

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import attrs
 
 from .acceptance import accepted, doubts, loss, of_the_law, too_far
-from .effect import BATCH, CAMERA, CURVED_CELL, HEATING, OF, STEP, THICKNESS, Effect
+from .effect import BATCH, CURVED_CELL, HEATING, OF, STEP, THICKNESS, Effect
+from .effects import CAMERA
 from .fit import Fit, Fitter
 from .found_causes import FALSE_ALARM_RATE, LAW, RIVAL_DELTA_CHI2, Cause, Selection
 from .hypotheses import SEEDS, beside, by_all_laws, by_search, cost, hypotheses, other_seeds, ranked, refined

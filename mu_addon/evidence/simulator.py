@@ -15,11 +15,10 @@ from ..design.settings import PRESET
 from ..errors import InputError
 from ..measured import Experiment
 from ..measured.kinds import OF_A_UNIT
-from .effect import GEOMETRY, OF, SCALES, THICKNESS, Effect, Parameter
+from .effect import GEOMETRY, OF, THICKNESS, Effect, Parameter
+from .effects import MODULI, acted
 
 Array = np.ndarray[Any, Any]
-
-HEIGHT = f"{GEOMETRY}.height"
 
 # Part of the name of every modulus among the nuisances.
 MODULUS = "modulus"
@@ -147,7 +146,11 @@ class Composite:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key][1]
-        found = simulator.predict(_of_height(experiment, own.pop(HEIGHT, 0.0)), own)
+        found = simulator.predict(_strained(experiment, own), own)
+        first = found[0]
+        read = acted("reading", experiment, first, own)
+        if read is not first:
+            found = np.vstack([read, found[1:]])
         found.flags.writeable = False
         self.calls += 1
         # Stored with the experiment, whose identity could otherwise be reused.
@@ -171,7 +174,7 @@ class Composite:
             effect = plain.partition(".")[0]
             if plain in knows or effect in (GEOMETRY, THICKNESS):
                 own[plain] = value
-            elif effect in SCALES:
+            elif effect in MODULI:
                 moduli = (p for p in self.nuisances if p.name in knows and MODULUS in p.name)
                 own |= {p.name: own.get(p.name, p.null) * (1.0 + value) for p in moduli}
         return own
@@ -186,11 +189,12 @@ class Composite:
         return self._simulators[experiment.kind]
 
 
-def _of_height(experiment: Experiment, off: float) -> Experiment:
-    """The experiment of a specimen higher than typed by a share, so that it was strained less."""
-    if not off:
+def _strained(experiment: Experiment, values: Mapping[str, float]) -> Experiment:
+    """The experiment with the strain of effects that act on it."""
+    typed = experiment.columns.get("strain")
+    strain = typed if typed is None else acted("strain", experiment, typed, values)
+    if strain is typed:
         return experiment
-    strain = experiment["strain"] / (1.0 + off)
     return attrs.evolve(experiment, columns={**experiment.columns, "strain": strain})
 
 

@@ -18,7 +18,7 @@ from benchmarks.evidence.second_code.recording import Instrument, Trial, read, s
 from benchmarks.evidence.second_code.sets import BENCHES, CLASSES, SINGLE, Order, made, noise_of, order
 from benchmarks.evidence.second_code.tables import blames_physics, report
 from mu_addon.errors import InputError
-from mu_addon.evidence.effect import LIBRARY
+from mu_addon.evidence.effects import DECLARED
 from mu_addon.measured import read_folder
 
 FOLDER = Path(second_code.__file__).parent
@@ -108,14 +108,14 @@ def test_every_order_makes_a_folder_that_is_read(tmp_path):
     for part in CLASSES:
         for number in range(0, 60, 7):
             of = order(part, number, 5)
-            assert set(of.truth) <= set(LIBRARY)
+            assert set(of.truth) <= set(DECLARED)
             write(tmp_path / f"{part}{number}", made(of))
             # A unit that changes within a file is refused, where it is seen.
             refused = [InputError] * ("unit_change" in of.faults)
             with contextlib.suppress(*refused):
                 assert read_folder(tmp_path / f"{part}{number}").experiments
     assert order("single", 3, 5) == order("single", 3, 5) != order("single", 3, 6)
-    assert {n for effects in SINGLE.values() for n in effects} <= set(LIBRARY)
+    assert {n for effects in SINGLE.values() for n in effects} <= set(DECLARED)
 
 
 @pytest.mark.nightly("tests/evidence/test_owned.py::test_a_leak_of_all_is_nobody_s_own")

@@ -1,4 +1,4 @@
-"""A law and a lattice kind are added by the one file that docs/engineering/extend.md shows of each."""
+"""A law, an effect and a lattice kind are each added by the one file shown in docs/engineering/extend.md."""
 
 import json
 import os
@@ -18,12 +18,16 @@ GENT = UNIT + '[wall]\nlaw = "gent"\ngent_limit = 5\n'
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """A copy of the program with the page's two files."""
+    """A copy of the program with the page's files."""
     folder = tmp_path_factory.mktemp("copy")
-    for name in ("mu_addon", "headless", "assets", "tests/fem"):
+    for name in ("mu_addon", "headless", "assets", "tests/fem", "tests/evidence"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "tests" / "__init__.py", folder / "tests")
-    for name, place in (("gent.py", "mu_addon/fem/laws"), ("cross.toml", "assets/lattices")):
+    for name, place in (
+        ("gent.py", "mu_addon/fem/laws"),
+        ("vacuum_gain.py", "mu_addon/evidence/effects"),
+        ("cross.toml", "assets/lattices"),
+    ):
         text = re.search(rf"`{name}`:\n\n```\n(.*?)\n```\n", PAGE, re.DOTALL)[1]
         (folder / place / name).write_text(text, encoding="utf-8")
     (folder / "gent.toml").write_text(GENT)
@@ -92,6 +96,30 @@ def test_a_wall_of_that_law_bends_less(copy):
         ran(copy, "headless/run.py", "simulate", "--unit", f"{name}.toml", "--out", name, *shared)
         angles.append(float((copy / name / "angle.csv").read_text().split(",")[-1]))
     assert angles == pytest.approx([8.65, 8.74], abs=0.01)
+
+
+EFFECT = """
+import json
+import numpy as np
+from mu_addon.evidence.diagnosis import diagnose
+from mu_addon.usecases.diagnose.words import to_do
+from tests.evidence import analytic
+
+random, made = np.random.default_rng(4), []
+for period, name in ((20.0, "slow"), (9.0, "fast")):
+    t, p = analytic.triangle(0.25, period, 2, -20.0, 30.0)
+    angle = analytic.channels(p)[0] + random.normal(0.0, 0.1, len(t))
+    made.append(analytic.experiment(name, t, np.where(p < 0, 1.15 * p, p), {"angle_deg": angle}))
+found = diagnose(made, analytic.simulator(made))
+print(json.dumps([found.names, found.intervals["vacuum_gain.gain"], to_do(found)]))
+"""
+
+
+def test_an_effect_is_one_file(copy):
+    names, (low, high), remedy = json.loads(ran(copy, "-c", EFFECT).splitlines()[-1])
+    assert names == ["vacuum_gain"]
+    assert low < 0.15 < high
+    assert remedy == "Have the gauge calibrated below zero."
 
 
 KIND = """

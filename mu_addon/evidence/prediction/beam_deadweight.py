@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import ConvergenceError
 from ...measured import Experiment
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
 from .coupon import STRAIN_STIFFENING
 from .specimen import FRAME
 
@@ -71,7 +71,7 @@ class BeamSag:
     """
 
     nuisances = (MODULUS, TILT)
-    effects = EFFECTS
+    effects = (*EFFECTS, *laws(KIND, ()))
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The predicted column: sag of the tip in mm."""

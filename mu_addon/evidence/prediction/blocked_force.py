@@ -12,11 +12,11 @@ import numpy as np
 from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import down
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
+from ..effects import acted
 from .drift import drift, drifts, largest_reading
 from .effective_pressure import DECADES, first_order_lag, in_the_chambers, lag_weights
 from .instruments import amplified, amplifier, before_the_gauge, filtered
-from .supply import supplied, supply
 from .unit_pressure import (
     GAUGE_SHARE,
     REFERENCE_C,
@@ -81,7 +81,7 @@ class BlockedForce:
             *(Effect(e.name, e.parameters, (KIND,)) for e in static),
             *drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, KIND, here),
             *drifts("force_drift", "N", ZERO_SHARE * most, KIND, here),
-            *supply(KIND, here),
+            *laws(KIND, here),
             *amplifier(KIND),
             *([Effect("frame_compliance", (STAND,), (KIND,))] if "seating" in self._sizes else []),
         )
@@ -104,7 +104,7 @@ class BlockedForce:
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
         p = before_the_gauge(p, values, self._largest_kPa)
-        p = supplied(t, p, values, self._largest_kPa)
+        p = acted("pressure", experiment, p, values, self._largest_kPa)
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)
         kelvin = experiment.temperature_C - REFERENCE_C

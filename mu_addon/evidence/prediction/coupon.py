@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...measured import Experiment
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
 from .specimen import NEW, largest_N, load_cell, load_zeros, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
@@ -79,7 +79,7 @@ class CouponStress:
     """
 
     def __init__(self, experiments: Sequence[Experiment] = ()) -> None:
-        self.effects = (*EFFECTS, *load_cell(experiments, KIND))
+        self.effects = (*EFFECTS, *load_cell(experiments, KIND), *laws(KIND, experiments))
         self.nuisances = (MODULUS, DISCREPANCY, *load_zeros(experiments, KIND))
         strains = [float(np.abs(e["strain"]).max()) for e in experiments if e.kind == KIND]
         self._largest = max(strains, default=0.0) or 1.0

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...homogenize.offset_response import OffsetResponse
 from ...measured import Experiment
-from ..effect import THICKNESS, Effect, Parameter
+from ..effect import THICKNESS, Effect, Parameter, laws
 from .specimen import NEW, largest_N, load_cell, machine, recorded, strain_histories
 
 Array = np.ndarray[Any, Any]
@@ -229,7 +229,7 @@ class LatticeStress:
             default=math.inf,
         )
         printed = (_within(e, most) if e.name == "overcure" else e for e in EFFECTS)
-        self.effects = (*printed, *load_cell(experiments, KIND))
+        self.effects = (*printed, *load_cell(experiments, KIND), *laws(KIND, experiments))
         self._curve = curve
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...measured import Experiment
 from ...measured.folder import ATMOSPHERE_kPa
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import lag_weights
 from .instruments import CURVE, as_read, gauge
@@ -169,6 +169,7 @@ class ChamberPressure:
         self.effects = (
             *zeroed(map(partial(_warmed, experiments), EFFECTS), KIND, experiments),
             *drifts("pressure_drift", "kPa", GAUGE_SHARE * self._largest_kPa, KIND, experiments),
+            *laws(KIND, experiments),
         )
         nuisances = []
         for e in experiments:

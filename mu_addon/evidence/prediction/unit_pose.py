@@ -11,7 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...measured import Experiment
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
+from ..effects import acted
 from .drift import largest_reading
 from .instruments import before_the_gauge
 from .unit_pressure import REFERENCE_C, TIMED, UnitPressure, UnitResponse, believed
@@ -46,7 +47,7 @@ class UnitPose:
         driven = UnitPressure(responses)
         static = [e for e in driven.effects if e.name in responses[0].variants]
         here = [attrs.evolve(e, kinds=(KIND,)) for e in TIMED if e.name in ACTING]
-        self.effects = (*here, *(attrs.evolve(e, kinds=(KIND,)) for e in static))
+        self.effects = (*here, *(attrs.evolve(e, kinds=(KIND,)) for e in static), *laws(KIND, experiments))
         self._driven = driven
         self._largest_kPa = largest_reading("pressure_kPa", KIND, experiments)
         self._sizes = {e.name: e.keys[0] for e in static}
@@ -69,6 +70,7 @@ class UnitPose:
         kelvin = experiment.temperature_C - REFERENCE_C
         modulus *= 1.0 + get("temperature_drift.per_K", 0.0) * (kelvin if math.isfinite(kelvin) else 0.0)
         p = before_the_gauge(experiment["pressure_kPa"], values, self._largest_kPa)
+        p = acted("pressure", experiment, p, values, self._largest_kPa)
         p = self._driven.discrepant(p / modulus, values)
         static = self._driven.static(values)
         if "gravity" in static:

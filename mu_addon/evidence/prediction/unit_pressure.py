@@ -15,7 +15,8 @@ from ...errors import InputError
 from ...measured import Experiment
 from ...measured.pose import Direction, X, down
 from ..drawn import Surface
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
+from ..effects import acted
 from .camera import camera_effects, read_by_camera
 from .drift import drift, drifts, largest_reading, zeroed
 from .effective_pressure import in_the_chambers, play_operator, remembered
@@ -23,7 +24,6 @@ from .flat_obstacle import NAME as CONTACT
 from .flat_obstacle import ObstacleResponse, contact_effect
 from .instruments import before_the_gauge, gauge
 from .marker_slip import Recordings, slip_effects, slipped
-from .supply import supplied, supply
 
 Array = np.ndarray[Any, Any]
 
@@ -411,7 +411,7 @@ class UnitPressure:
             TWO_VOLUMES,
             *static.values(),
             *drifting,
-            *supply(self.kind, experiments),
+            *laws(self.kind, experiments),
             *camera,
             *slips,
         )
@@ -492,7 +492,7 @@ class UnitPressure:
             p = np.interp(t - delay, t, p)
         p = p - drift("pressure_drift", t, values)
         p = before_the_gauge(p, values, self._largest_kPa)
-        p = supplied(t, p, values, self._largest_kPa)
+        p = acted("pressure", experiment, p, values, self._largest_kPa)
         # With a valve shut nothing flows between gauge and chambers: both see a leak.
         if experiment.valve != "shut":
             p = in_the_chambers(t, p, values)

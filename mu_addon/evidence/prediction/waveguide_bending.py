@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...measured import Experiment
-from ..effect import Effect, Parameter
+from ..effect import Effect, Parameter, laws
 from .effective_pressure import play_operator
 from .unit_pressure import TIMED
 
@@ -105,7 +105,7 @@ class WaveguideVoltage:
     """
 
     nuisances = (STRAIGHT, LOSS)
-    effects = EFFECTS
+    effects = (*EFFECTS, *laws(KIND, ()))
 
     def channels(self, experiment: Experiment) -> tuple[str, ...]:
         """The predicted column: voltage of the photodiode in V."""

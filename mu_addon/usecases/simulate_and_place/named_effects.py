@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from ...errors import InputError, did_you_mean
-from ...evidence.effect import LIBRARY, Parameter
+from ...evidence.effect import Parameter
+from ...evidence.effects import DECLARED
 from ...evidence.prediction.effective_pressure import in_the_chambers, remembered
 from ...evidence.prediction.unit_pressure import RELAXING, SPREADING, TIMED, TWO_VOLUMES
 from ...evidence.unit_effects import EFFECTS, Body
@@ -90,7 +91,7 @@ class NamedEffects:
     def _checked(self, name: str, given: Any) -> dict[str, float]:
         where = f"{self.where}.{name}"
         if name not in NAMES:
-            why = " it is not an effect that a simulation of the unit can contain" if name in LIBRARY else ""
+            why = " it is not an effect that a simulation of the unit can contain" if name in DECLARED else ""
             raise InputError(
                 f"no effect {name!r} is known here{';' + why if why else did_you_mean(name, NAMES)}",
                 self.where,

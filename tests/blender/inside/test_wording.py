@@ -8,11 +8,12 @@ import bpy
 from mu_addon.blender.shared.panels import wrapped
 from mu_addon.blender.shared.wording import in_panel
 from mu_addon.blender.sidebar import menus
-from mu_addon.usecases.diagnose.remedies import TO_DO, what_to_do
+from mu_addon.evidence.effects import DECLARED
+from mu_addon.usecases.diagnose.remedies import what_to_do
 
 
 def test_what_to_do_about_a_cause_names_buttons_and_no_options():
-    for name in TO_DO:
+    for name in DECLARED:
         text = in_panel(what_to_do((name,)))
         assert "--" not in text, (name, text)
         assert ".toml" not in text, (name, text)

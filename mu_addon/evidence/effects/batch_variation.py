@@ -1,0 +1,10 @@
+"""Batch variation."""
+
+from .declaration import Declaration
+
+EFFECT = Declaration(
+    mechanism="the modulus of one specimen, or its section as typed, differs from that of the others",
+    reveals="another specimen in its place, its height and section measured, clamped again",
+    remedy="print and test the specimens in one batch, or give that specimen another modulus",
+    modulus=True,
+)
