@@ -266,6 +266,7 @@ class Study:
             return
         self.estimated_mm = dict(sorted(found.items(), key=lambda one: one[1]))
         self.context.summary[ESTIMATED] = self.estimated_mm
+        self.progress.told(estimate_words(self.estimated_mm))
         self.progress.update(0.0, estimate_words(self.estimated_mm))
 
     def _keep_partial_motion(self) -> None:
