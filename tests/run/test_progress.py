@@ -111,7 +111,7 @@ def test_a_first_finding_has_a_line_of_its_own(clock):
     stream = io.StringIO()
     progress = Progress([terminal(stream, clock)], clock)
     with progress.stage("Model A"):
-        progress.told("estimated: alpha4 0.26 mm")
+        progress.finding("estimated: alpha4 0.26 mm")
     assert "estimated: alpha4 0.26 mm\n" in stream.getvalue()
 
 
