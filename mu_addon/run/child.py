@@ -169,7 +169,7 @@ class Child:
             self.result = message
         elif kind == "error":
             self.error = message
-        else:
+        elif kind != "finding":
             # Blender and libraries write to standard output, too: that is in the file, and no reason to stop.
             self.garbage += 1
 

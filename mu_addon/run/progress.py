@@ -8,6 +8,7 @@ A `Progress` makes messages, plain dictionaries with a `type`, and hands each to
   Optional: detail, the last step done or, at the end, the stage's result; beat, only the time is new. With a
   plan: whole (0..1) and whole_seconds_left of the run, and why, the reason if the time left grew. Of a run
   within this one the stage begins with its name, and part (0..1) and part_seconds_left are its own.
+- finding: what, a first finding while the run goes on
 - warning: what, where, what_to_do
 - result: whatever the run found; the last message of a run that succeeded
 - error: what, where, what_to_do, status; the last message of a run that did not
@@ -135,6 +136,10 @@ class Progress:
                 self._fraction = max(min(max(float(fraction), 0.0), 1.0), self._fraction or 0.0)
                 self._pace.tell(self._clock() - self._start, self._fraction)
                 self._emit_progress("run", self._fraction, detail)
+
+    def finding(self, what: str) -> None:
+        """Report a first finding, which a terminal shows on a line of its own."""
+        self.emit({"type": "finding", "what": what})
 
     def warning(self, what: str, where: str = "", what_to_do: str = "") -> None:
         """Report a problem that does not end the run."""
@@ -273,6 +278,8 @@ class _Lines:
             self.write(f"{busy if slowed >= SLOWED else alone}, {count} stage{'s' * (count > 1)}\n")
         elif message["type"] == "progress":
             self.progress(message)
+        elif message["type"] == "finding":
+            self.write(printable(message["what"], self.stream) + "\n")
         elif message["type"] in ("warning", "error"):
             self.write(printable(_formatted(message), self.stream) + "\n")
 

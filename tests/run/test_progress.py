@@ -107,6 +107,14 @@ def test_an_error_does_not_write_into_the_live_line(clock):
     assert "\nerror: no such preset\n  where: --preset\n  what to do: choose another\n" in stream.getvalue()
 
 
+def test_a_first_finding_has_a_line_of_its_own(clock):
+    stream = io.StringIO()
+    progress = Progress([terminal(stream, clock)], clock)
+    with progress.stage("Model A"):
+        progress.finding("estimated: alpha4 0.26 mm")
+    assert "estimated: alpha4 0.26 mm\n" in stream.getvalue()
+
+
 def test_json_lines(clock):
     stream = io.StringIO()
     progress = Progress([json_lines(stream, clock)], clock)

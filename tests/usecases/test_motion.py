@@ -143,7 +143,7 @@ def test_a_paths_motion_is_what_its_deviation_was_found_from(study, motion):
     for number, state in enumerate(trajectory.solved):
         if round(state.pressure_MPa * 1e3, 9) not in np.round(sweep.solved_kPa, 9):
             continue
-        kept = sweep._cache.get("sweep", sweep._name(state, job))["moved_mm"]
+        kept = sweep._cache.get("sweep", sweep._name(state.pressure_MPa, job))["moved_mm"]
         assert np.allclose(anchor_points(UNIT) + monitor.displacement(moved[number]), kept, atol=1e-5)
         apart = np.linalg.norm(moved[number] - motion.model_a[number], axis=1)
         assert apart.max() > 1e-3

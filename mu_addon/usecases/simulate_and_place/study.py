@@ -12,6 +12,7 @@ import numpy as np
 
 from ...body.lattice import strut_volume_mm3
 from ...design.anchors import Window, anchor_points, windows
+from ...design.quantity import in_MPa
 from ...design.settings import USUAL_RESIN
 from ...design.solid import Solid, build_solid
 from ...design.stl_and_nodes import write_nodes, write_stl
@@ -252,7 +253,8 @@ class Study:
             angles[f"{state.pressure_kPa:.6g}"] = self.bending_angle_deg(state.u)
         if self._ahead is not None:
             self._ahead.reached(state)
-        if self._estimates and state.pressure_kPa == self.job.samples[1].max() > 0.0:
+        highest = in_MPa(float(self.job.samples[1].max()))
+        if self._estimates and state.pressure_MPa == highest > 0.0:
             self._estimate()
 
     def _estimate(self) -> None:
@@ -266,6 +268,7 @@ class Study:
             return
         self.estimated_mm = dict(sorted(found.items(), key=lambda one: one[1]))
         self.context.summary[ESTIMATED] = self.estimated_mm
+        self.progress.finding(estimate_words(self.estimated_mm))
         self.progress.update(0.0, estimate_words(self.estimated_mm))
 
     def _keep_partial_motion(self) -> None:
