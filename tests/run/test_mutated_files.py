@@ -26,6 +26,7 @@ from mu_addon.design.parameters import load_preset
 from mu_addon.design.printing.printer import load_printer
 from mu_addon.design.surface import stl_bytes, stl_surface
 from mu_addon.errors import InputError
+from mu_addon.fem.protocol import Protocol
 from mu_addon.files import read_npz, write_npz
 from mu_addon.graph.tree_file import read_tree
 from mu_addon.grasp import read_phases, shipped_phases
@@ -38,6 +39,7 @@ from mu_addon.studies.grip import Grip
 from mu_addon.studies.homogenize import Homogenize
 from mu_addon.studies.inputs import ResinInput
 from mu_addon.usecases.resume import use_case_of
+from mu_addon.usecases.simulate_and_place.job import Job
 from mu_addon.usecases.track_video.tracked_table import read_pixels
 
 from ..homogenize.lattice_laws import body_centred
@@ -231,30 +233,23 @@ def test_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
             raise AssertionError(f"{name}, number {number}: {error!r}") from error
 
 
-FOLDERS: dict[str, tuple[Callable[[Path], Any], Path]] = {
-    "measured": (read_folder, DATA / "measured"),
-    **{
-        kind: (lambda folder: use_case_of(folder).read(folder), DATA / "folders" / kind)
-        for kind in ("place",)
-    },
-}
-STUDIES = {
+JOBS: dict[str, Any] = {
     "check": Check(printer=load_printer(), unit=load_preset("mu-1.0x")),
     "grip": Grip(gripper=load_gripper("gripper")),
     "homogenize": Homogenize(unit=load_preset("mu-1.0x"), resin=ResinInput().made(("flexible-80a",), {})),
+    "place": Job(load_preset("mu-1.0x"), Protocol(np.arange(3.0), np.array([0.0, -20.0, 40.0]))),
 }
 
 
-@pytest.mark.parametrize("name", [*FOLDERS, *STUDIES])
+@pytest.mark.parametrize("name", ["measured", *JOBS])
 def test_a_folder_with_a_damaged_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
-    reader: Callable[[Path], Any]
-    if name in STUDIES:
-        reader = STUDIES[name].read
-        keep_inputs(folder, STUDIES[name].texts())
+    reader: Callable[[Path], Any] = read_folder
+    if name in JOBS:
+        keep_inputs(folder, JOBS[name].texts())
+        reader = use_case_of(folder).read
     else:
-        reader, source = FOLDERS[name]
-        shutil.copytree(source, folder)
+        shutil.copytree(DATA / name, folder)
     files = sorted(p for p in folder.iterdir() if p.suffix in (".toml", ".csv"))
     for path in files:
         content = path.read_bytes()

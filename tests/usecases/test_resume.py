@@ -44,7 +44,6 @@ from mu_addon.usecases.sensor import record
 from mu_addon.usecases.simulate_and_place import job as study
 
 DATA = Path(__file__).parent.parent / "data"
-OLD = DATA / "folders"
 UNIT = Unit(name='a "quoted" unit', chambers=Chambers(wall_mm=0.95))
 
 
@@ -127,16 +126,6 @@ def test_every_job_is_read_back_from_its_folder(tmp_path):
         seen.add(found.layout.inputs)
     # These two are made from recordings: tests/usecases/test_calibrate.py, test_bench_nodes.py.
     assert seen == {*MODULES, *(f"{name}.toml" for name in STUDIES)} - {"calibrate.toml", "measure.toml"}
-
-
-@pytest.mark.parametrize("name", sorted(p.name for p in OLD.iterdir()))
-def test_a_folder_of_an_older_version_says_the_same(tmp_path, name):
-    """Inputs as the version before wrote them: read, and equal to what this version writes for them."""
-    folder = shutil.copytree(OLD / name, tmp_path / name)
-    found = use_case_of(folder)
-    job = found.read(folder)
-    texts = job.texts_in(folder)[0] if hasattr(job, "texts_in") else job.texts()
-    assert same_inputs(folder, {k: v for k, v in texts.items() if k != "resin.toml"})
 
 
 def test_measured_data_that_are_gone_or_others_are_named(tmp_path):
