@@ -37,7 +37,7 @@ OTHERWISE = {
     "blender/optimize/properties.py": {"points"},  # of a curve that is wanted
     "chain/chain.py": {"tip_mass_g"},  # no load
     "chain/joint_learning.py": {"bend_deg"},  # of a joint
-    "evidence/effect.py": {"experiment"},  # that shows an effect
+    "evidence/parameter.py": {"experiment"},  # that shows an effect
     "evidence/prediction/specimen.py": {"strain"},
     "evidence/prediction/unit_pressure.py": {"orientation_deg"},
     "evidence/unit_effects.py": {"self_contact", "orientation_deg", "device"},  # the plain unit, on the CPU
