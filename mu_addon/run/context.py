@@ -61,7 +61,7 @@ class RunContext:
     short_report: writes a report quickly from a folder, with the reason of a requested stop. wants_report:
     False to write no report. hurried: the user or the parent process waits for the run to stop.
     console_summary: makes the last lines at a terminal from the summary; work: the study at work, an
-    `Execution`.
+    `Execution`. words: the command's, if it may end at once where nothing has changed (`run.unchanged`).
     """
 
     progress: Progress
@@ -74,6 +74,7 @@ class RunContext:
     hurried: bool = False
     console_summary: Callable[[dict[str, Any]], list[str]] = lambda summary: []
     work: Any = None
+    words: tuple[str, ...] | None = None
     _lock: FolderLock | None = None
     _kept_s: float = 0.0
 

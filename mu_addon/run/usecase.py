@@ -8,9 +8,11 @@ from typing import Any, Generic, TypeVar
 
 import attrs
 
+from . import unchanged
 from .context import RunContext
 from .folder import FolderLayout, begin
 from .processes import require_memory
+from .progress import Message
 from .progress_estimate import Plan, remaining, shares_done
 
 Job = TypeVar("Job")
@@ -48,6 +50,10 @@ class UseCase(Generic[Job]):
             self.begin(job, folder, context)
         else:
             begin(context, folder, self.layout, job.texts())  # type: ignore[attr-defined]
+        if (before := unchanged.finished(folder, context)) is not None:
+            return unchanged.tell(before, context)
+        warnings: list[Message] = []
+        context.progress.sinks.append(lambda m: warnings.append(m) if m["type"] == "warning" else None)
         context.console_summary = self.console_summary
         if self.plan_in is not None:
             plan = self.plan_in(job, folder, context)
@@ -56,4 +62,5 @@ class UseCase(Generic[Job]):
         context.progress.plan([stage for stage in plan if context.wants_report or stage[0] != "report"])
         found = self.run(job, folder, context)
         context.write_report()
+        unchanged.remember(folder, context, warnings)
         return found

@@ -1,0 +1,91 @@
+"""A command given again ends at once where its inputs, its results and this program are as they were.
+
+What a run leaves is told by the digests of its folder's files, inputs among them; a file that was edited,
+removed or added makes the command a run again, which takes finished stages from its cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, MuError
+from ..files import make_folder, plain, write_json
+from ..reading import file_bytes, parse_json
+from .context import RunContext
+from .folder import ALWAYS, OWN
+from .progress import Message
+from .versions import package_versions
+
+FILE = "finished.json"
+CACHE = "cache"
+# Larger folders are not read to the end: their stages are found in their caches.
+MOST_BYTES = 400_000_000
+
+
+def finished(folder: Path, context: RunContext) -> dict[str, Any] | None:
+    """Record of the command's last complete run in a claimed folder; None if anything differs."""
+    if context.words is None:
+        return None
+    with suppress(OSError, InputError):
+        found = parse_json(file_bytes(folder / CACHE / FILE), FILE)
+        if found["asked"] == _asked(context) and found["files"] == _digests(folder):
+            return dict(found)
+    return None
+
+
+def tell(before: Mapping[str, Any], context: RunContext) -> None:
+    """Say again what a record's run said."""
+    context.summary = dict(before["summary"])
+    for message in before["warnings"]:
+        context.progress.warning(message["what"], message["where"], message["what_to_do"])
+    lines = [*before["lines"], "nothing has changed: every file is as the last run left it"]
+    context.console_summary = lambda summary: lines
+
+
+def remember(folder: Path, context: RunContext, warnings: Sequence[Message]) -> None:
+    """Record a run that is complete; a record that cannot be written is none."""
+    if context.words is None:
+        return
+    with suppress(OSError, MuError):
+        make_folder(folder / CACHE)
+        seconds = {**context.summary.get("seconds", {}), **context.progress.seconds}
+        record = {
+            "asked": _asked(context),
+            "files": _digests(folder),
+            "summary": plain(context.summary | {"seconds": seconds}),
+            "lines": context.console_summary(context.summary),
+            "warnings": list(warnings),
+        }
+        write_json(folder / CACHE / FILE, record)
+
+
+def _asked(context: RunContext) -> list[Any]:
+    """The command's words, the packages' versions, and the newest of this program's files."""
+    package = Path(__file__).parents[1]
+    newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
+    return [list(context.words or ()), package_versions(), newest]
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for where, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if name not in (CACHE, "stale")]
+        yield from (Path(where, name) for name in names)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file of a folder but caches and what tells of the run; raises InputError if large."""
+    found, size = {}, 0
+    for path in sorted(_files(folder)):
+        if path.name in (*OWN, *ALWAYS):
+            continue
+        size += path.stat().st_size
+        if size > MOST_BYTES:
+            raise InputError("the folder is too large to compare", str(folder))
+        with path.open("rb") as file:
+            found[path.relative_to(folder).as_posix()] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
