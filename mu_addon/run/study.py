@@ -460,8 +460,9 @@ class Study:
         for one in self.stages().values():
             if not (one.title and one.wanted(self)):
                 continue
-            members = [] if one.over is None or one.over.grows else one.over.members(self)
-            for title in map(one.title_of, members) if members else (one.title,):
+            members = [None] if one.over is None or one.over.grows else one.over.members(self)
+            for member in members:
+                title = one.title if member is None else one.title_of(member)
                 if title not in found:
                     found[title] = one.seconds(self, title)
         return found
