@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .options import add_results, require_out
 
 if TYPE_CHECKING:
-    from ..lab_files.draft import Question
-    from ..lab_files.proposal import Proposal
+    from ..lab_files.proposal import Proposal, Question
     from ..run.context import RunContext
     from .options import Commands
 

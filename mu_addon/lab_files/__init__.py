@@ -1,6 +1,7 @@
 """Files exported by test machines and data loggers: cells, blocks of numbers, quantities, a proposal.
 
-`source` gives rows of cells in one of `formats`, `blocks` finds the tables in them, `columns` the quantity of
-a title, `proposal` the experiments in steps (`quantities`, `kind`, `times`, `signs`, `facts`); `decisions`
-lists what the data decide.
+`source` gives rows of cells in one of `formats`, `blocks` finds the tables in them, `cells` reads columns as
+numbers, `columns` knows titles and units. A `proposal` is one immutable table of the columns that are read;
+`steps` names in order the functions that make an experiment of it, each of which decides one thing and says
+why. `decisions` lists which function decides what.
 """

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from itertools import zip_longest
 
 import attrs
 import numpy as np
@@ -17,11 +17,10 @@ import numpy as np
 from ..errors import InputError
 from ..table_cells.clock import clock, is_clock
 from ..table_cells.dialect import BRACKET, Row, split
-from ..table_cells.notation import Numbers, is_like_number, judged, number, unit_behind, with_units
-from .columns import Column, column, is_unit, plain, unit_of
+from ..table_cells.notation import Array, is_like_number, judged, unit_behind
+from .cells import ReadColumn, in_one_notation, read_column
+from .columns import Column, column, is_unit, plain, shown
 from .sheet import Sheet
-
-Array = np.ndarray[Any, Any]
 
 # A line that names the specimen whose table follows, such as "Specimen 2".
 _SPECIMEN = re.compile(
@@ -39,10 +38,6 @@ _JUDGED = 30
 # What begins a line that is a comment, titles included.
 _COMMENT = re.compile(r"^(#+|%+|//+|;+)\s*")
 _LONGEST_UNIT = 10
-# Cells with the other decimal sign from which these alternate; fewer are damaged cells.
-_ALTERNATING = 3
-# Readings above so many times the others were no thousands.
-_FAR = 10.0
 # Letters of a line shown in a list.
 _LONGEST_SHOWN = 50
 
@@ -151,9 +146,9 @@ class _Finding:
         return Tables(tuple(found), tuple(self.unread), tuple(head))
 
     def _leave(self, rows: Sequence[Row], why: str) -> None:
-        lines = tuple(line for row in rows for line in row.lines)
-        if lines:
-            self.unread.append(Unread("", why, lines))
+        """List rows as unread."""
+        if rows:
+            self.unread.append(Unread("", why, tuple(line for row in rows for line in row.lines)))
 
     def _leave_text(self, rows: Sequence[Row], why: str) -> None:
         """List rows as unread, with their text."""
@@ -200,10 +195,7 @@ class _Finding:
     def _extent(self, start: int) -> tuple[list[int], list[int], int]:
         """The rows of a table, the rows within it that lack two of its numbers, and its end."""
         near = [m for m in self.numeric[start : start + _JUDGED] if len(m) >= self.fewest]
-        counts: dict[int, int] = {}
-        for m in near:
-            for k in m:
-                counts[k] = counts.get(k, 0) + 1
+        counts = Counter(k for m in near for k in m)
         usual = frozenset(k for k, count in counts.items() if 2 * count >= len(near))
         self.usual = usual = usual if len(usual) > 1 else frozenset(counts)
         least = min(2, len(usual))
@@ -388,23 +380,18 @@ def _block(
     heads = named[-1].cells if named else ()
     labels: Sequence[str] = ()
     if len(named) > 1:
-        upper = named[-2].cells
+        pairs = tuple(zip_longest(named[-2].cells, heads, fillvalue=""))
         if _is_label_row(named[-2], named[-1]):
             # A cell above an empty one is the title of its column.
-            alone = {k for k, cell in enumerate(upper) if cell and not _cell(heads, k)}
-            labels = tuple("" if k in alone else cell for k, cell in enumerate(upper))
-            heads = tuple(
-                _cell(upper if k in alone else heads, k) for k in range(max(len(upper), len(heads)))
-            )
+            labels = tuple(above if head else "" for above, head in pairs)
+            heads = tuple(head or above for above, head in pairs)
         else:
-            heads = tuple(
-                f"{_cell(upper, k)} {_cell(heads, k)}".strip() for k in range(max(len(upper), len(heads)))
-            )
+            heads = tuple(f"{above} {head}".strip() for above, head in pairs)
     width = max(len(row.cells) for row in rows)
     _require_divided(sheet, heads, rows)
     lines = np.array([row.line for row in rows])
-    read = {k: _column(sheet, [_cell(row.cells, k) for row in rows], lines) for k in range(width)}
-    read = _in_one_notation(sheet, read)
+    read = {k: read_column(sheet, [_cell(row.cells, k) for row in rows], lines) for k in range(width)}
+    read = in_one_notation(sheet, read)
     columns: dict[int, Column] = {}
     unread: list[Unread] = []
     for k, one in read.items():
@@ -412,16 +399,12 @@ def _block(
         if one.numbers:
             columns[k] = attrs.evolve(column(title, unit or one.unit), place=k + 1)
             if one.clock:
-                columns[k] = attrs.evolve(
-                    columns[k],
-                    quantity="time",
-                    unit="" if one.halves else "clock",
-                    factor=None if one.halves else 1.0,
-                )
+                unit, factor = ("", None) if one.halves else ("clock", 1.0)
+                columns[k] = attrs.evolve(columns[k], quantity="time", unit=unit, factor=factor)
         elif one.words:
-            unread.append(Unread(_named(title, k), one.words))
+            unread.append(Unread(shown(title, k + 1), one.words))
     beyond = ((k, title) for k, title in enumerate(heads) if k >= width and title)
-    unread += [Unread(_named(title, k), "no cell in it") for k, title in beyond]
+    unread += [Unread(shown(title, k + 1), "no cell in it") for k, title in beyond]
     parts: list[Block] = []
     for group in _side_by_side(columns):
         values = np.stack([read[k].scaled for k in group], axis=1)
@@ -451,7 +434,7 @@ def _block(
                 unsure=any(read[k].unsure for k in group),
                 clock=next((n for n, k in enumerate(group) if read[k].clock), None),
                 noted=tuple(
-                    f"{_named(columns[k].title, k)}: {noted}"
+                    f"{shown(columns[k].title, k + 1)}: {noted}"
                     for k in group
                     for noted in _noted(read[k], k, rows)
                 ),
@@ -460,14 +443,10 @@ def _block(
     return parts
 
 
-def _noted(one: _Read, k: int, rows: Sequence[Row]) -> list[str]:
+def _noted(one: ReadColumn, k: int, rows: Sequence[Row]) -> list[str]:
     """Conclusions on column k: how it was read, or computed."""
     computed = dict.fromkeys(row.computed for row in rows if k == 0 and row.computed)
     return [*([one.noted] if one.noted else []), *computed]
-
-
-def _named(title: str, k: int) -> str:
-    return f"column {title!r}" if title else f"column {k + 1}, which has no title"
 
 
 def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) -> None:
@@ -482,163 +461,6 @@ def _require_divided(sheet: Sheet, heads: Sequence[str], rows: Sequence[Row]) ->
             f"line {rows[0].line}",
             "export it with semicolons or tabs between columns, or with decimal points",
         )
-
-
-@attrs.frozen(eq=False)
-class _Read:
-    """A column read as numbers (values (n,)), or the reason why not."""
-
-    values: Array
-    bad: dict[int, str]
-    cells: tuple[str, ...]
-    numbers: bool = True
-    decimal: str = ""
-    unsure: bool = False
-    clock: bool = False
-    halves: bool = False
-    unit: str = ""
-    words: str = ""
-    noted: str = ""
-    factors: Array | None = None
-
-    @property
-    def scaled(self) -> Array:
-        """Values in the column's one unit, where rows have units of their own."""
-        return self.values if self.factors is None else self.values * self.factors
-
-
-def _column(sheet: Sheet, cells: list[str], lines: Array) -> _Read:
-    """A column of numbers, of a clock, or of words, by most of its cells."""
-    filled = [cell for cell in cells if cell]
-    empty = np.full(len(cells), np.nan)
-    if not filled:
-        return _Read(empty, {}, (), numbers=False)
-    clocks = sum(map(is_clock, filled))
-    if 2 * clocks > len(filled):
-        return _clock_column(cells)
-    apart, unit, factors = _without_units(cells)
-    found = judged(apart, sheet.usual, sheet.forced)
-    _require_one_sign(found, apart, lines)
-    if sheet.forced:
-        _require_forced(sheet, found.unreadable, apart, lines)
-    if 2 * len(found.unreadable) >= len(filled):
-        words = Counter(filled).most_common(1)[0][0]
-        if words.startswith("="):
-            words = (
-                f"formulas without stored values, such as {words!r}: save the values in a spreadsheet program"
-            )
-            return _Read(empty, {}, (), numbers=False, words=words)
-        same = (
-            " in every row" if len(set(filled)) == 1 and len(filled) == len(cells) else f", such as {words!r}"
-        )
-        return _Read(
-            empty, {}, (), numbers=False, words=f"words{same}" if same[0] == "," else f"{words!r}{same}"
-        )
-    noted = ""
-    if found.both:
-        noted = (
-            f"{found.decimal!r} separates decimals as well as thousands from line {lines[found.both[0]]} on: "
-            f"{cells[found.both[0]]} is read as {found.values[found.both[0]]:.10g}"
-        )
-    bad = {i: cells[i] for i in found.unreadable}
-    unsure = not found.sure and not sheet.forced
-    if factors is not None:
-        k = int(np.argmax(np.isfinite(factors) & (factors != 1.0)))
-        other = unit_behind(cells[k])
-        noted = f"its unit changes from {unit!r} to {other!r} at line {lines[k]}: each row is read in its own"
-    return _Read(
-        found.values, bad, tuple(apart), True, found.decimal, unsure, unit=unit, noted=noted, factors=factors
-    )
-
-
-def _without_units(cells: list[str]) -> tuple[list[str], str, Array | None]:
-    """Cells without the units behind their numbers, the unit, and factors (n,) to it where it changes."""
-    apart = with_units(cells)
-    units = Counter(unit for _, unit in apart if unit)
-    if not units:
-        return cells, "", None
-    usual = next((unit for _, unit in apart if unit_of(unit)), units.most_common(1)[0][0])
-    read, one = unit_of(usual) or ("", 1.0)
-    same = {unit: known[1] / one for unit in units if (known := unit_of(unit)) and known[0] == read} or {
-        usual: 1.0
-    }
-    if 2 * sum(units[unit] for unit in same) < sum(map(bool, cells)):
-        return cells, "", None
-    values = [text if unit in same else cell for (text, unit), cell in zip(apart, cells, strict=True)]
-    # Of a number without a unit among those of several nothing is known.
-    alone = 1.0 if len(same) == 1 else np.nan
-    factors = np.array([same.get(unit, alone) for _, unit in apart])
-    return values, usual, None if len(same) == 1 else factors
-
-
-def _require_one_sign(found: Numbers, cells: Sequence[str], lines: Array) -> None:
-    """Raise InputError for a column in which decimal points and commas alternate."""
-    other = "." if found.decimal == "," else ","
-    if not any(other in cell for cell in cells):
-        return
-    apart = [i for i in found.unreadable if number(cells[i], other) is not None]
-    single = [i for i, cell in enumerate(cells) if cell.count(found.decimal) == 1 and other not in cell]
-    usual = float(np.nanmax(np.abs(found.values[single]), initial=0.0))
-    # Read as thousands, these are far from the rest, and as decimals among it.
-    thousands = [
-        i
-        for i, cell in enumerate(cells)
-        if cell.count(other) == 1
-        and found.decimal not in cell
-        and abs(found.values[i]) > _FAR * usual > 0
-        and abs(number(cell, other) or np.inf) <= 2 * usual
-    ]
-    if len(apart) < _ALTERNATING and not thousands:
-        return
-    first, then = (single or [0])[0], (apart or thousands)[0]
-    raise InputError(
-        f"decimal points and commas alternate in a column: {cells[first]!r} in line {lines[first]}, "
-        f"{cells[then]!r} in line {lines[then]}",
-        f"line {lines[then]}",
-        "export it again with one decimal sign, or replace the other one in a text editor",
-    )
-
-
-def _require_forced(sheet: Sheet, unreadable: Sequence[int], cells: Sequence[str], lines: Array) -> None:
-    """Raise InputError for a number that can be read with the other decimal sign only."""
-    other = "." if sheet.forced == "," else ","
-    for i in unreadable:
-        if number(cells[i], other) is not None:
-            raise InputError(
-                f"{cells[i]!r} is not a number where {sheet.forced!r} is the decimal sign",
-                f"line {lines[i]}",
-                f"answer decimal={other}, or leave the decimal sign to the columns",
-            )
-
-
-def _clock_column(cells: list[str]) -> _Read:
-    found = clock(cells)
-    if np.nanmax(found.seconds, initial=0.0) == 0.0:
-        return _Read(found.seconds, {}, (), numbers=False, words="the same date in every row")
-    bad = {i: cells[i] for i in found.unreadable}
-    return _Read(found.seconds, bad, (), clock=True, halves=found.halves)
-
-
-def _in_one_notation(sheet: Sheet, read: dict[int, _Read]) -> dict[int, _Read]:
-    """The columns, ambiguous ones read with the decimal sign of the others."""
-    taken = [
-        one.decimal
-        for one in read.values()
-        if one.cells and not one.unsure and any(_signed(c) for c in one.cells)
-    ]
-    if not taken or sheet.forced:
-        return {k: attrs.evolve(one, unsure=one.unsure and not sheet.usual) for k, one in read.items()}
-    usual = max(set(taken), key=taken.count)
-    return {
-        k: attrs.evolve(one, values=judged(one.cells, usual).values, decimal=usual, unsure=False)
-        if one.unsure
-        else one
-        for k, one in read.items()
-    }
-
-
-def _signed(cell: str) -> bool:
-    return "." in cell or "," in cell
 
 
 def _cell(cells: Sequence[str], k: int) -> str:

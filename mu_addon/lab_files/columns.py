@@ -7,121 +7,80 @@ import unicodedata
 
 import attrs
 
-from ..measured.kinds import CONVERTED, UNITS
+from ..measured.kinds import CONVERTED, UNITS, named
 
-# Names of units beyond those that measured data are read in, by the unit that these are read in, and how much
+# Names of units beyond those that measured data are read in, by the unit that these are read in and how much
 # of it is one of them. The pound-force is exactly 4.4482216152605 N, the inch 25.4 mm.
 _INCH, _POUND, _KILOPOND = 25.4, 4.4482216152605, 9.80665
-_SPELT: dict[str, dict[str, float]] = {
+_SPELT: dict[str, dict[float, str]] = {
     "s": {
-        **dict.fromkeys(
-            ("sec", "secs", "second", "seconds", "sek", "sekunden", "\u0441", "\u0441\u0435\u043a"), 1.0
-        ),
-        **dict.fromkeys(
-            ("\u79d2", "\ucd08", "segundos", "segundo", "seg", "secondes", "secondi", "sekunder"), 1.0
-        ),
-        **dict.fromkeys(
-            (
-                "msec",
-                "millis",
-                "millisecond",
-                "milliseconds",
-                "milisegundos",
-                "millisekunden",
-                "\u043c\u0441",
-            ),
-            1e-3,
-        ),
-        **dict.fromkeys(("\u00b5s", "\u03bcs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
-        "ns": 1e-9,
-        **dict.fromkeys(("mins", "minute", "minutes", "minuten", "minutos", "minuti"), 60.0),
-        **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "stunden", "horas", "heures", "ore"), 3600.0),
-        **dict.fromkeys(("d", "day", "days"), 86400.0),
-        # Times of day of two parts are read as the former.
-        **dict.fromkeys(("h:min", "hh:mm"), 1.0),
-        **dict.fromkeys(("min:s", "mm:ss"), 1.0 / 60.0),
+        # Times of day of two parts are read as hours and minutes.
+        1.0: "sec secs second seconds segundo segundos seg secondes secondi sek sekunden sekunder \u0441 "
+        "\u0441\u0435\u043a \u79d2 \ucd08 h:min hh:mm",
+        1e-3: "msec millis millisecond milliseconds milisegundos millisekunden \u043c\u0441",
+        1e-6: "\u00b5s \u03bcs usec micros microsecond microseconds",
+        1e-9: "ns",
+        60.0: "mins minute minutes minuten minutos minuti",
+        3600.0: "h hr hrs hour hours stunden horas heures ore",
+        86400.0: "d day days",
+        1.0 / 60.0: "min:s mm:ss",
     },
     "mm": {
-        **dict.fromkeys(("in", "inch", "inches"), _INCH),
-        **dict.fromkeys(("\u00b5m", "\u03bcm", "micron", "microns", "\u043c\u043a\u043c"), 1e-3),
-        **dict.fromkeys(
-            (
-                "millimeter",
-                "millimeters",
-                "millimetre",
-                "millimetres",
-                "milimetros",
-                "millimetri",
-                "\u043c\u043c",
-            ),
-            1.0,
-        ),
-        **dict.fromkeys(("mil", "mils", "thou"), _INCH / 1000.0),
-        "ft": 12.0 * _INCH,
-        "nm": 1e-6,
-        "\u0441\u043c": 10.0,
+        1.0: "millimeter millimeters millimetre millimetres milimetros millimetri \u043c\u043c",
+        1e-3: "\u00b5m \u03bcm micron microns \u043c\u043a\u043c",
+        1e-6: "nm",
+        10.0: "\u0441\u043c",
+        _INCH: "in inch inches",
+        _INCH / 1000.0: "mil mils thou",
+        12.0 * _INCH: "ft",
     },
     "N": {
-        **dict.fromkeys(("lbf", "lb", "lbs", "pound", "pounds"), _POUND),
-        **dict.fromkeys(("kgf", "kp", "\u043a\u0433\u0441"), _KILOPOND),
-        **dict.fromkeys(("newton", "newtons", "newtones", "\u043d"), 1.0),
-        **dict.fromkeys(("gf", "grf", "gram-force", "grams-force"), _KILOPOND / 1000.0),
-        "ozf": _POUND / 16.0,
-        "\u043a\u043d": 1e3,
-        "dan": 10.0,
-        "cn": 1e-2,
+        1.0: "newton newtons newtones \u043d",
+        1e-2: "cn",
+        10.0: "dan",
+        1e3: "\u043a\u043d",
+        _POUND: "lbf lb lbs pound pounds",
+        _POUND / 16.0: "ozf",
+        _KILOPOND: "kgf kp \u043a\u0433\u0441",
+        _KILOPOND / 1000.0: "gf grf gram-force grams-force",
     },
     "kPa": {
-        **dict.fromkeys(("N/mm2", "N/mm\u00b2", "N/mm^2", "\u043c\u043f\u0430"), 1e3),
-        **dict.fromkeys(("kN/mm2", "kN/mm\u00b2", "kN/mm^2", "GPa"), 1e6),
-        **dict.fromkeys(("N/m2", "N/m\u00b2", "N/m^2", "\u043f\u0430"), 1e-3),
-        **dict.fromkeys(("kgf/cm2", "kgf/cm\u00b2", "kg/cm2", "kg/cm\u00b2"), 10.0 * _KILOPOND),
-        **dict.fromkeys(("mmHg", "Torr"), 101.325 / 760.0),
-        **dict.fromkeys(("\u043a\u043f\u0430", "kilopascal", "kilopascals", "kilopascales"), 1.0),
-        **dict.fromkeys(("pascal", "pascals", "pascales"), 1e-3),
-        **dict.fromkeys(("megapascal", "megapascals"), 1e3),
-        "millibar": 0.1,
-        "atm": 101.325,
-        **dict.fromkeys(("mmH2O", "mmWC", "mmWS"), 0.00980665),
-        **dict.fromkeys(("cmH2O", "cmWC", "cmWS"), 0.0980665),
-        "inH2O": _INCH * 0.00980665,
-        "inHg": _INCH * 101.325 / 760.0,
-        "ksi": 1e3 * CONVERTED["kPa"]["psi"],
-        "hPa": 0.1,
+        1.0: "\u043a\u043f\u0430 kilopascal kilopascals kilopascales",
+        1e-3: "N/m2 N/m\u00b2 N/m^2 \u043f\u0430 pascal pascals pascales",
+        1e3: "N/mm2 N/mm\u00b2 N/mm^2 \u043c\u043f\u0430 megapascal megapascals",
+        1e6: "kN/mm2 kN/mm\u00b2 kN/mm^2 GPa",
+        0.1: "millibar hPa",
+        10.0 * _KILOPOND: "kgf/cm2 kgf/cm\u00b2 kg/cm2 kg/cm\u00b2",
+        101.325: "atm",
+        101.325 / 760.0: "mmHg Torr",
+        _INCH * 101.325 / 760.0: "inHg",
+        0.00980665: "mmH2O mmWC mmWS",
+        0.0980665: "cmH2O cmWC cmWS",
+        _INCH * 0.00980665: "inH2O",
+        1e3 * CONVERTED["kPa"]["psi"]: "ksi",
     },
-    "deg": dict.fromkeys(("\u00b0", "degree", "degrees", "grad", "grados", "gradi", "degres", "\u00ba"), 1.0),
+    "deg": {1.0: "\u00b0 \u00ba degree degrees grad grados gradi degres"},
     "": {
-        **dict.fromkeys(("mm/mm", "m/m", "in/in", "1", "-"), 1.0),
-        "%": 1e-2,
-        **dict.fromkeys(
-            ("\u00b5\u03b5", "\u03bc\u03b5", "ue", "microstrain", "\u00b5m/m", "\u03bcm/m"), 1e-6
-        ),
+        1.0: "mm/mm m/m in/in 1 -",
+        1e-2: "%",
+        1e-6: "\u00b5\u03b5 \u03bc\u03b5 ue microstrain \u00b5m/m \u03bcm/m",
     },
-    "V": {"volt": 1.0, "volts": 1.0, "\u0432": 1.0},
-    "mm3": {
-        **dict.fromkeys(("mm\u00b3", "mm^3", "\u00b5l", "\u03bcl"), 1.0),
-        **dict.fromkeys(("cm\u00b3", "cc", "cm^3"), 1e3),
-    },
-    "g": {**dict.fromkeys(("gram", "grams", "gramm"), 1.0), "oz": 28.349523125},
+    "V": {1.0: "volt volts \u0432"},
+    "mm3": {1.0: "mm\u00b3 mm^3 \u00b5l \u03bcl", 1e3: "cm\u00b3 cc cm^3"},
+    "g": {1.0: "gram grams gramm", 28.349523125: "oz"},
 }
 _UNITS = {
     unicodedata.normalize("NFC", name).casefold(): (read, factor)
-    for read, names in _SPELT.items()
-    for name, factor in {**({read: 1.0} if read else {}), **CONVERTED[read], **names}.items()
+    for read, spelt in _SPELT.items()
+    for names in (
+        {read: 1.0} if read else {},
+        CONVERTED[read],
+        {n: f for f, s in spelt.items() for n in s.split()},
+    )
+    for name, factor in names.items()
 }
-# These differ by their case alone.
-_BY_CASE = {
-    "mN": ("N", 1e-3),
-    "MN": ("N", 1e6),
-    "mPa": ("kPa", 1e-6),
-    "MPa": ("kPa", 1e3),
-    "M": None,
-    "S": None,
-    "V": ("V", 1.0),
-    "v": None,
-    "H": None,
-}
-
+# These differ from others by their case alone.
+_BY_CASE = {"MN": ("N", 1e6), "mPa": ("kPa", 1e-6), **dict.fromkeys(("M", "S", "v", "H"))}
 
 # A unit of pressure with the zero it counts from, such as psia, bar(g) and kPa abs, and titles that say so.
 _REFERENCE = re.compile(
@@ -200,10 +159,10 @@ _WORDS = tuple(
         ),
     )
 )
-# Units that quantities are read in. A machine's position is a displacement, a stretch (1 at rest) a strain; a
-# count is not read.
+# Units that quantities are read in; a count is not read.
 READ_IN = {**UNITS, "position": "mm", "stretch": "", "count": ""}
-READ_AS = {"position": "displacement", "stretch": "strain"}
+# A machine's position is a displacement, a stretch (1 at rest) a strain.
+_READ_AS = {"position": "displacement", "stretch": "strain"}
 # Never concluded from a unit, which suggests a more usual quantity.
 _ONLY_BY_NAME = ("angle_sd", "stress_sd", "orientation", "tip_deflection")
 _UNIT = r"(?:\(([^()]*)\)|\[([^\[\]]*)\]|\{([^{}]*)\})"
@@ -237,6 +196,11 @@ class Column:
         match = _REFERENCE.fullmatch(self.unit.casefold())
         word = match[2] if match else (_ABSOLUTE.search(plain(self.title)) or [""])[0]
         return {"a": "absolute", "g": "gauge", "": ""}[word[:1]] if self.quantity == "pressure" else ""
+
+    @property
+    def reads(self) -> str:
+        """Name of the column of measured data that it is read as, such as force_N."""
+        return named(_READ_AS.get(self.quantity, self.quantity))
 
     @property
     def name(self) -> str:
@@ -340,3 +304,8 @@ def _meant(name: str, unit: str | None = None) -> str:
         if pattern.search(words) and (unit is None or READ_IN[quantity] == unit):
             return quantity
     return ""
+
+
+def shown(title: str, place: int) -> str:
+    """Title of a column in a text; place: its number in its table."""
+    return f"column {title!r}" if title else f"column {place}, which has no title"

@@ -8,17 +8,18 @@ from collections.abc import Mapping
 
 from ..table_cells.notation import number
 from .columns import unit_of
+from .proposal import Proposal
 
-LENGTH = re.compile(
+_LENGTH = re.compile(
     r"gau?ge length|dimension\W+length|grip separation|messlange|einspannlange|anfangslange|initial length|"
     r"specimen length|\bheight\b|\bhohe\b|probenhohe|longueur|lunghezza|longitud|\bl0\b"
 )
-WIDTH = re.compile(r"width|breite|largeur|larghezza|anchura|szerokosc|\bb0\b")
-THICKNESS = re.compile(r"thickness|dicke|epaisseur|spessore|espesor|grubosc|\ba0\b")
-DIAMETER = re.compile(r"diameter|durchmesser|diametre|diametro|srednica|\bd0\b")
-AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
-SECTION = re.compile(r"section|querschnitt")
-NAME = re.compile(
+_WIDTH = re.compile(r"width|breite|largeur|larghezza|anchura|szerokosc|\bb0\b")
+_THICKNESS = re.compile(r"thickness|dicke|epaisseur|spessore|espesor|grubosc|\ba0\b")
+_DIAMETER = re.compile(r"diameter|durchmesser|diametre|diametro|srednica|\bd0\b")
+_AREA = re.compile(r"\barea\b|querschnitt|section area|\bs0\b|aire\b")
+_SECTION = re.compile(r"section|querschnitt")
+_NAME = re.compile(
     r"specimen (label|name|id)|sample (name|id)|probenbezeichnung|probenname|specimen$|sample$|probe$"
 )
 # In a line of text a number and its unit follow its name at once.
@@ -32,12 +33,43 @@ _PAIR = re.compile(rf"\D{{0,20}}?{_NUMBER}\s*[x\u00d7*]\s*{_NUMBER}\s*(\w+)\s*$"
 Facts = Mapping[str, tuple[str, ...]]
 
 
-def named(facts: Facts, pattern: re.Pattern[str]) -> str:
-    """Text that a line gives for a name, "" without one."""
-    return next((cells[0] for key, cells in facts.items() if cells and pattern.search(key)), "")
+def specimen(draft: Proposal) -> str:
+    """Name of the specimen in the file, "" without one."""
+    facts = draft.block.facts.items()
+    return next((cells[0] for key, cells in facts if cells and _NAME.search(key)), "")
 
 
-def size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | None:
+def section_mm(draft: Proposal) -> tuple[Proposal, list[float] | None]:
+    """Width and thickness in mm by an answer or the file; a round section as a square of equal area."""
+    lines, decimal = draft.block.facts, draft.block.decimal
+    if "section_mm" in draft.answers:
+        return draft, draft.numbers("section_mm", (2,))
+    width, thickness, diameter, area = (
+        _size_mm(lines, pattern, decimal) for pattern in (_WIDTH, _THICKNESS, _DIAMETER, _AREA)
+    )
+    pair = [width, thickness] if width and thickness else _pair_mm(lines, _SECTION, decimal)
+    if pair:
+        return draft.concluding(f"section of {pair[0]:g} x {pair[1]:g} mm, as the file says"), pair
+    side = _square_mm(area, diameter)
+    if side:
+        words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
+        return draft.concluding(f"section {words}, as the file says: given as a square of that area"), [
+            side,
+            side,
+        ]
+    return draft, None
+
+
+def length_mm(draft: Proposal) -> tuple[Proposal, float | None]:
+    """Length in mm by an answer or the file."""
+    answered = draft.positive("length_mm")
+    length = answered or _size_mm(draft.block.facts, _LENGTH, draft.block.decimal)
+    if length and not answered:
+        draft = draft.concluding(f"length of {length:g} mm, as the file says")
+    return draft, length
+
+
+def _size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | None:
     """A positive length in mm, or area in mm2, that the lines state; None without it or its unit."""
     for key, cells in facts.items():
         text = " ".join((key, *cells))
@@ -56,7 +88,7 @@ def size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | Non
     return None
 
 
-def pair_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> list[float] | None:
+def _pair_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> list[float] | None:
     """Two lengths in mm as in "section: 10 x 2 mm"; None without them."""
     for key, cells in facts.items():
         text = " ".join((key, *cells))
@@ -68,7 +100,7 @@ def pair_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> list[float]
     return None
 
 
-def square_mm(area: float | None, diameter: float | None) -> float | None:
+def _square_mm(area: float | None, diameter: float | None) -> float | None:
     """Side in mm of the square with a section's area, by its area in mm2 or its diameter in mm."""
     if area:
         return round(math.sqrt(area), 6)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any
 
 import attrs
 import numpy as np
 
 from ..measured.kinds import KINDS, named
+from ..table_cells.notation import Array
 from .columns import READ_IN, plain, unit_of
-from .draft import Draft, NoExperiment
+from .proposal import NoExperiment, Proposal
 from .quantities import ask_column, may_hold
-
-Array = np.ndarray[Any, Any]
 
 _TENSION = re.compile(r"tensil|tension test|zugversuch|\bzug\b|traction|trazione|traccion|rozciagan")
 _COMPRESSION = re.compile(r"compress|druckversuch|stauch|druckspannung|\bdruck\b|schiacc|sciskan")
@@ -41,7 +39,7 @@ _KNOWN_BY = (
 )
 
 
-def with_kind(draft: Draft) -> Draft:
+def with_kind(draft: Proposal) -> Proposal:
     """The draft with its kind, "" where it must be asked; raises InputError, NoExperiment."""
     asked = any(question.key.startswith("column.") for question in draft.questions)
     answer = draft.choice("kind", tuple(KINDS))
@@ -75,17 +73,17 @@ def with_kind(draft: Draft) -> Draft:
     )
     raise NoExperiment(
         f"no kind of experiment has {' and '.join(sorted(have)) or 'no known column'} alone; there are "
-        f"{draft.titles()}{_unread(draft)}",
+        f"{draft.titles}{_unread(draft)}",
         draft.where,
         f"export the columns of one kind ({ways}), or say with column.TITLE=QUANTITY what a column holds",
     )
 
 
-def _loading(draft: Draft) -> Draft:
+def _loading(draft: Proposal) -> Proposal:
     """Kind of loading, tension of a specimen or compression of a lattice, by the file's text."""
     block = draft.block
     words = " ".join(
-        [draft.path.stem, block.sheet, block.label, *(c.title for c in block.columns)]
+        [draft.file.stem, block.sheet, block.label, *(c.title for c in block.columns)]
         + [" ".join((key, *cells)) for key, cells in block.facts.items()]
     )
     pulled, pressed = (bool(pattern.search(plain(words))) for pattern in (_TENSION, _COMPRESSION))
@@ -109,7 +107,7 @@ def _is_stepped(columns: Mapping[str, Array]) -> bool:
     return bool(np.abs(later - p).max() >= _STEP * extent)
 
 
-def require_curve(draft: Draft) -> Draft:
+def require_curve(draft: Proposal) -> Proposal:
     """Raise NoExperiment for amplitudes of an oscillation, and for one strain alone.
 
     A column whose quantity is answered is taken as it is.
@@ -126,10 +124,14 @@ def require_curve(draft: Draft) -> Draft:
                 f"column.{draft.key(one)}=none, or with its quantity",
             )
     for name in ("strain", "displacement_mm"):
-        values = draft.columns.get(name)
-        if "time_s" in draft.columns or values is None or len(set(values[np.isfinite(values)])) != 1:
+        read = draft.table.get(name)
+        if read is None or read.place is None or "time_s" in draft.table:
             continue
-        if draft.answer_on("column", draft.block.columns[draft.places[name]])[1] is None:
+        values = read.values
+        if (
+            len(set(values[np.isfinite(values)])) == 1
+            and draft.answer_on("column", draft.block.columns[read.place])[1] is None
+        ):
             raise NoExperiment(
                 f"{name} is {np.nanmax(values):g} in every row, and there is no time: that is no curve",
                 draft.where,
@@ -138,7 +140,7 @@ def require_curve(draft: Draft) -> Draft:
     return draft
 
 
-def with_needed(draft: Draft) -> Draft:
+def with_needed(draft: Proposal) -> Proposal:
     """Ask for the columns that the kind needs; raises NoExperiment if no candidate is left."""
     have, kind = set(draft.columns), KINDS[draft.kind]
     groups = [set(group) | ({"time_s"} if kind.timed else set()) for group in kind.needs]
@@ -156,7 +158,7 @@ def with_needed(draft: Draft) -> Draft:
     if not unknown:
         raise NoExperiment(
             f"{kind.name} needs {' and '.join(gone)}, and no column is left that may hold it; there are "
-            f"{draft.titles()}{_unread(draft)}",
+            f"{draft.titles}{_unread(draft)}",
             draft.where,
             "export that column as well, choose another kind, or say with column.TITLE=QUANTITY and "
             "unit.TITLE=UNIT what a column holds",
@@ -167,7 +169,7 @@ def with_needed(draft: Draft) -> Draft:
     return draft
 
 
-def _unread(draft: Draft) -> str:
+def _unread(draft: Proposal) -> str:
     """Columns that were not read, with the reasons, for an error."""
     listed = "; ".join(one.words for one in draft.unread if one.what)
     return f"; not read: {listed}" if listed else ""

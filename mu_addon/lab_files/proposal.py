@@ -1,312 +1,208 @@
-"""Experiments in the tables of laboratory files, the conclusions drawn, and the open questions.
-
-An experiment is made in steps, each a function from a draft to the next one.
-"""
+"""An experiment that is made of a table: its columns, what was decided, and the open questions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from ..measured.folder import LIKE_ABSOLUTE_kPa
-from ..measured.kinds import ACCURACIES, AXES, KINDS, MODES, PLATES, VALVES, may_be_missing
-from ..table_cells.notation import DECIMALS, number
-from . import facts
+from ..errors import InputError
+from ..table_cells.notation import Array
 from .blocks import Block, Unread
-from .decisions import kept_by
-from .draft import Draft, NoExperiment, Question
-from .kind import require_curve, with_kind, with_needed
-from .quantities import free_columns, read_columns
-from .signs import LOADS, jumps, turned
-from .times import with_interval, with_rising_time
+from .columns import Column, shown
 
-Array = np.ndarray[Any, Any]
 
-# A displacement that begins farther from zero than this share of its range is a place of the machine.
-_OFFSET = 0.02
-# A column that is missing in a larger share of the rows is left out instead of them, where it may be.
-_SPARSE = 0.1
-# Jumps of a column that are named at most.
-_MOST_JUMPS = 3
-_KEYS_OF_NUMBERS = (
-    "temperature_C",
-    "scale",
-    "orientation_deg",
-    "mass_g",
-    "strut_mm",
-    "chamber_volume_mm3",
-    "gap_mm",
-    *ACCURACIES,
-)
-_KEYS_OF_CHOICE = {
-    "plates": PLATES,
-    "axis": AXES,
-    "valve": VALVES,
-    "orientation_axis": AXES,
-    "mode": MODES,
-    "pressure": ("gauge", "absolute"),
-}
+class NoExperiment(InputError):
+    """A table from which no experiment can be made."""
+
+
+@attrs.frozen
+class Question:
+    """A question that a file leaves open: its key, its text, and possible answers.
+
+    proposed: the likely answer, "" without one.
+    """
+
+    key: str
+    words: str
+    choices: tuple[str, ...] = ()
+    proposed: str = ""
+
+    @property
+    def text(self) -> str:
+        """The question with its possible answers."""
+        return self.words + (f" ({', '.join(self.choices)})" if self.choices else "")
+
+
+@attrs.frozen(eq=False)
+class Series:
+    """A column that is read.
+
+    values (n,): in the unit that its name ends with; origin: title and unit in the file, or how it was made;
+    place: position in the file's table, None for one that was made.
+    """
+
+    values: Array
+    origin: str
+    place: int | None = None
 
 
 @attrs.frozen(eq=False)
 class Proposal:
-    """One experiment, as far as it was read.
+    """One experiment, as far as it was read and decided: each step returns a new one.
 
-    file, sheet: its source; lines (n,): of the rows read; keys: of experiments.toml; columns: arrays (n,) by
-    their names in a folder of measured data; origin: source of each column; concluded: changes and
-    assumptions; unread: lines and columns that are not read; questions: those still open; titles: of all
-    columns of the table, and their numbers.
+    file, block: its source; name: of the experiment; answers: by key, as text; rows (n,): of the block, those
+    that are read; concluded: changes and assumptions; unread: lines and columns that are not read; table: the
+    columns by their names in a folder of measured data; free: positions of columns of no known quantity;
+    kind, keys: of experiments.toml; questions: those still open.
     """
 
     file: Path
-    sheet: str
-    lines: Array
-    keys: dict[str, Any]
-    columns: dict[str, Array]
-    origin: dict[str, str]
+    block: Block
+    name: str
+    answers: Mapping[str, str]
+    rows: Array
     concluded: tuple[str, ...]
     unread: tuple[Unread, ...]
-    questions: tuple[Question, ...]
-    titles: tuple[str, ...]
+    table: Mapping[str, Series] = attrs.field(factory=dict)
+    free: tuple[int, ...] = ()
+    kind: str = ""
+    keys: Mapping[str, Any] = attrs.field(factory=dict)
+    questions: tuple[Question, ...] = ()
+
+    @classmethod
+    def of(cls, file: Path, block: Block, name: str, answers: Mapping[str, str]) -> Proposal:
+        """The proposal of a table of which nothing is decided."""
+        return cls(file, block, name, answers, np.arange(len(block.lines)), block.noted, block.unread)
 
     @property
-    def name(self) -> str:
-        """The experiment's name."""
-        return str(self.keys["name"])
+    def columns(self) -> dict[str, Array]:
+        """Values (n,) of the columns."""
+        return {name: one.values for name, one in self.table.items()}
 
     @property
-    def place(self) -> str:
-        """Name of the file, sheet and lines, in words."""
-        sheet = f", sheet {self.sheet!r}" if self.sheet else ""
-        return f"{self.file.name}{sheet}, lines {self.lines[0]} to {self.lines[-1]}"
+    def origin(self) -> dict[str, str]:
+        """Source of each column."""
+        return {name: one.origin for name, one in self.table.items()}
+
+    @property
+    def lines(self) -> Array:
+        """Lines (n,) of the rows in the file."""
+        return np.asarray(self.block.lines[self.rows])
 
     @property
     def where(self) -> str:
-        """The same with the file's path."""
-        return f"{self.file}{self.place.removeprefix(self.file.name)}"
+        """File, sheet and lines of the whole table."""
+        return self._at(str(self.file), self.block.lines)
 
+    @property
+    def source(self) -> str:
+        """File, sheet and lines of the rows that are read."""
+        return self._at(str(self.file), self.lines)
 
-def propose(path: Path, block: Block, name: str, answers: Mapping[str, str]) -> Proposal:
-    """Make an experiment of a table.
+    @property
+    def place(self) -> str:
+        """The same without the file's folder."""
+        return self._at(self.file.name, self.lines)
 
-    name: of the experiment; answers: by key, as text, of this experiment. Raises InputError for an invalid
-    answer, for a time that does not increase, and NoExperiment where columns are missing.
-    """
-    draft = with_kind(read_columns(Draft.of(path, block, name, answers)))
-    for step in _STEPS if draft.kind else ():
-        draft = step(draft)
-    draft = free_columns(draft)
-    return Proposal(
-        file=path,
-        sheet=block.sheet,
-        lines=draft.lines,
-        keys=dict(draft.keys) if draft.kind else {"name": name},
-        columns=dict(draft.columns),
-        origin={column: draft.origin[column] for column in draft.columns},
-        concluded=draft.concluded,
-        unread=draft.unread,
-        questions=draft.questions,
-        titles=tuple(title for c in block.columns for title in dict.fromkeys((c.name, str(c.place)))),
-    )
+    def _at(self, file: str, lines: Array) -> str:
+        sheet = f", sheet {self.block.sheet!r}" if self.block.sheet else ""
+        return f"{file}{sheet}, lines {lines[0]} to {lines[-1]}"
 
+    def concluding(self, words: str) -> Proposal:
+        """With a conclusion."""
+        return attrs.evolve(self, concluded=(*self.concluded, words))
 
-def answers_for(name: str, given: Mapping[str, str]) -> dict[str, str]:
-    """Answers for an experiment: those under its name before those for all."""
-    general = {key: value for key, value in given.items() if "." not in key or key.startswith(_OWN)}
-    own = {key[len(name) + 1 :]: value for key, value in given.items() if key.startswith(name + ".")}
-    return general | own
+    def left(self, what: str, why: str, lines: Sequence[int] = ()) -> Proposal:
+        """With a part that is not read."""
+        return attrs.evolve(self, unread=(*self.unread, Unread(what, why, tuple(lines))))
 
+    def asked(self, key: str, words: str, choices: Sequence[str] = (), proposed: str = "") -> Proposal:
+        """With an open question."""
+        return attrs.evolve(self, questions=(*self.questions, Question(key, words, tuple(choices), proposed)))
 
-# Answers about a column begin so, and hold its title.
-_OWN = ("unit.", "column.")
+    def with_column(self, name: str, values: Array, origin: str = "", place: int | None = None) -> Proposal:
+        """With a column, or with other values of the one of this name, whose source it keeps."""
+        one = Series(values, origin, place) if origin else attrs.evolve(self.table[name], values=values)
+        return attrs.evolve(self, table={**self.table, name: one})
 
+    def without_column(self, name: str, why: str) -> Proposal:
+        """Without a column, which is listed as unread."""
+        place = self.table[name].place
+        found = attrs.evolve(self, table={other: one for other, one in self.table.items() if other != name})
+        return found if place is None else found.left(self.title(place), why)
 
-def _of_kind(draft: Draft) -> Draft:
-    """The draft with the columns that its kind may have."""
-    for name in draft.columns:
-        if not KINDS[draft.kind].knows(name):
-            draft = draft.without_column(name, f"{name} is not a column of {draft.kind}")
-    return draft
+    def with_rows(self, keep: Array) -> Proposal:
+        """With the rows of a mask (n,) alone."""
+        table = {name: attrs.evolve(one, values=one.values[keep]) for name, one in self.table.items()}
+        return attrs.evolve(self, table=table, rows=self.rows[keep])
 
+    # Columns of the table, and what is answered about them.
 
-def _with_complete_rows(draft: Draft) -> Draft:
-    """Rows without missing required values; the others are listed with the reason."""
-    kind = KINDS[draft.kind]
-    reasons: dict[str, list[int]] = {}
-    keep = np.full(len(draft.rows), True)
-    for name, values in draft.columns.items():
-        gone = np.isnan(values)
-        if not gone.any() or name not in draft.places:
-            continue
-        others = set(draft.columns) - {name}
-        if gone.mean() > _SPARSE and name != "time_s" and any(others.issuperset(g) for g in kind.needs):
-            draft = draft.without_column(name, f"missing in {gone.sum()} of {len(gone)} rows")
-            continue
-        for i in np.flatnonzero(gone):
-            text = draft.block.bad.get((int(i), draft.places[name]))
-            why = _why_missing(text, draft.title(draft.places[name]), draft.block.decimal)
-            if may_be_missing(name) and text is not None:
-                reasons.setdefault(f"{why}: left empty", []).append(int(draft.lines[i]))
-            elif not may_be_missing(name) and keep[i]:
-                reasons.setdefault(why, []).append(int(draft.lines[i]))
-                keep[i] = False
-    for why, lines in reasons.items():
-        draft = draft.left("", why, lines)
-    if keep.sum() < kind.fewest:
-        raise NoExperiment(
-            f"{keep.sum()} rows have all that {kind.name} needs, at least {kind.fewest} must: "
-            + "; ".join(one.words for one in draft.unread[-3:]),
-            draft.where,
-            "correct these cells, or leave a column out with column.TITLE=none",
-        )
-    columns = {name: values[keep] for name, values in draft.columns.items()}
-    return attrs.evolve(draft, columns=columns, rows=draft.rows[keep])
+    def title(self, k: int) -> str:
+        """Column k as text."""
+        one = self.block.columns[k]
+        unit = f" [{one.unit}]" if one.unit and one.unit not in one.title else ""
+        return shown(one.title, one.place) + unit
 
+    @property
+    def titles(self) -> str:
+        """All columns as text."""
+        return ", ".join(map(self.title, range(len(self.block.columns))))
 
-def _why_missing(text: str | None, title: str, decimal: str) -> str:
-    if text is None:
-        return f"no number in {title}"
-    (other,) = (sign for sign in DECIMALS if sign != decimal)
-    signs = {".": "decimal point", ",": "decimal comma"}
-    if number(text, other) is not None:
-        return f"{text!r} in {title} has a {signs[other]}, the others have a {signs[decimal]}"
-    return f"{text!r} in {title} is not a number"
+    def extent(self, k: int) -> str:
+        """The least and the largest number of column k as text, "" if it has none."""
+        values = self.block.values[:, k]
+        return f" ({np.nanmin(values):.6g} to {np.nanmax(values):.6g})" if np.isfinite(values).any() else ""
 
+    def key(self, one: Column) -> str:
+        """Name of a column in answers: its number if others have its title."""
+        return one.name if [c.title for c in self.block.columns].count(one.title) == 1 else str(one.place)
 
-def _with_zero(draft: Draft) -> Draft:
-    """Shift a displacement that begins at a position of the machine to begin at zero."""
-    found = draft.columns.get("displacement_mm")
-    if found is None or draft.choice("zero", ("as_read",)):
-        return draft
-    first = float(found[0])
-    if abs(first) <= _OFFSET * float(np.ptp(found)):
-        return draft
-    return draft.with_column("displacement_mm", found - first).concluding(
-        f"displacement_mm: minus its first value, {first:g} mm, the machine's position {kept_by('zero')}"
-    )
+    def answer_on(self, key: str, one: Column) -> tuple[str, str | None]:
+        """Key and text of an answer about a column, `unit` or `column`, by its title or its number."""
+        keys = [f"{key}.{one.title}", f"{key}.{one.place}"] if one.title else [f"{key}.{one.place}"]
+        if self.key(one) != one.title:
+            keys.reverse()
+        found = next((k for k in keys if k in self.answers), keys[0])
+        return found, self.answers.get(found)
 
+    # Answers as values.
 
-def _with_signs(draft: Draft) -> Draft:
-    """The loads with their signs; jumps of one column alone are named."""
-    if draft.kind not in ("coupon", "lattice_compression"):
-        return draft
-    loads = [name for name in LOADS if name in draft.columns]
-    for name in loads:
-        for row in jumps(draft.columns, name)[:_MOST_JUMPS]:
-            by = draft.columns[name][row] - draft.columns[name][row - 1]
-            line = draft.lines[row]
-            draft = draft.concluding(
-                f"{name}: jumps by {by:.4g} at line {line} while the test goes on; check it"
+    def choice(self, key: str, choices: Sequence[str]) -> str | None:
+        """An answer of one of `choices`, None without one; raises InputError for another."""
+        answer = self.answers.get(key)
+        if answer is not None and answer not in choices:
+            raise InputError(
+                f"{key} = {answer!r} is not known", self.where, f"choose one of {', '.join(choices)}"
             )
-    pressed = draft.kind == "lattice_compression"
-    found = () if draft.choice("sign", ("as_read",)) else turned(draft.columns, pressed)
-    for name in found:
-        draft = draft.with_column(name, 0.0 - draft.columns[name]).concluding(
-            f"{name}: sign turned, positive in {'compression' if pressed else 'tension'} {kept_by('sign')}"
-        )
-    if not pressed and not found and all(np.mean(draft.columns[name]) < 0 for name in loads):
-        draft = draft.concluding("force and displacement are negative: read as compression of the coupon")
-    return draft
+        return answer
 
+    def numbers(self, key: str, counts: Sequence[int] = (1,), whole: bool = False) -> list[Any]:
+        """Numbers of an answer such as 12.5x3 or 3,3,3, as many as one of `counts`; raises InputError."""
+        parts = [part for part in re.split(r"[x\u00d7,; ]+", self.answers[key].strip("[]() ")) if part]
+        try:
+            values = [int(part) if whole else float(part) for part in parts]
+        except ValueError:
+            values = []
+        if len(values) not in counts or not all(math.isfinite(value) for value in values):
+            raise InputError(
+                f"{key} = {self.answers[key]!r} is not {' or '.join(map(str, counts))} numbers",
+                self.where,
+                f"write it as {'3x3x3' if whole else 'x'.join(['12.5', '3', '1'][: counts[0]])}",
+            )
+        return values
 
-def _with_keys(draft: Draft) -> Draft:
-    """Keys of experiments.toml: answers, then facts in the file, else a question."""
-    kind, block = KINDS[draft.kind], draft.block
-    keys: dict[str, Any] = {"name": draft.name, "kind": draft.kind}
-    keys["specimen"] = draft.answers.get("specimen") or facts.named(block.facts, facts.NAME) or draft.name
-    keys["role"] = draft.choice("role", ("fit", "held_out")) or "fit"
-    keys["source"] = draft.path.name
-    keys |= {key: draft.numbers(key)[0] for key in _KEYS_OF_NUMBERS if key in draft.answers}
-    keys |= {key: draft.choice(key, choices) for key, choices in _KEYS_OF_CHOICE.items()}
-    if draft.kind == "coupon" and keys["mode"] is None:
-        draft = draft.asked("mode", "how was the coupon loaded?", MODES, "uniaxial")
-    if draft.kind == "blocked_force" and "gap_mm" not in keys:
-        draft = draft.asked("gap_mm", "how far in mm was the load cell from the tip at rest?", (), "0")
-    if "pressure" in kind.keys and keys["pressure"] is None and "pressure_kPa" in draft.columns:
-        draft, keys["pressure"] = _reference(draft)
-    if "cells" in draft.answers and "cells" in kind.keys:
-        cells = draft.numbers("cells", (1, 3), whole=True)
-        keys["cells"] = cells if len(cells) == 3 else cells[0]
-    draft, keys["section_mm"] = _section(draft)
-    draft, keys["length_mm"] = _length(draft)
-    # Section and length turn force and displacement into stress and strain.
-    beam = draft.kind == "beam_deadweight"
-    if keys["section_mm"] is None and (beam or _computed(draft, "stress_kPa", "force_N")):
-        draft = draft.asked("section_mm", "width and thickness of the section in mm, as 12.5x3?")
-    if keys["length_mm"] is None and (beam or _computed(draft, "strain", "displacement_mm")):
-        words = "length in mm over which the displacement is taken (gauge length, height of a block)?"
-        draft = draft.asked("length_mm", words)
-    given = {key: value for key, value in keys.items() if value is not None and key in kind.keys}
-    return attrs.evolve(draft, keys=given)
-
-
-def _computed(draft: Draft, wanted: str, source: str) -> bool:
-    """Return True if a load's column follows from another one by a size of the specimen."""
-    return KINDS[draft.kind].knows(wanted) and wanted not in draft.columns and source in draft.columns
-
-
-def _reference(draft: Draft) -> tuple[Draft, str | None]:
-    """Whether pressures are gauge or absolute ones: by the column's unit or title, or asked."""
-    values = draft.columns["pressure_kPa"]
-    least, most = float(np.nanmin(values)), float(np.nanmax(values))
-    stated = draft.keys.get("pressure")
-    if stated == "absolute" and least > 0:
-        return draft.concluding(
-            "pressure = absolute, by unit or title (pressure=gauge for another)"
-        ), "absolute"
-    low, high = LIKE_ABSOLUTE_kPa
-    if stated is None and low < least and most < high:
-        words = (
-            f"pressures are from {least:.4g} to {most:.4g} kPa: are they absolute, or above the atmosphere's?"
-        )
-        draft = draft.asked("pressure", words, _KEYS_OF_CHOICE["pressure"], "absolute")
-    return draft, stated if stated == "gauge" else None
-
-
-def _section(draft: Draft) -> tuple[Draft, list[float] | None]:
-    """Width and thickness in mm by an answer or the file; a round section as a square of equal area."""
-    lines, decimal = draft.block.facts, draft.block.decimal
-    if "section_mm" in draft.answers:
-        return draft, draft.numbers("section_mm", (2,))
-    width, thickness, diameter, area = (
-        facts.size_mm(lines, pattern, decimal)
-        for pattern in (facts.WIDTH, facts.THICKNESS, facts.DIAMETER, facts.AREA)
-    )
-    pair = [width, thickness] if width and thickness else facts.pair_mm(lines, facts.SECTION, decimal)
-    if pair:
-        return draft.concluding(f"section of {pair[0]:g} x {pair[1]:g} mm, as the file says"), pair
-    side = facts.square_mm(area, diameter)
-    if side:
-        words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
-        return draft.concluding(f"section {words}, as the file says: given as a square of that area"), [
-            side,
-            side,
-        ]
-    return draft, None
-
-
-def _length(draft: Draft) -> tuple[Draft, float | None]:
-    """Length in mm by an answer or the file."""
-    answered = draft.positive("length_mm")
-    length = answered or facts.size_mm(draft.block.facts, facts.LENGTH, draft.block.decimal)
-    if length and not answered:
-        draft = draft.concluding(f"length of {length:g} mm, as the file says")
-    return draft, length
-
-
-_STEPS = (
-    with_interval,
-    require_curve,
-    with_needed,
-    _of_kind,
-    _with_complete_rows,
-    with_rising_time,
-    # A place of the machine may be negative: its change tells the sign.
-    _with_zero,
-    _with_signs,
-    _with_keys,
-)
+    def positive(self, key: str) -> float | None:
+        """An answer of one number above 0, None without one; raises InputError."""
+        if key not in self.answers:
+            return None
+        value = float(self.numbers(key)[0])
+        if value <= 0:
+            raise InputError(f"{key} = {value:g} is not above 0", self.where, "give a number above 0")
+        return value

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import attrs
 import numpy as np
 
 from ..errors import InputError
-from ..measured.kinds import KINDS, named
-from .columns import READ_AS, READ_IN, Column, column, known_in, plain, unit_of
-from .draft import Draft
-
-Array = np.ndarray[Any, Any]
+from ..measured.kinds import KINDS
+from ..table_cells.notation import Array
+from .columns import READ_IN, Column, column, known_in, plain, unit_of
+from .proposal import Proposal
 
 # A stretch at rest is 1, a strain 0, within this.
 _AT_REST = 0.1
@@ -39,13 +37,13 @@ OFTEN = {
 }
 
 
-def read_columns(draft: Draft) -> Draft:
+def read_columns(draft: Proposal) -> Proposal:
     """The draft with the columns of known quantity; of several of one quantity the first is read."""
     found: dict[str, list[tuple[int, Column]]] = {}
     for k in range(len(draft.block.columns)):
-        draft, one = _identified(draft, k)
+        draft, one = identified(draft, k)
         if one is not None:
-            found.setdefault(named(READ_AS.get(one.quantity, one.quantity)), []).append((k, one))
+            found.setdefault(one.reads, []).append((k, one))
     taken = {name: min(group, key=_rank) for name, group in found.items()}
     for name, group in found.items():
         for k, one in group:
@@ -58,9 +56,9 @@ def read_columns(draft: Draft) -> Draft:
     return draft
 
 
-def with_values(draft: Draft, k: int, one: Column) -> Draft:
+def with_values(draft: Proposal, k: int, one: Column) -> Proposal:
     """The draft with column k as a column of this quantity, its unit asked for where it is not known."""
-    draft, one = _in_unit(*_strain_or_stretch(draft, k, one), k)
+    draft, one = in_unit(*_strain_or_stretch(draft, k, one), k)
     if one.stated and one.stated != one.quantity:
         draft = draft.concluding(f"{draft.title(k)} is read as {one.quantity}, by its unit")
     values = draft.block.values[:, k] * (one.factor or 1.0) - (one.quantity == "stretch")
@@ -68,10 +66,12 @@ def with_values(draft: Draft, k: int, one: Column) -> Draft:
     origin = f"{one.title or f'column {one.place}'!r}{read}"
     if one.reference:
         draft = attrs.evolve(draft, keys={**draft.keys, "pressure": one.reference})
-    return draft.with_column(named(READ_AS.get(one.quantity, one.quantity)), values[draft.rows], origin, k)
+    return draft.with_column(one.reads, values[draft.rows], origin, k)
 
 
-def ask_column(draft: Draft, k: int, quantities: Sequence[str], why: str = "", sure: bool = False) -> Draft:
+def ask_column(
+    draft: Proposal, k: int, quantities: Sequence[str], why: str = "", sure: bool = False
+) -> Proposal:
     """Ask for the quantity of column k; sure: the first of the quantities is likely."""
     one = draft.block.columns[k]
     proposed = one.likely if one.likely in quantities else quantities[0] if sure else ""
@@ -85,7 +85,7 @@ def ask_column(draft: Draft, k: int, quantities: Sequence[str], why: str = "", s
     )
 
 
-def may_hold(draft: Draft, k: int, quantities: Sequence[str]) -> bool:
+def may_hold(draft: Proposal, k: int, quantities: Sequence[str]) -> bool:
     """Return True if a column that is not read may hold one of these quantities, by its unit."""
     one = draft.block.columns[k]
     if draft.answer_on("column", one)[1] is not None or (one.quantity == "count" and one.unit):
@@ -93,7 +93,7 @@ def may_hold(draft: Draft, k: int, quantities: Sequence[str]) -> bool:
     return unit_of(one.unit) is None or any(known_in(q, one.unit) is not None for q in quantities)
 
 
-def free_columns(draft: Draft) -> Draft:
+def free_columns(draft: Proposal) -> Proposal:
     """The draft with the columns that nothing was taken from listed, with the reason."""
     for k in draft.free:
         one = draft.block.columns[k]
@@ -119,7 +119,7 @@ def _rank(held: tuple[int, Column]) -> tuple[bool, bool, bool, int]:
     )
 
 
-def _identified(draft: Draft, k: int) -> tuple[Draft, Column | None]:
+def identified(draft: Proposal, k: int) -> tuple[Proposal, Column | None]:
     """Column k with its quantity, by an answer or its title; None for one that is not read."""
     one = draft.block.columns[k]
     key, answer = draft.answer_on("column", one)
@@ -147,7 +147,7 @@ def _identified(draft: Draft, k: int) -> tuple[Draft, Column | None]:
     return _weight(draft, k, one)
 
 
-def _weight(draft: Draft, k: int, one: Column) -> tuple[Draft, Column]:
+def _weight(draft: Proposal, k: int, one: Column) -> tuple[Proposal, Column]:
     """A load in grams as the weight of that mass, or as the mass that bends a beam."""
     unit = unit_of(one.unit)
     if unit is None or unit[0] != "g" or one.quantity not in ("force", "added_mass"):
@@ -162,7 +162,7 @@ def _weight(draft: Draft, k: int, one: Column) -> tuple[Draft, Column]:
     return draft.concluding(words), attrs.evolve(one, quantity="force", factor=factor)
 
 
-def _strain_or_stretch(draft: Draft, k: int, one: Column) -> tuple[Draft, Column]:
+def _strain_or_stretch(draft: Proposal, k: int, one: Column) -> tuple[Proposal, Column]:
     """A stretch, 1 or 100 % at rest, and a strain, 0 at rest, told apart by the first reading."""
     values = draft.block.values[:, k]
     if one.quantity not in ("stretch", "strain") or not np.isfinite(values).any():
@@ -186,7 +186,7 @@ def _strain_or_stretch(draft: Draft, k: int, one: Column) -> tuple[Draft, Column
     return draft, one
 
 
-def _in_unit(draft: Draft, one: Column, k: int) -> tuple[Draft, Column]:
+def in_unit(draft: Proposal, one: Column, k: int) -> tuple[Proposal, Column]:
     """A column with its unit from an answer, `unit.TITLE=N`; asked for where it has none."""
     wanted = READ_IN[one.quantity]
     key, answer = draft.answer_on("unit", one)

@@ -1,33 +1,74 @@
-"""Signs of the columns of a load, decided by their whole course instead of their largest value."""
+"""Zero and sign of a load's columns, decided by their whole course instead of their largest value."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from ..table_cells.notation import Array
+from .decisions import kept_by
+from .proposal import Proposal
 
-LOADS = ("strain", "displacement_mm", "stress_kPa", "force_N")
+_LOADS = ("strain", "displacement_mm", "stress_kPa", "force_N")
 # A jump is a step above this multiple of the usual one and this share of the range, in one column alone.
 _JUMP_USUAL, _JUMP_RANGE = 10.0, 0.1
 # Rows within which a jump of another column is of the same event, and one back of a spike.
 _TOGETHER, _SPIKE = 2, 3
 # Rows, and usual steps, that a column has moved where a jump ends the part that counts.
 _MOVED = 5
+# A displacement that begins farther from zero than this share of its range is a place of the machine.
+_OFFSET = 0.02
+# Jumps of a column that are named at most.
+_MOST_JUMPS = 3
 # Mean over range that decides the direction.
 _DECISIVE = 0.1
 
 
-def turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
+def with_zero(draft: Proposal) -> Proposal:
+    """Shift a displacement that begins at a position of the machine to begin at zero."""
+    found = draft.columns.get("displacement_mm")
+    if found is None or draft.choice("zero", ("as_read",)):
+        return draft
+    first = float(found[0])
+    if abs(first) <= _OFFSET * float(np.ptp(found)):
+        return draft
+    return draft.with_column("displacement_mm", found - first).concluding(
+        f"displacement_mm: minus its first value, {first:g} mm, the machine's position {kept_by('zero')}"
+    )
+
+
+def with_signs(draft: Proposal) -> Proposal:
+    """The loads with their signs; jumps of one column alone are named."""
+    if draft.kind not in ("coupon", "lattice_compression"):
+        return draft
+    loads = [name for name in _LOADS if name in draft.columns]
+    for name in loads:
+        for row in _jumps(draft.columns, name)[:_MOST_JUMPS]:
+            by = draft.columns[name][row] - draft.columns[name][row - 1]
+            line = draft.lines[row]
+            draft = draft.concluding(
+                f"{name}: jumps by {by:.4g} at line {line} while the test goes on; check it"
+            )
+    pressed = draft.kind == "lattice_compression"
+    found = () if draft.choice("sign", ("as_read",)) else _turned(draft.columns, pressed)
+    for name in found:
+        draft = draft.with_column(name, 0.0 - draft.columns[name]).concluding(
+            f"{name}: sign turned, positive in {'compression' if pressed else 'tension'} {kept_by('sign')}"
+        )
+    if not pressed and not found and all(np.mean(draft.columns[name]) < 0 for name in loads):
+        draft = draft.concluding("force and displacement are negative: read as compression of the coupon")
+    return draft
+
+
+def _turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
     """Names of the columns (n,) whose sign is to be turned.
 
     compression: a block, positive where it is pressed. Else a coupon, whose stretch and load have one sign:
     all stay where all are negative, in a compression test.
     """
-    courses = {name: _course(columns, name) for name in LOADS if name in columns}
+    courses = {name: _course(columns, name) for name in _LOADS if name in columns}
     ways = {name: _way(course) for name, course in courses.items()}
     known = [name for name, way in ways.items() if way]
     # Of a cycle about zero the direction is that of the column which it follows.
@@ -41,9 +82,9 @@ def turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
     return negative if compression or len(negative) < len(ways) else ()
 
 
-def jumps(columns: Mapping[str, Array], name: str) -> Array:
+def _jumps(columns: Mapping[str, Array], name: str) -> Array:
     """Rows (k,) of a load's column before which it jumps while the others go on."""
-    others = [np.flatnonzero(_steep(columns[c])) for c in LOADS if c in columns and c != name]
+    others = [np.flatnonzero(_steep(columns[c])) for c in _LOADS if c in columns and c != name]
     own = np.flatnonzero(_steep(columns[name]))
     apart = np.abs(own[:, None] - np.concatenate([*others, []])).min(axis=1, initial=np.inf)
     return own[apart > _TOGETHER] + 1
@@ -60,7 +101,7 @@ def _steep(values: Array) -> Array:
 def _course(columns: Mapping[str, Array], name: str) -> Array:
     """Values (m,) less the first and without spikes, up to the first jump after which nothing can be said."""
     course = np.asarray(columns[name] - columns[name][0], float)
-    rows = [int(row) for row in jumps(columns, name)]
+    rows = [int(row) for row in _jumps(columns, name)]
     for begin, end in itertools.pairwise(rows):
         back = abs(course[end] - course[begin - 1])
         if end - begin <= _SPIKE and back < 0.5 * abs(course[begin] - course[begin - 1]):

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..errors import InputError
 from ..measured.kinds import KINDS
-from .draft import Draft
-
-Array = np.ndarray[Any, Any]
+from ..table_cells.notation import Array
+from .proposal import Proposal
 
 # Seconds or days since 1970 or 1900 are no time of a test.
 _LONGEST_TEST_S = 1e8
@@ -18,7 +15,7 @@ _LONGEST_TEST_S = 1e8
 _BITS, _TICKS_S, _STEPS = (16, 31, 32), (1.0, 1e-3, 1e-6), 5.0
 
 
-def with_interval(draft: Draft) -> Draft:
+def with_interval(draft: Proposal) -> Proposal:
     """A time made from an interval, if the file has none; asked for where the kind needs one."""
     if "time_s" in draft.columns:
         return draft
@@ -32,7 +29,7 @@ def with_interval(draft: Draft) -> Draft:
     return draft
 
 
-def with_rising_time(draft: Draft) -> Draft:
+def with_rising_time(draft: Proposal) -> Proposal:
     """Count on a counter that begins again; leave out a constant time, if allowed.
 
     Raises InputError for a time that runs backward otherwise.
@@ -47,7 +44,7 @@ def with_rising_time(draft: Draft) -> Draft:
         if not turn:
             raise InputError(
                 "the time runs backward",
-                f"{draft.path}, line {line}",
+                f"{draft.file}, line {line}",
                 "divide the file where a new record begins; a counter of 16, 31 or 32 bits that begins again "
                 "is counted on where no rows are missing",
             )

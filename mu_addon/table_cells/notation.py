@@ -12,6 +12,7 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 DECIMALS = (".", ",")
+OTHER = {".": ",", ",": "."}
 MISSING = ("", "nan", "n/a", "na", "#n/a", "null", "none", "-", "--", "---")
 # ASCII substitutes of typographic minus signs, spaces and apostrophes, of Arabic signs, and of digits.
 _SIGNS = str.maketrans(
@@ -31,7 +32,7 @@ _PLAIN = {
 
 def _grouped(decimal: str) -> re.Pattern[str]:
     """Groups of thousands, with the same sign throughout; the first does not begin with 0."""
-    d, other = re.escape(decimal), re.escape(",.".replace(decimal, ""))
+    d, other = re.escape(decimal), re.escape(OTHER[decimal])
     indian = rf"|[1-9]\d?(?:{other}\d\d)+{other}\d{{3}}" if decimal == "." else ""
     return re.compile(rf"{_SIGNED}(?:[1-9]\d{{0,2}}([{other}' ])\d{{3}}(?:\1\d{{3}})*{indian})(?:{d}\d*)?")
 

@@ -1,6 +1,7 @@
 """The pages on import: the table of decisions is the code's, the example of a format reads a file."""
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,9 @@ def test_the_guide_has_the_rules_by_which_the_data_decide():
     page = (DOCS / "guide/measure.md").read_text(encoding="utf-8")
     rows = [f"| {one.of} | {one.rule} | `{one.override}` |" for one in DECISIONS.values()]
     assert "\n".join(rows) in page
+    for one in DECISIONS.values():
+        module, name = one.by.split(".")
+        assert callable(getattr(import_module(f"mu_addon.lab_files.{module}"), name))
 
 
 def test_a_format_is_one_module_as_the_page_shows(tmp_path, monkeypatch):

@@ -12,8 +12,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import write_text
-from ...lab_files.draft import Question
-from ...lab_files.proposal import Proposal
+from ...lab_files.proposal import Proposal, Question
 from ...measured.table import Remark
 from ...measured.writing import csv_text, file_stem, put, require_free, tried
 from ...run.context import RunContext
@@ -126,7 +125,7 @@ def _at(p: Proposal, text: str, error: InputError) -> str:
     """Place in the imported file of an error in the table that was made of it."""
     row = re.search(r"\brow (\d+)", error.where)
     k = int(row[1]) - text.split("\n")[: int(row[1])].index(",".join(p.columns)) - 2 if row else -1
-    return f"{p.file}, line {p.lines[k]}" if 0 <= k < len(p.lines) else f"{p.where} ({error.where})"
+    return f"{p.file}, line {p.lines[k]}" if 0 <= k < len(p.lines) else f"{p.source} ({error.where})"
 
 
 def _changes(p: Proposal) -> str:
@@ -148,7 +147,7 @@ def _figures(p: Proposal) -> dict[str, Any]:
     return {
         "kind": p.keys.get("kind", ""),
         "rows": len(p.lines),
-        "from": p.where,
+        "from": p.source,
         "columns": dict(p.origin),
         "concluded": list(p.concluded),
         "not_read": [one.words for one in p.unread],

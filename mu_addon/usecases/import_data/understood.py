@@ -10,11 +10,11 @@ import attrs
 
 from ...errors import InputError
 from ...lab_files.blocks import FEWEST, Block, tables
-from ...lab_files.draft import NoExperiment, Question
-from ...lab_files.proposal import Proposal, answers_for, propose
+from ...lab_files.keys import ANSWERS
+from ...lab_files.proposal import NoExperiment, Proposal, Question
 from ...lab_files.sheet import Sheet
 from ...lab_files.source import read_sheets
-from ...measured.kinds import ACCURACIES
+from ...lab_files.steps import answers_for, propose
 from ...table_cells.notation import DECIMALS
 from ..track_video.tracked_table import read_pixels
 
@@ -24,32 +24,6 @@ _INTERVAL = "interval_s"
 # Words of files whose pairs of x and y are positions, and of those where they are something else.
 _TRACKERS = re.compile(r"kinovea|bodyparts|\bmarker|track|trajector")
 _NO_PLACES = re.compile(r"accel|\bacc\b|gyro|magnet|\bimu\b")
-# Keys that answer a question or change a conclusion; others are mistakes.
-KEYS = (
-    "kind",
-    "mode",
-    "section_mm",
-    "length_mm",
-    _INTERVAL,
-    "zero",
-    "sign",
-    "specimen",
-    "role",
-    "plates",
-    "axis",
-    "valve",
-    "pressure",
-    "cells",
-    "strut_mm",
-    "temperature_C",
-    "scale",
-    "orientation_deg",
-    "orientation_axis",
-    "gap_mm",
-    "mass_g",
-    "chamber_volume_mm3",
-    *ACCURACIES,
-)
 
 
 @attrs.frozen
@@ -213,16 +187,16 @@ def _unlike(name: str, others: Sequence[str]) -> str:
 def _require_used(answers: Mapping[str, str], proposals: Sequence[Proposal]) -> None:
     """Raise InputError for answers to no question: unknown keys, experiments and columns."""
     names = [p.name for p in proposals]
-    titles = {title for p in proposals for title in p.titles}
+    titles = {title for p in proposals for c in p.block.columns for title in (c.name, str(c.place))}
     for given in answers:
         name = next((n for n in names if given.startswith(n + ".")), "")
         key = given[len(name) + 1 :] if name else given
         kind, _, title = key.partition(".")
         known = kind in ("unit", "column") and title in titles
-        if not (known or key in KEYS or (key == DECIMAL and not name)):
+        if not (known or key in ANSWERS or (key == DECIMAL and not name)):
             raise InputError(
                 f"{given!r} answers no question",
                 "--set",
-                f"experiments: {', '.join(names)}; keys: {', '.join(KEYS)}, decimal, unit.TITLE and "
+                f"experiments: {', '.join(names)}; keys: {', '.join(ANSWERS)}, decimal, unit.TITLE and "
                 f"column.TITLE with a title or number of {', '.join(sorted(titles))}",
             )
