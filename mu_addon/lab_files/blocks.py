@@ -156,8 +156,8 @@ class _Finding:
         for row in rows:
             by_text.setdefault(" ".join(row.filled), []).append(row)
         for text, same in by_text.items():
-            shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
-            self._leave(same, f"{shown!r}: {why}")
+            begin = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+            self._leave(same, f"{begin!r}: {why}")
 
     def _note_numbers(self, begin: int, places: Sequence[int]) -> None:
         """List rows of numbers outside every record, also a row that was cut after its first number.
@@ -199,26 +199,21 @@ class _Finding:
         usual = frozenset(k for k, count in counts.items() if 2 * count >= len(near))
         self.usual = usual = usual if len(usual) > 1 else frozenset(counts)
         least = min(2, len(usual))
-        members = [start]
-        pending: list[int] = []
-        skipped: list[int] = []
+        members, pending, skipped = [start], list[int](), list[int]()
         for k in range(start + 1, len(self.rows)):
-            row = self.rows[k]
             if len(self.numeric[k] & usual) >= least:
                 if k > members[-1] + 1 and self._begins_anew(members, pending, k):
                     break
                 skipped += pending
                 pending = []
                 members.append(k)
-            elif row.filled:
+            elif self.rows[k].filled:
                 pending.append(k)
         return members, skipped, members[-1] + 1
 
     def _begins_anew(self, members: Sequence[int], between: Sequence[int], k: int) -> bool:
         """Return True if another record begins at row k, after rows without numbers."""
-        if any(
-            len(row.filled) == 1 and _SPECIMEN.fullmatch(plain(row.filled[0])) for row in self._at(between)
-        ):
+        if _specimen(self._at(between)):
             return True
         order = self._order(members, k)
         titles = [row for row in self._at(between) if _is_titles(row)]
@@ -227,16 +222,14 @@ class _Finding:
             return order is not None and order < 0
         width = len(self.rows[k].filled)
         known = any(sum(bool(column(c).quantity) or is_unit(c) for c in row.filled) > 1 for row in titles)
-        same = any(list(row.filled) == cells for row in titles for cells in self._titles_of(members[0]))
+        before = self.rows[max(0, members[0] - _MOST_TITLE_ROWS) : members[0]]
+        same = any(row.filled == above.filled for row in titles for above in before)
         if order is not None and order > 0 and (same or not known):
             return False
         return known or same or any(len(row.filled) >= width for row in titles)
 
     def _at(self, places: Sequence[int]) -> list[Row]:
         return [self.rows[k] for k in places]
-
-    def _titles_of(self, start: int) -> list[list[str]]:
-        return [list(row.filled) for row in self.rows[max(0, start - _MOST_TITLE_ROWS) : start] if row.filled]
 
     def _order(self, members: Sequence[int], k: int) -> int | None:
         """1 if the first growing column goes on growing at row k, -1 if it falls back, else None."""

@@ -229,7 +229,7 @@ def column(title: str, unit: str = "") -> Column:
     if known and known[0] == "g" and meant == "force":
         return Column(title, meant, unit, known_in("force", unit))
     quantity = _meant(name, known[0]) if known else meant
-    if quantity == "count" or (not known and quantity == "strain" and not unit):
+    if quantity == "count":
         return Column(title, quantity, unit, None)
     if quantity == "stretch":
         return Column(title, quantity, unit, known[1] if known else 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from ..table_cells.notation import number
 from .columns import unit_of
@@ -50,14 +50,12 @@ def section_mm(draft: Proposal) -> tuple[Proposal, list[float] | None]:
     pair = [width, thickness] if width and thickness else _pair_mm(lines, _SECTION, decimal)
     if pair:
         return draft.concluding(f"section of {pair[0]:g} x {pair[1]:g} mm, as the file says"), pair
-    side = _square_mm(area, diameter)
-    if side:
-        words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
-        return draft.concluding(f"section {words}, as the file says: given as a square of that area"), [
-            side,
-            side,
-        ]
-    return draft, None
+    if not (area or diameter):
+        return draft, None
+    words = f"of {area:g} mm2" if area else f"round, {diameter:g} mm"
+    side = round(math.sqrt(area or 0.25 * math.pi * (diameter or 0.0) ** 2), 6)
+    words = f"section {words}, as the file says: given as a square of that area"
+    return draft.concluding(words), [side, side]
 
 
 def length_mm(draft: Proposal) -> tuple[Proposal, float | None]:
@@ -71,16 +69,12 @@ def length_mm(draft: Proposal) -> tuple[Proposal, float | None]:
 
 def _size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | None:
     """A positive length in mm, or area in mm2, that the lines state; None without it or its unit."""
-    for key, cells in facts.items():
-        text = " ".join((key, *cells))
-        found = pattern.search(text)
-        if not found:
-            continue
+    for key, cells, text, end in _named(facts, pattern):
         value = None
-        if cells and found.end() <= len(key):
+        if cells and end <= len(key):
             unit = cells[1] if len(cells) > 1 else (re.search(_BRACKET, key) or ["", ""])[1]
             value = _in_mm(cells[0], unit, decimal)
-        behind = _BEHIND.match(text, found.end())
+        behind = _BEHIND.match(text, end)
         if value is None and behind:
             value = _in_mm(behind[2].rstrip(".,"), behind[3] or behind[1] or "", decimal)
         if value is not None:
@@ -90,21 +84,20 @@ def _size_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> float | No
 
 def _pair_mm(facts: Facts, pattern: re.Pattern[str], decimal: str) -> list[float] | None:
     """Two lengths in mm as in "section: 10 x 2 mm"; None without them."""
-    for key, cells in facts.items():
-        text = " ".join((key, *cells))
-        found = pattern.search(text)
-        both = _PAIR.match(text, found.end()) if found else None
-        values = [_in_mm(text, both[3], decimal) for text in both.group(1, 2)] if both else [None]
-        if None not in values:
-            return [value for value in values if value is not None]
+    for *_, text, end in _named(facts, pattern):
+        if both := _PAIR.match(text, end):
+            values = [value for side in both.group(1, 2) if (value := _in_mm(side, both[3], decimal))]
+            if len(values) == 2:
+                return values
     return None
 
 
-def _square_mm(area: float | None, diameter: float | None) -> float | None:
-    """Side in mm of the square with a section's area, by its area in mm2 or its diameter in mm."""
-    if area:
-        return round(math.sqrt(area), 6)
-    return round(0.5 * math.sqrt(math.pi) * diameter, 6) if diameter else None
+def _named(facts: Facts, pattern: re.Pattern[str]) -> Iterator[tuple[str, tuple[str, ...], str, int]]:
+    """Lines that have a name: their key, cells and text, and where the name ends in it."""
+    for key, cells in facts.items():
+        text = " ".join((key, *cells))
+        if found := pattern.search(text):
+            yield key, cells, text, found.end()
 
 
 def _in_mm(text: str, unit: str, decimal: str) -> float | None:

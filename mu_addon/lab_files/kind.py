@@ -27,7 +27,7 @@ _OSCILLATION = re.compile(
 _MOST_ASKED = 12
 # A pressure that goes this share of its range within that share of a record, read so many times a second.
 _STEP, _WITHIN, _CAMERA_Hz = 0.6, 0.02, 20.0
-_LOADED = ("coupon", "lattice_compression")
+LOADED = ("coupon", "lattice_compression")
 # Quantities of each kind that is known by them alone, the more particular first, and what is concluded.
 _KNOWN_BY = (
     ("unit_pose", {"pressure_kPa", "orientation_deg", "angle_deg"}, ""),
@@ -92,7 +92,7 @@ def _loading(draft: Proposal) -> Proposal:
         words = f"{kind}: the file speaks of {'tension' if pulled else 'compression'}"
         return attrs.evolve(draft.concluding(words), kind=kind)
     words = "a specimen was loaded: was it a coupon of resin, or a block of lattice compressed?"
-    return draft.asked("kind", words, _LOADED)
+    return draft.asked("kind", words, LOADED)
 
 
 def _is_stepped(columns: Mapping[str, Array]) -> bool:
@@ -112,7 +112,7 @@ def require_curve(draft: Proposal) -> Proposal:
 
     A column whose quantity is answered is taken as it is.
     """
-    if draft.kind not in _LOADED:
+    if draft.kind not in LOADED:
         return draft
     for k, one in enumerate(draft.block.columns):
         if _OSCILLATION.search(plain(one.title)) and draft.answer_on("column", one)[1] is None:
@@ -127,13 +127,11 @@ def require_curve(draft: Proposal) -> Proposal:
         read = draft.table.get(name)
         if read is None or read.place is None or "time_s" in draft.table:
             continue
-        values = read.values
-        if (
-            len(set(values[np.isfinite(values)])) == 1
-            and draft.answer_on("column", draft.block.columns[read.place])[1] is None
-        ):
+        one = draft.block.columns[read.place]
+        readings = set(read.values[np.isfinite(read.values)])
+        if len(readings) == 1 and draft.answer_on("column", one)[1] is None:
             raise NoExperiment(
-                f"{name} is {np.nanmax(values):g} in every row, and there is no time: that is no curve",
+                f"{name} is {readings.pop():g} in every row, and there is no time: that is no curve",
                 draft.where,
                 f"export a test of one pull or pressing, or the time of a test that holds the {name}",
             )

@@ -166,9 +166,7 @@ class Proposal:
 
     def answer_on(self, key: str, one: Column) -> tuple[str, str | None]:
         """Key and text of an answer about a column, `unit` or `column`, by its title or its number."""
-        keys = [f"{key}.{one.title}", f"{key}.{one.place}"] if one.title else [f"{key}.{one.place}"]
-        if self.key(one) != one.title:
-            keys.reverse()
+        keys = [f"{key}.{name}" for name in (self.key(one), one.name, str(one.place))]
         found = next((k for k in keys if k in self.answers), keys[0])
         return found, self.answers.get(found)
 

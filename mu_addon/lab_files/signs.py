@@ -9,6 +9,7 @@ import numpy as np
 
 from ..table_cells.notation import Array
 from .decisions import kept_by
+from .kind import LOADED
 from .proposal import Proposal
 
 _LOADS = ("strain", "displacement_mm", "stress_kPa", "force_N")
@@ -41,34 +42,31 @@ def with_zero(draft: Proposal) -> Proposal:
 
 def with_signs(draft: Proposal) -> Proposal:
     """The loads with their signs; jumps of one column alone are named."""
-    if draft.kind not in ("coupon", "lattice_compression"):
+    if draft.kind not in LOADED:
         return draft
-    loads = [name for name in _LOADS if name in draft.columns]
-    for name in loads:
-        for row in _jumps(draft.columns, name)[:_MOST_JUMPS]:
-            by = draft.columns[name][row] - draft.columns[name][row - 1]
-            line = draft.lines[row]
-            draft = draft.concluding(
-                f"{name}: jumps by {by:.4g} at line {line} while the test goes on; check it"
-            )
+    loads = {name: draft.columns[name] for name in _LOADS if name in draft.table}
+    for name, values in loads.items():
+        for row in _jumps(loads, name)[:_MOST_JUMPS]:
+            words = f"jumps by {values[row] - values[row - 1]:.4g} at line {draft.lines[row]}"
+            draft = draft.concluding(f"{name}: {words} while the test goes on; check it")
     pressed = draft.kind == "lattice_compression"
-    found = () if draft.choice("sign", ("as_read",)) else _turned(draft.columns, pressed)
+    found = () if draft.choice("sign", ("as_read",)) else _turned(loads, pressed)
     for name in found:
-        draft = draft.with_column(name, 0.0 - draft.columns[name]).concluding(
+        draft = draft.with_column(name, 0.0 - loads[name]).concluding(
             f"{name}: sign turned, positive in {'compression' if pressed else 'tension'} {kept_by('sign')}"
         )
-    if not pressed and not found and all(np.mean(draft.columns[name]) < 0 for name in loads):
+    if not pressed and not found and all(np.mean(values) < 0 for values in loads.values()):
         draft = draft.concluding("force and displacement are negative: read as compression of the coupon")
     return draft
 
 
-def _turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
-    """Names of the columns (n,) whose sign is to be turned.
+def _turned(loads: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
+    """Names of the loads (n,) whose sign is to be turned.
 
     compression: a block, positive where it is pressed. Else a coupon, whose stretch and load have one sign:
     all stay where all are negative, in a compression test.
     """
-    courses = {name: _course(columns, name) for name in _LOADS if name in columns}
+    courses = {name: _course(loads, name) for name in loads}
     ways = {name: _way(course) for name, course in courses.items()}
     known = [name for name, way in ways.items() if way]
     # Of a cycle about zero the direction is that of the column which it follows.
@@ -82,10 +80,10 @@ def _turned(columns: Mapping[str, Array], compression: bool) -> tuple[str, ...]:
     return negative if compression or len(negative) < len(ways) else ()
 
 
-def _jumps(columns: Mapping[str, Array], name: str) -> Array:
-    """Rows (k,) of a load's column before which it jumps while the others go on."""
-    others = [np.flatnonzero(_steep(columns[c])) for c in _LOADS if c in columns and c != name]
-    own = np.flatnonzero(_steep(columns[name]))
+def _jumps(loads: Mapping[str, Array], name: str) -> Array:
+    """Rows (k,) of a load before which it jumps while the others go on."""
+    others = [np.flatnonzero(_steep(values)) for other, values in loads.items() if other != name]
+    own = np.flatnonzero(_steep(loads[name]))
     apart = np.abs(own[:, None] - np.concatenate([*others, []])).min(axis=1, initial=np.inf)
     return own[apart > _TOGETHER] + 1
 
@@ -98,10 +96,10 @@ def _steep(values: Array) -> Array:
     return step > max(_JUMP_USUAL * float(np.median(step)), _JUMP_RANGE * float(np.ptp(values)))
 
 
-def _course(columns: Mapping[str, Array], name: str) -> Array:
+def _course(loads: Mapping[str, Array], name: str) -> Array:
     """Values (m,) less the first and without spikes, up to the first jump after which nothing can be said."""
-    course = np.asarray(columns[name] - columns[name][0], float)
-    rows = [int(row) for row in _jumps(columns, name)]
+    course = np.asarray(loads[name] - loads[name][0], float)
+    rows = [int(row) for row in _jumps(loads, name)]
     for begin, end in itertools.pairwise(rows):
         back = abs(course[end] - course[begin - 1])
         if end - begin <= _SPIKE and back < 0.5 * abs(course[begin] - course[begin - 1]):

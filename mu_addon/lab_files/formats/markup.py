@@ -49,8 +49,8 @@ class _Reader(HTMLParser):
             if at.isdigit() and len(self.rows[-1]) < int(at) - 1 < 1000:
                 self.rows[-1] += [""] * (int(at) - 1 - len(self.rows[-1]))
             span = given.get("colspan") or "1"
-            self.rows[-1] += [""] * (min(int(span), 1000) if span.isdigit() and int(span) > 1 else 1)
-            self.at = len(self.rows[-1]) - (int(span) if span.isdigit() and 1 < int(span) <= 1000 else 1)
+            self.at = len(self.rows[-1])
+            self.rows[-1] += [""] * (min(max(int(span), 1), 1000) if span.isdigit() else 1)
             self.within = True
         elif tag == "br" and self.within:
             self.rows[-1][self.at] += " "
