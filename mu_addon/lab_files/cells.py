@@ -22,7 +22,13 @@ _FAR = 10.0
 
 @attrs.frozen(eq=False)
 class ReadColumn:
-    """A column read as numbers (values (n,)), or the reason why not."""
+    """A column read as numbers, or the reason why not.
+
+    values (n,): nan where a cell holds none; bad: text of these by row; cells: without their units; numbers:
+    False where it holds none, and words say what it holds; decimal: the decimal sign, unsure if both are
+    possible; clock: dates or times of day, halves: of two parts; unit: behind the numbers, factors (n,) to it
+    where it changes; noted: a conclusion.
+    """
 
     values: Array
     bad: Mapping[int, str] = attrs.field(factory=dict)
@@ -44,7 +50,10 @@ class ReadColumn:
 
 
 def read_column(sheet: Sheet, cells: list[str], lines: Array) -> ReadColumn:
-    """A column of numbers, of a clock, or of words, by most of its cells."""
+    """A column of numbers, of a clock or of words, by most of its cells.
+
+    lines (n,): of the cells. Raises InputError where decimal points and commas alternate.
+    """
     filled = [cell for cell in cells if cell]
     if not filled:
         return _no_numbers("")

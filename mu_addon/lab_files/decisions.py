@@ -30,7 +30,7 @@ DECISIONS = {
     for one in (
         Decision("decimal sign", _DECIMAL, "decimal=,", "cells.read_column"),
         Decision("quantity", _QUANTITY, "column.TITLE=force", "quantities.identified"),
-        Decision("unit", _UNIT, "unit.TITLE=N", "quantities.in_unit"),
+        Decision("unit", _UNIT, "unit.TITLE=N", "units.in_unit"),
         Decision("pressure", "*abs*, psia, bar(a)", "pressure=gauge", "keys.reference"),
         Decision("time", _TIME, "interval_s=0.1", "times.with_rising_time"),
         Decision("sign", _SIGN, "sign=as_read", "signs.with_signs"),
