@@ -89,7 +89,15 @@ def add_place(commands: Commands[Any]) -> None:
 
     from ..placement.settings import BEND, LONGEST, SHORTEST
     from ..sensing.guide import Optics
-    from ..usecases.simulate_and_place.settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, STATIONS, WORKERS
+    from ..usecases.simulate_and_place.settings import (
+        ALL_PATHS,
+        CHECKS,
+        MESH_CHECK,
+        PATHS,
+        QUICK,
+        STATIONS,
+        WORKERS,
+    )
 
     constants = ", ".join(f"{name} {value:g}" for name, value in attrs.asdict(Optics()).items())
     command = commands.add_parser(
@@ -99,6 +107,7 @@ def add_place(commands: Commands[Any]) -> None:
         epilog="example: run.py place --preset mu-1.0x --refine 0.5 --out out/mu-1.0x",
     )
     solver = _add_motion(command)
+    add_setting(command, QUICK)
     add_setting(command, WORKERS, "N")
     add_setting(solver, STATIONS, "J")
     add_setting(solver, MESH_CHECK)
@@ -131,7 +140,7 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
     from ..fem.device import require_device
     from ..meshing.settings import MeshSettings
     from ..placement.graph import Limits
-    from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of
+    from ..usecases.simulate_and_place.job import Job, body_for, obstacles_for, optics_of, protocol_of, quick
 
     extra: dict[str, Any] = {}
     if "simulate" not in options.stages:
@@ -165,7 +174,8 @@ def job_of(options: argparse.Namespace, context: RunContext) -> Job:
         extra["obstacles"] = obstacles_for(unit, options.obstacles, extra.get("body"))
     if getattr(options, "path", None) is not None:
         extra["path"] = options.path
-    return Job(unit=unit, protocol=protocol, quality=options.quality, stages=options.stages, **extra)
+    job = Job(unit=unit, protocol=protocol, quality=options.quality, stages=options.stages, **extra)
+    return quick(job) if getattr(options, "quick", False) else job
 
 
 def add_presets(commands: Commands[Any]) -> None:

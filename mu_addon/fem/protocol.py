@@ -43,6 +43,22 @@ class Protocol:
         # Rounded, so that the same pressure met twice is recognised as one equilibrium.
         return time, np.round(np.interp(time, self.time_s, self.pressure_kPa), 9)
 
+    def under_pressure(self) -> Protocol:
+        """This protocol with 0 kPa where it has suction.
+
+        >>> import numpy as np
+        >>> found = Protocol(np.array([0.0, 2.0, 8.0]), np.array([0.0, -20.0, 40.0])).under_pressure()
+        >>> found.time_s.tolist(), found.pressure_kPa.tolist()
+        ([0.0, 2.0, 4.0, 8.0], [0.0, 0.0, 0.0, 40.0])
+        """
+        time, pressure = self.time_s, self.pressure_kPa
+        n = np.flatnonzero(pressure[:-1] * pressure[1:] < 0.0)
+        crossed = time[n] - pressure[n] * np.diff(time)[n] / np.diff(pressure)[n]
+        every = np.union1d(time, crossed)
+        kept = np.maximum(np.interp(every, time, pressure), 0.0)
+        kept[np.isin(every, crossed)] = 0.0
+        return Protocol(every, kept)
+
 
 @attrs.frozen
 class ProtocolText:

@@ -278,6 +278,7 @@ class ReportData:
     pictures: Sequence[Picture] = ()
     paths: Sequence[Path] = ()
     ranking: RankingResult | None = None
+    left_out: str = ""  # by a quick ranking
     estimated_mm: Mapping[str, float] = attrs.field(factory=dict)  # mean deviation before any path is solved
     search: LatticeSearch | None = None
     search_picture: Picture | None = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...errors import InputError
+from ...usecases.simulate_and_place.settings import QUICK_REFINE
 from ..jobs.start_child import JobKind
 from ..obstacles import state as obstacles
 from ..shared.blender_property import exact
@@ -19,26 +20,36 @@ if TYPE_CHECKING:
     from ...usecases.simulate_and_place.job import Job
 
 
-def plan_of(root: Any) -> list[tuple[str, float]]:
-    """Expected stages of a unit's simulation, with the seconds of each."""
-    return _expected(root)[0]
+def plan_of(root: Any, quick: bool = False) -> list[tuple[str, float]]:
+    """Expected stages of a unit's simulation or quick ranking, with the seconds of each."""
+    return _expected(root, quick)[0]
 
 
-def announced(root: Any) -> tuple[float, bool]:
-    """Expected seconds of a unit's simulation, and True if measured on this machine."""
-    plan, known = _expected(root)
+def announced(root: Any, quick: bool = False) -> tuple[float, bool]:
+    """Expected seconds of a unit's simulation or quick ranking, and True if measured on this machine."""
+    plan, known = _expected(root, quick)
     return sum(seconds for _, seconds in plan), known
 
 
-def _expected(root: Any) -> tuple[list[tuple[str, float]], bool]:
+def _expected(root: Any, quick: bool) -> tuple[list[tuple[str, float]], bool]:
     """The plan, and True if all its long stages were measured: for this unit, else another one."""
-    from ...usecases.simulate_and_place.expected import PATHS_CHECKED, SOLVED, Size, seconds_of, stage_names
+    from ...usecases.simulate_and_place.expected import (
+        PATHS_CHECKED,
+        SHIPPED_KPA,
+        SOLVED,
+        Size,
+        seconds_of,
+        stage_names,
+    )
 
     settings = root.mu_unit.study
-    known = 0 if settings.all_paths else PATHS_CHECKED
-    size = Size(root.mu_unit.chambers.count, exact(settings.refine), settings.self_contact, known=known)
+    known = 0 if settings.all_paths else 1 if quick else PATHS_CHECKED
+    refine, pressures = exact(settings.refine), SHIPPED_KPA
+    if quick:
+        refine, pressures = min(refine, QUICK_REFINE), tuple(p for p in pressures if p > 0)
+    size = Size(root.mu_unit.chambers.count, refine, settings.self_contact, pressures, known)
     detail = timings.of_size(size)
-    names = stage_names(settings.command == "place", True, settings.paths == "graph")
+    names = stage_names(quick or settings.command == "place", not quick, settings.paths == "graph")
     runs = (run for run in studies.runs_of(root) if timings.of_run(run) == detail)
     alike = (run.summary.get("seconds") for run in runs)
     own = next((s for s in alike if isinstance(s, dict) and {*names} - {"report"} <= {*s}), {})
@@ -63,28 +74,29 @@ SIMULATION = JobKind(
 )
 
 
-def job_of(root: Any) -> Job:
-    """Study job from a unit's properties; raises InputError."""
+def job_of(root: Any, in_short: bool = False) -> Job:
+    """Study job from a unit's properties; in_short: its quick ranking. Raises InputError."""
     # Imported late: they need the solver's packages, which a Blender may lack.
     try:
         from ...meshing.settings import MeshSettings
-        from ...usecases.simulate_and_place.job import Job, protocol_of, require_paths_inside
+        from ...usecases.simulate_and_place.job import Job, protocol_of, quick, require_paths_inside
     except (ImportError, OSError, RuntimeError) as error:
         raise InputError(
             f"the solver cannot load: {error}", "", "install the extension built for this Blender and system"
         ) from error
 
     settings, unit = root.mu_unit.study, to_unit(root.mu_unit)
-    stages = ("design", "simulate", "place") if settings.command == "place" else ("design", "simulate")
+    place = in_short or settings.command == "place"
+    stages = ("design", "simulate", "place") if place else ("design", "simulate")
     extra: dict[str, Any] = {}
-    if settings.command == "place":
+    if place:
         extra |= {"paths": settings.paths, "all_paths": settings.all_paths}
     if settings.self_contact:
         extra["self_friction"] = round(settings.self_friction, 6)
     body = envelope.envelope_in(root, unit)
     if body is not None:
         require_paths_inside(unit, body, stages, settings.paths)
-    return Job(
+    job = Job(
         unit=unit,
         protocol=protocol_of(bpy.path.abspath(settings.protocol) if settings.protocol else None),
         body=body,
@@ -96,3 +108,4 @@ def job_of(root: Any) -> Job:
         device=settings.device,
         **extra,
     )
+    return quick(job) if in_short else job

@@ -2,15 +2,18 @@
 
 # Blender reads the annotations themselves: no `from __future__ import annotations` here.
 
+import attrs
 import bpy
 
 from ...usecases.simulate_and_place import unit_runs
+from ...usecases.simulate_and_place.settings import QUICK
 from ..jobs import start_child
 from ..jobs.operators import FILES, job_operators
 from ..shared import viewports
+from ..shared.blender_property import blender_property
 from ..unit.base_classes import ValidUnitOperator
 from . import study_folder as studies
-from .job import SIMULATION, job_of
+from .job import SIMULATION, job_of, plan_of
 
 
 def _file_of(root, what):
@@ -28,6 +31,9 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
     bl_label = "Simulate"
     bl_options = {"REGISTER"}
 
+    # Not remembered: the next press of the main button is no quick one.
+    quick: blender_property(QUICK, name="Quick Ranking", options={"SKIP_SAVE"})
+
     @classmethod
     def trouble(cls, root):
         running = SIMULATION.is_running(root)
@@ -35,13 +41,14 @@ class MU_OT_simulate(ValidUnitOperator, bpy.types.Operator):
 
     def act(self, context, root):
         study = root.mu_unit.study
-        job = job_of(root)
+        job = job_of(root, self.quick)
         # Imported late, with the solver's packages.
         from ...usecases.simulate_and_place.job import write_study
 
         folder, job = unit_runs.place_of(studies.assign_folder(root), job)
         options = ["--device", study.device]
-        SIMULATION.start(root, folder, lambda folder: write_study(job, folder), options)
+        kind = attrs.evolve(SIMULATION, plan_of=lambda root: plan_of(root, self.quick))
+        kind.start(root, folder, lambda folder: write_study(job, folder), options)
         viewports.redraw()
 
 

@@ -52,6 +52,9 @@ class MU_PT_simulate(UnitPanel, bpy.types.Panel):
         _effects(layout, root)
         child = SIMULATION.child(root)
         start_button(layout, child, "mu.simulate", "PLAY", root=root, text=start_words(root))
+        if study.command == "place" and not SIMULATION.is_running(root):
+            words = timed("Quick Ranking", announced(root, quick=True))
+            layout.operator("mu.simulate", text=words, icon="PLAY").quick = True
         if child is None and not announced(root)[1]:
             wrapped(layout, "Perhaps: no such run has been timed on this machine yet", "TIME")
         job_state(layout, child, "see Results")

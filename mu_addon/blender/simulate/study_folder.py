@@ -43,7 +43,9 @@ class Findings:
 
     @property
     def caveat(self) -> str:
-        """Known error of the run's model, as text; empty on the default mesh."""
+        """Known error of the run's model, or what it leaves out, as text; empty on the default mesh."""
+        if self.run.left_out:
+            return f"quick ranking, {self.run.left_out}: deviations are larger with suction"
         return COARSE.format(self.run.refine) if self.run.refine < REFINE.default else ""
 
     @property

@@ -26,15 +26,17 @@ LEAST_SHARE = 0.05
 def of_size(size: Size) -> str:
     """Detail under which a simulation's seconds are kept: those of another unit or mesh are other ones."""
     contact = "contact" if size.self_contact else "no contact"
-    return f"{size.chambers} chambers, refine {size.refine:g}, {contact}"
+    part = "" if min(size.pressures_kPa) < 0 else ", under pressure"
+    return f"{size.chambers} chambers, refine {size.refine:g}, {contact}{part}"
 
 
 def of_run(run: unit_runs.Run) -> str:
     """Detail of a run's seconds, as `of_size`."""
-    from ...usecases.simulate_and_place.expected import Size
+    from ...usecases.simulate_and_place.expected import SHIPPED_KPA, Size
 
     contact = bool(run.tables.get("simulate", {}).get("self_contact"))
-    return of_size(Size(run.unit.chambers.count, run.refine, contact))
+    pressures = tuple(p for p in SHIPPED_KPA if p > 0 or not run.left_out)
+    return of_size(Size(run.unit.chambers.count, run.refine, contact, pressures))
 
 
 def _of_simulation(folder: Path) -> tuple[str, dict[str, Any]]:

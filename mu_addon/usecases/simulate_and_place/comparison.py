@@ -15,6 +15,7 @@ _SETTINGS = (
     ("refinement", "simulate", "mesh", "refine"),
     ("meshed part", "simulate", "mesh", "fraction"),
     ("instants", "simulate", "times"),
+    ("without suction", "simulate", "under_pressure"),
     ("self-contact", "simulate", "self_contact"),
     ("self-friction", "simulate", "self_friction"),
     ("protocol", "simulate", "protocol_sha256"),

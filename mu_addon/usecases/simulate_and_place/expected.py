@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import attrs
 import numpy as np
 
+from ...placement.elimination import first_and_rest
+
 if TYPE_CHECKING:
     from ...run.progress_estimate import Plan
     from .job import Job
@@ -32,8 +34,8 @@ TOUCHING = 6.0
 # The best paths, which the coarser mesh solves too: each costs as much there as on the fine one, and only
 # paths near the best can be tied with it.
 PATHS_CHECKED = 3
-# Pressures in kPa other than 0 of the shipped protocol at the default number of times.
-_SHIPPED = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
+SHIPPED_KPA = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
+"""Pressures other than 0 of the shipped protocol at the default number of times."""
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5
 # Below a refinement of 1 the wall alone grows coarser.
@@ -77,7 +79,7 @@ class Size:
     chambers: int
     refine: float
     self_contact: bool
-    pressures_kPa: tuple[float, ...] = _SHIPPED
+    pressures_kPa: tuple[float, ...] = SHIPPED_KPA
     known: int = 0
 
     @classmethod
@@ -92,13 +94,14 @@ class Size:
     def factor(self, stage: str) -> float:
         """Work of a stage by that of the shipped protocol on the default mesh of six chambers, in contact."""
         shipped = Size(6, 1.0, True)
-        states = max(work(self, self.pressures_kPa), 1.0) / work(shipped, _SHIPPED)
+        states = max(work(self, self.pressures_kPa), 1.0) / work(shipped, SHIPPED_KPA)
         body = of_mesh(self.refine) * self.chambers / 6
         if stage != "candidates":
             return body * states
         paths = (self.chambers - 1) * (self.chambers - 2) / 2
-        suction = work(self, [p for p in self.pressures_kPa if p < 0]) / work(shipped, _SHIPPED)
-        left = suction * max(paths - self.known, 0) if self.known else 0.0
+        _, rest = first_and_rest(np.array(self.pressures_kPa))
+        later = work(self, [self.pressures_kPa[n] for n in rest]) / work(shipped, SHIPPED_KPA)
+        left = later * max(paths - self.known, 0) if self.known else 0.0
         return body * (states * paths - left) / 10
 
 

@@ -33,7 +33,19 @@ from ...run.inputs import digest
 from ...run.lock import FolderLock
 from ...sensing.guide import Optics
 from .named_effects import NamedEffects
-from .settings import ALL_PATHS, CHECKS, MESH_CHECK, PATHS, SELF_FRICTION, STAGES, STATIONS, TIMES, WORKERS
+from .settings import (
+    ALL_PATHS,
+    CHECKS,
+    MESH_CHECK,
+    PATHS,
+    QUICK_REFINE,
+    SELF_FRICTION,
+    STAGES,
+    STATIONS,
+    TIMES,
+    UNDER_PRESSURE,
+    WORKERS,
+)
 from .study_file import FILES, FILES_OF, LAYOUT, NAME, Tables, compose, holds, read_run
 from .study_file import read as read_tables
 
@@ -57,6 +69,7 @@ class Job:
     protocol: Protocol
     mesh: MeshSettings = attrs.field(factory=MeshSettings)
     times: int = TIMES.field()
+    under_pressure: bool = UNDER_PRESSURE.field()
     stations: int = STATIONS.field()
     quality: str = QUALITY.field()
     workers: int = WORKERS.field()
@@ -121,11 +134,22 @@ class Job:
         clogged = graph and bool(self.effects.clogged)
         yield clogged, f"{without} a clogged chamber", "clogged_chamber, paths", one
         yield (
+            self.under_pressure and not self.driven.pressure_kPa.any(),
+            "the protocol has no pressure above 0, and its suction is left out",
+            "--quick, protocol",
+            "rank with suction, or give a protocol with pressure",
+        )
+        yield (
             not self.samples[1].any(),
             f"none of the {self.times} samples of the protocol has a pressure other than 0",
             "times",
             "give more samples, or a protocol that leaves 0 kPa",
         )
+
+    @property
+    def driven(self) -> Protocol:
+        """The protocol that is solved: without suction if that is left out."""
+        return self.protocol.under_pressure() if self.under_pressure else self.protocol
 
     @cached_property
     def samples(self) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
@@ -133,13 +157,14 @@ class Job:
 
         With effects in time that is the effective pressure.
         """
-        time, pressure = self.protocol.sample(self.times)
+        protocol = self.driven
+        time, pressure = protocol.sample(self.times)
         if not self.effects.in_time:
             return time, pressure
         # Between the protocol's corners the pressure is linear, as the effects have it.
-        every = np.union1d(self.protocol.time_s, time)
+        every = np.union1d(protocol.time_s, time)
         effective = self.effects.effective_kPa(
-            every, np.interp(every, self.protocol.time_s, self.protocol.pressure_kPa)
+            every, np.interp(every, protocol.time_s, protocol.pressure_kPa)
         )
         # Rounded, so that the same pressure met twice is recognised as one equilibrium.
         return time, np.round(effective[np.searchsorted(every, time)], 9)
@@ -147,7 +172,7 @@ class Job:
     @property
     def supplied_kPa(self) -> np.ndarray[Any, Any]:
         """The protocol's pressure (k,) in kPa at the times of `samples`."""
-        return self.protocol.sample(self.times)[1]
+        return self.driven.sample(self.times)[1]
 
     def tables(self) -> Tables:
         """All inputs that decide the results, a table for each stage, as in study.toml.
@@ -155,6 +180,8 @@ class Job:
         Not `workers` and `device`, which do not.
         """
         simulate: dict[str, Any] = {"times": self.times}
+        if self.under_pressure:
+            simulate[UNDER_PRESSURE.name] = True
         if self.self_contact:
             simulate["self_contact"] = True
         if self.self_friction:
@@ -271,6 +298,15 @@ class Job:
         return attrs.evolve(settings, fraction="full")
 
 
+def quick(job: Job) -> Job:
+    """The quick ranking of a study's unit: less is solved, and `study_file.left_out` says what is not.
+
+    Raises InputError for a protocol without pressure above 0.
+    """
+    mesh = attrs.evolve(job.mesh, refine=min(job.mesh.refine, QUICK_REFINE))
+    return attrs.evolve(job, mesh=mesh, mesh_check=False, under_pressure=True)
+
+
 def in_time_newton(self_contact: bool) -> NewtonSettings:
     """Settings of Newton's method where a motion is solved instant by instant."""
     return RESOLVED_CONTACT_NEWTON if self_contact else RESOLVED_OBSTACLE_NEWTON
@@ -368,7 +404,7 @@ OF_FILES = ("friction",)
 # Keys of each stage's table besides files and inner tables.
 SETTINGS = {
     "design": ("quality",),
-    "simulate": ("times", "orientation_deg", "self_contact", "self_friction"),
+    "simulate": ("times", "under_pressure", "orientation_deg", "self_contact", "self_friction"),
     "place": ("stations", "mesh_check", "paths"),
 }
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def doubts_of_job(job: Job) -> Iterator[str]:
     """Warnings on the omissions of a simulation's settings."""
     # Uniform samples miss the protocol's extremes.
-    corners, samples = job.protocol.pressure_kPa, job.supplied_kPa
+    corners, samples = job.driven.pressure_kPa, job.supplied_kPa
     for extreme, met in ((corners.min(), samples.min()), (corners.max(), samples.max())):
         if abs(extreme - met) > 1e-6:
             yield (

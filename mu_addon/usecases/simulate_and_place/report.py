@@ -65,10 +65,11 @@ def _headline(r: ReportData) -> str:
     if found is not None:
         best = _index(r, found.chosen)
         path = r.solved_paths[best]
+        without = f" ({r.left_out})" if r.left_out else ""
         html += (
             f'<p class="answer">Put the sensor along <strong>{_name(path.name)}</strong>, anchors '
             f"{path.anchors}: of {len(r.paths)} candidates it has the smallest mean deviation, "
-            f"{found.j_hat[best]:.3f}&nbsp;mm.</p><p>{_caveat(found)}</p>{_key_figures(r, found)}"
+            f"{found.j_hat[best]:.3f}&nbsp;mm{without}.</p><p>{_caveat(found)}</p>{_key_figures(r, found)}"
         )
     pictures = "".join(picture_figure(picture) for picture in r.pictures[:1])
     if r.view is None:
@@ -122,6 +123,8 @@ def _ranking(r: ReportData) -> str:
     if found is None:
         return _estimates(r)
     over = "the compared part of the pressure cycle" if r.is_partly_compared else "the whole pressure cycle"
+    if r.left_out:
+        over = "the pressure cycle, with rest in place of suction, so that it is less than in a full ranking"
     tied = f" Hatched: tied with {_name(found.chosen)}." if found.tied else ""
     whiskers = (
         f" Whiskers: ± {found.uncertainty_mm:.3f} mm mesh uncertainty."

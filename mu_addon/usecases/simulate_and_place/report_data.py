@@ -144,6 +144,7 @@ def report_data(
         pictures=tuple(pictures),
         paths=tuple(Path(w.name, w.start, w.length) for w in windows),
         ranking=ranking,
+        left_out=study.context.summary.get("left_out", ""),
         estimated_mm={} if ranking else study.estimated_mm,
         search=study.search,
         search_picture=search_picture,

@@ -91,7 +91,8 @@ def console_summary(summary: dict[str, Any]) -> list[str]:
     if name := summary.get("chosen"):
         tied = summary["tied_with_chosen"]
         equal = f", tied with {', '.join(tied)}" if tied else ""
-        lines.append(f"best path: {name}, J_hat {summary['J_hat_mm'][name]:.4f} mm{equal}")
+        without = f" ({words})" if (words := summary.get("left_out")) else ""
+        lines.append(f"best path: {name}, J_hat {summary['J_hat_mm'][name]:.4f} mm{equal}{without}")
         if bounds := summary.get("J_hat_at_least_mm"):
             paths = ", ".join(f"{name} {bound:.3f}" for name, bound in bounds.items())
             lines.append(f"not solved further, J_hat at least [mm]: {paths}; --all-paths solves them")

@@ -34,6 +34,15 @@ ALL_PATHS = described(
     "solve every path at every pressure; else a path is left, with a lower bound, once it certainly deviates "
     "more than the best",
 )
+UNDER_PRESSURE = described(
+    "under_pressure", False, "leave out the protocol's suction: the unit is then at rest"
+)
+QUICK = described(
+    "quick",
+    False,
+    "quick ranking: states under pressure alone, on a mesh of at most 0.35 in refinement, without mesh check",
+)
+QUICK_REFINE = 0.35
 CHECKS = described(
     "checks", 100, "largest number of paths of the lattice solved by the full model", low=2, high=100_000
 )

@@ -47,7 +47,7 @@ from .motion_tables import Row, in_order, instants, write_motion, write_self_con
 from .path_estimate import estimated_J_mm
 from .ranking import Ranking, extremes, mesh_change_mm
 from .settings import STAGES
-from .study_file import LAYOUT, NAME
+from .study_file import LAYOUT, NAME, left_out
 
 Array = np.ndarray[Any, Any]
 
@@ -106,6 +106,8 @@ class Study:
             summary["study"] |= {"mesh": attrs.asdict(job.mesh)}
             if job.effects:
                 summary["study"] |= job.effects.tables
+            if words := left_out(job.tables()):
+                summary["left_out"] = words
             study.warn(*doubts_of_job(job))
         return study
 
@@ -410,7 +412,7 @@ class Study:
         samples = np.arange(len(chosen), dtype=float), chosen
         if job.in_time:
             # The history of contact or wall is of the whole protocol.
-            samples = job.protocol.sample(job.times)
+            samples = job.driven.sample(job.times)
             instants = list(range(job.times))
         checked = self.ranking.best(self.candidates, PATHS_CHECKED)
         with self.progress.stage("mesh check"):

@@ -8,11 +8,12 @@ from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
+from ...meshing.settings import REFINE
 from ...reading import file_bytes, parse_toml
 from ...run.folder import RUN, FolderLayout
 from ...run.inputs import digest
 from ...toml_writer import toml_text
-from .settings import STAGES
+from .settings import MESH_CHECK, STAGES, UNDER_PRESSURE
 
 NAME = "study.toml"
 # The first line, by which a study's folder is known.
@@ -61,6 +62,20 @@ Tables = dict[str, dict[str, Any]]
 def compose(tables: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any] = MappingProxyType({})) -> str:
     """Text of study.toml with a table a stage, and a table [run] of keys that decide no figure."""
     return toml_text({"format": FORMAT, **tables, **({RUN: run} if run else {})}, HEADER)
+
+
+def left_out(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """What the figures of a quick ranking leave out, as text; empty for another study.
+
+    tables: of study.toml, by stage.
+    """
+    motion, ranking = tables.get("simulate", {}), tables.get("place", {})
+    if not motion.get(UNDER_PRESSURE.name):
+        return ""
+    coarse = motion["mesh"]["refine"] < REFINE.default
+    unchecked = not ranking.get(MESH_CHECK.name, True)
+    words = "under pressure alone", "coarse mesh" * coarse, "no mesh check" * unchecked
+    return ", ".join(filter(None, words))
 
 
 def read(folder: Path) -> Tables | None:

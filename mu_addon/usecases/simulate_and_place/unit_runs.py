@@ -131,7 +131,14 @@ class Run:
         what = {"design": "Design", "simulate": "Motion", "place": "Ranking"}[self.job]
         if self.tables.get("place", {}).get("paths") == "graph":
             what += ", lattice"
+        if self.left_out:
+            what = f"Quick {what.lower()}"
         return self.name or what
+
+    @property
+    def left_out(self) -> str:
+        """What a quick ranking leaves out, as text; empty for another run."""
+        return study_file.left_out(self.tables)
 
     @property
     def seconds(self) -> float:
@@ -255,13 +262,13 @@ def read_run(folder: Path) -> Run:
 def best_of(found: Sequence[Run], design: str) -> Run | None:
     """Run whose results are shown for a design: the best of its runs, or else the latest of all.
 
-    Complete before incomplete, a finer mesh before a coarser one, a ranking before the motion alone, then the
-    latest. A run that has just begun is shown only if there is no other.
+    Complete before incomplete, a finer mesh before a coarser one, a quick ranking after others, a ranking
+    before the motion alone, then the latest. A run that has just begun is shown only if there is no other.
     """
     own = [run for run in found if run.design == design]
     ready = [run for run in own if run.has_results]
     if ready:
-        return max(ready, key=lambda r: (r.complete, r.refine, bool(r.ranking), r.changed_s))
+        return max(ready, key=lambda r: (r.complete, r.refine, not r.left_out, bool(r.ranking), r.changed_s))
     others = [run for run in found if run.has_results]
     return next(iter(ordered(others or own)), None)
 
