@@ -34,7 +34,7 @@ TOUCHING = 6.0
 # The best paths, which the coarser mesh solves too: each costs as much there as on the fine one, and only
 # paths near the best can be tied with it.
 PATHS_CHECKED = 3
-SHIPPED_KPA = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
+SHIPPED_KPA: tuple[float, ...] = (-20.0, -10.0, 10.0, 20.0, 30.0, 40.0)
 """Pressures other than 0 of the shipped protocol at the default number of times."""
 # Unknowns grow as the cube of the refinement, and a factorisation's time somewhat faster.
 BY_REFINEMENT = 3.5

@@ -10,9 +10,10 @@ import pytest
 import mu_addon
 from mu_addon.blender.jobs import header, preferences, start_child
 from mu_addon.blender.jobs.panel import rounded
+from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
-from mu_addon.blender.simulate.panel import start_words
+from mu_addon.blender.simulate.panel import MU_PT_simulate, start_words
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.run.child import Child
 
@@ -151,8 +152,6 @@ def test_a_plan_has_the_stages_of_the_job_and_the_seconds_of_the_last_run(study)
     root.mu_unit.study.command = "simulate"
     assert [name for name, _ in plan_of(root)] == ["solid", "mesh", "Model A", "report"]
     root.mu_unit.study.folder = str(study)
-    from mu_addon.blender.simulate import study_folder as studies
-
     seconds = studies.findings(root).summary["seconds"]
     assert dict(plan_of(root))["Model A"] != seconds["Model A"], (
         "a run on a coarser mesh tells nothing of this one"
@@ -182,6 +181,24 @@ def test_the_button_says_what_it_will_take_by_what_was_measured_here(tmp_path, m
     assert [rounded(s) for s in (3, 41, 95, 1500, 7200, 12600)] == [
         "10 s", "40 s", "2 min", "25 min", "2 h", "3 h 30 min",
     ]  # fmt: skip
+
+
+def test_a_quick_ranking_is_started_by_its_own_button(tmp_path, monkeypatch):
+    monkeypatch.setattr(timings, "_file", lambda: tmp_path / "timings.json")
+    root = add(preset="mu-0.75x")
+    assert announced(root, quick=True)[0] < 0.2 * announced(root)[0]
+    assert "Quick Ranking, perhaps " in drawn([MU_PT_simulate])
+    given = {}
+    monkeypatch.setattr(start_child, "start", lambda *_, **more: given.update(more))
+    monkeypatch.setattr(start_child, "watch", lambda *_: None)
+    assert bpy.ops.mu.simulate(quick=True) == {"FINISHED"}
+    assert given["plan"] == plan_of(root, quick=True)
+    (run,) = studies.runs_of(root)
+    assert run.title == "Quick ranking"
+    # The main button is the full one again, in a folder of its own.
+    assert bpy.ops.mu.simulate() == {"FINISHED"}
+    assert given["plan"] == plan_of(root)
+    assert sorted(run.title for run in studies.runs_of(root)) == ["Quick ranking", "Ranking"]
 
 
 def test_progress_redraws_sidebars_and_an_end_the_scene(monkeypatch):
