@@ -40,7 +40,7 @@ def test_it_is_the_same_study_with_other_inputs():
     assert (one.mesh.refine, one.mesh_check, one.self_contact) == (0.35, False, True)
     assert quick(attrs.evolve(FULL, mesh=MeshSettings(refine=0.2))).mesh.refine == 0.2
     # Four of six pressures, and not those where walls touch.
-    assert sum(s for _, s in plan_of(one)) < 0.1 * sum(s for _, s in plan_of(FULL))
+    assert sum(s for _, s in plan_of(one)) < 0.2 * sum(s for _, s in plan_of(FULL))
 
 
 def test_without_pressure_there_is_none():

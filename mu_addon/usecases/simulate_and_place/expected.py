@@ -31,6 +31,9 @@ SOLVING = {"Model A": 0.88, "candidates": 0.97}
 """Share of a stage's time until its last equilibrium."""
 TOUCHING = 6.0
 """Factor on the seconds of a state at -20 kPa where walls touch; by the square of that."""
+LEFT_UNDER_PRESSURE = 0.55
+"""Share left out of the states after the highest pressure, of paths that are not the best, without suction:
+15 of 27 of `mu-1.0x`."""
 # The best paths, which the coarser mesh solves too: each costs as much there as on the fine one, and only
 # paths near the best can be tied with it.
 PATHS_CHECKED = 3
@@ -102,6 +105,8 @@ class Size:
         _, rest = first_and_rest(np.array(self.pressures_kPa))
         later = work(self, [self.pressures_kPa[n] for n in rest]) / work(shipped, SHIPPED_KPA)
         left = later * max(paths - self.known, 0) if self.known else 0.0
+        if min(self.pressures_kPa) >= 0.0:
+            left *= LEFT_UNDER_PRESSURE
         return body * (states * paths - left) / 10
 
 
