@@ -24,8 +24,9 @@ GAIN, RELATIVE = 1e-2, 1e-4
 # A fit that is expected to gain less than this share of its excess over one from another start is ended.
 ALIKE = 1e-3
 # That is trusted of a fit that is expected to gain less than this share of its chi squared: far from its
-# minimum, a wall that stops the unit promises a tenth of what it gains.
-SETTLED = 0.2
+# minimum, a wall that stops the unit promises a tenth of what it gains. Or of one expected to end within this
+# share of the other's excess: it is on the way to the same minimum.
+SETTLED, SAME = 0.2, 0.05
 # Group of prior knowledge.
 PRIOR = "known before"
 
@@ -214,10 +215,11 @@ class Fitter:
 
         start: values by key, by default the first start of a parameter, else its null. fixed: values by key
         that are held; a held value costs its deviation from prior knowledge. Values are in the parameters'
-        units. reached: chi squared of a fit from another start; a fit that has settled and is not expected to
-        fall below it ends. Damped Gauss-Newton steps (Levenberg and Marquardt) within the bounds, with
-        finite-difference derivatives and at most `ITERATIONS` steps. Values without a prediction (`possible`)
-        count as infinitely bad; raises the prediction's error if the start is one.
+        units. reached: chi squared of a fit from another start; a fit that has settled, or nears the same
+        minimum, and is not expected to fall below it ends. Damped Gauss-Newton steps (Levenberg and
+        Marquardt) within the bounds, with finite-difference derivatives and at most `ITERATIONS` steps.
+        Values without a prediction (`possible`) count as infinitely bad; raises the prediction's error if the
+        start is one.
         """
         start, fixed = start or {}, dict(fixed or {})
         free: list[tuple[str, Parameter]] = [(p.name, p) for p in self.curved]
@@ -271,8 +273,9 @@ class Fitter:
             end = max(GAIN, RELATIVE * (chi2 - len(f)))
             if math.isfinite(reached):
                 promised = float(gradient @ _step(gram, gradient, 1e-9, x, low, high))
-                least = reached - max(GAIN, ALIKE * (reached - len(f)))
-                if promised < SETTLED * chi2 and chi2 + held - promised > least:
+                expected, excess = chi2 + held - promised, reached - len(f)
+                sure = promised < SETTLED * chi2 or expected < reached + SAME * excess
+                if sure and expected > reached - max(GAIN, ALIKE * excess):
                     break
             gained, accepted = 0.0, False
             for _ in range(8):
