@@ -74,70 +74,10 @@ def test_without_its_packages_it_says_how_to_install_them(tmp_path, words):
     assert_clear_failure(done, 1, "package attr", "is not installed", "-m pip install")
 
 
-PRESET = ("--preset", "mu-1.0x")
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (("place", "--preset", "mu-2.0x"), ("mu-2.0x", "mu-1.0x")),
-        (("place", "--presett", "mu-1.0x"), ("--help",)),
-        (("simulate", *PRESET, "--resin", ""), ("it is empty", "where: --resin")),
-        (("design", *PRESET, "--path", "alpha11"), ("alpha11", "alpha10")),
-        (("simulate", *PRESET, "--protocol", "none.csv"), ("none.csv",)),
-        (("simulate", *PRESET, "--times", "1"), ()),
-        (("simulate", *PRESET, "--refine", "0"), ()),
-        (("simulate", *PRESET, "--refine", "nan"), ()),
-        (("place", *PRESET, "--times", "2"), ("none of the 2 samples",)),
-        (("place", *PRESET, "--paths", "graph", "--shortest-cells", "40"), ("no path of the lattice",)),
-    ],
-)
-def test_words_that_no_run_can_use_are_refused_before_any_work(tmp_path, words, told):
-    assert_clear_failure(here(*words, "--out", tmp_path / "out"), 2, *told, "what to do")
+def test_a_search_without_a_path_is_refused_before_any_work(tmp_path):
+    words = ("--preset", "mu-0.75x", "--paths", "graph", "--shortest-cells", "40", "--out", tmp_path / "out")
+    assert_clear_failure(here("place", *words), 2, "no path of the lattice", "what to do")
     assert not (tmp_path / "out" / "unit.stl").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ('format = 1\nname = "x"\nscale = = 2\n', ("unit.toml", "line 3")),
-        ("format = 1\nscale = 1.0\n\n[chambers]\nwal_mm = 0.7\n", ("line 5", "wall_mm")),
-        # The largest wall, a (a + b) / (2 (R - r)) = 3.75 x 6.25 / 12.5 mm.
-        ("format = 1\n[chambers]\nwall_mm = 2.5\n", ("wall", "1.87", "cavity")),
-    ],
-    ids=["malformed", "misspelt", "impossible"],
-)
-def test_a_units_file_is_refused_in_its_own_words(tmp_path, text, told):
-    (tmp_path / "unit.toml").write_text(text)
-    done = here("design", "--unit", tmp_path / "unit.toml", "--out", tmp_path / "out")
-    assert_clear_failure(done, 2, *told)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("time_s,pressure_kPa\n0,0\n1,abc\n", ("line 3", "not a number")),
-        ("time_s,pressure_kPa\n0,0\n1,5\n1,6\n", ("line 4", "time does not increase")),
-        ("time_s,pressure\n0,0\n1,5\n", ("pressure_kPa", "line 1", "bar, psi")),
-        ("time_s,pressure_bar\n0,0\n1,11\n", ("line 3", "a pressure of 1100 kPa")),
-        ("time_s,pressure_kPa\n0,0\n1,nan\n", ("line 3", "not finite")),
-        ("time_s,pressure_kPa\n0,0\n1,-20000\n", ("line 3", "a pressure of -20000 kPa", "-101.325")),
-        ("time_s,pressure_kPa\n0,5\n1,6\n", ("0 kPa",)),
-        ("", ("empty",)),
-    ],
-)
-def test_unreadable_protocol_names_its_line(tmp_path, text, words):
-    file = tmp_path / "protocol.csv"
-    file.write_text(text)
-    done = here("simulate", "--preset", "mu-1.0x", "--out", tmp_path / "out", "--protocol", file)
-    assert_clear_failure(done, 2, "protocol", *words)
-
-
-def test_a_binary_protocol(tmp_path):
-    binary = tmp_path / "binary.csv"
-    binary.write_bytes(bytes(range(256)))
-    done = here("simulate", *PRESET, "--out", tmp_path / "out", "--protocol", binary)
-    assert_clear_failure(done, 2, "not a text file")
 
 
 def three_chambers(folder):

@@ -1,8 +1,7 @@
-"""`homogenize` and `fit-material` as their users run them: files, figures that agree, and bad input."""
+"""`homogenize` as its users run it: files, and figures that agree."""
 
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,18 +14,12 @@ from .processes import here
 COARSE = ("--cells", "1", "--friction", "slide", "--strain", "0.1", "--refine", "0.5")
 # A block between plates takes two thirds of the time.
 CELL = ("--friction", "none", "--refine", "0.3")
-TRELOAR = Path(__file__).resolve().parents[1] / "data" / "treloar"
 
 
 def homogenised(out, options):
     done = here("homogenize", "--preset", "mu-1.0x", *options, "--out", str(out))
     assert done.returncode == 0, done.stderr
     return out, done
-
-
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory):
-    return homogenised(tmp_path_factory.mktemp("pressed"), COARSE)
 
 
 def table(path):
@@ -62,85 +55,11 @@ def test_it_leaves_tensor_curve_law_and_report(tmp_path, monkeypatch):
 @pytest.mark.nightly(
     "tests/homogenize/test_compression.py::test_a_path_goes_on_from_its_states_to_the_same_ones"
 )
-def test_a_block_between_plates_is_pressed_drawn_and_reported(pressed):
-    out, _ = pressed
+def test_a_block_between_plates_is_pressed_drawn_and_reported(tmp_path):
+    out, _ = homogenised(tmp_path, COARSE)
     moduli = json.loads((out / "summary.json").read_text())["moduli_kPa"]
     block = table(out / "specimen_slide.csv")
     assert float(block["strain"][-1]) == pytest.approx(0.1)
     assert float(block["stress_kPa"][1]) / float(block["strain"][1]) < moduli["E100"]
     assert (out / "specimen.stl").stat().st_size > 10_000
     assert "Block between plates" in (out / "report.html").read_text()
-
-
-@pytest.mark.nightly(
-    "tests/homogenize/test_compression.py::test_a_path_goes_on_from_its_states_to_the_same_ones"
-)
-def test_it_resumes_from_what_was_finished(pressed):
-    out, _ = pressed
-    before = (out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()
-    (out / "report.html").unlink()
-    done = here("homogenize", "--preset", "mu-1.0x", *COARSE, "--out", str(out))
-    assert done.returncode == 0, done.stderr
-    assert ((out / "effective.toml").read_bytes(), (out / "specimen_slide.csv").read_bytes()) == before
-    assert (out / "report.html").exists()
-
-
-@pytest.mark.nightly("tests/homogenize/test_cell_mesh.py::test_scales_share_one_mesh_and_one_tensor")
-def test_other_inputs_set_the_old_results_aside(pressed):
-    out, _ = pressed
-    done = here(
-        "homogenize",
-        "--preset",
-        "mu-1.5x",
-        "--friction",
-        "none",
-        "--refine",
-        "0.5",
-        "--no-report",
-        "--out",
-        str(out),
-    )
-    assert done.returncode == 0, done.stderr
-    assert (out / "stale" / "specimen_slide.csv").exists()
-    assert not (out / "specimen_slide.csv").exists()
-    # One lattice at another scale: the same moduli, to the last digit of its mesh.
-    now, before = (json.loads((p / "summary.json").read_text())["moduli_kPa"] for p in (out, out / "stale"))
-    assert now["E100"] == pytest.approx(before["E100"], rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("more", "status", "words"),
-    [
-        (("--cells", "0"), 2, "cells = 0 is out of bounds"),
-        (("--strain", "2"), 2, "strain = 2 is out of bounds"),
-        (("--refine", "0.4"), 2, "refine = 0.4 is too coarse for the specimen"),
-        (("--resin", "no-such-resin"), 2, "no-such-resin"),
-    ],
-)
-def test_bad_input_is_named(tmp_path, more, status, words):
-    done = here("homogenize", "--preset", "mu-1.0x", *more, "--out", str(tmp_path / "out"))
-    assert done.returncode == status
-    assert words in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-def test_an_offset_that_fills_the_cell_is_named(tmp_path):
-    unit = tmp_path / "unit.toml"
-    unit.write_text("format = 1\nscale = 0.2\n[print]\noffset_xy_mm = 0.5\noffset_z_mm = 0.5\n")
-    done = here("homogenize", "--unit", str(unit), "--friction", "none", "--out", str(tmp_path / "out"))
-    assert done.returncode == 2
-    assert "[print]" in done.stderr or "offset" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-@pytest.mark.slow
-def test_fit_material_shows_what_a_law_misses(tmp_path):
-    out = tmp_path / "rubber"
-    words = ("--laws", "neo-hooke", "yeoh", "--hold-out", "equibiaxial")
-    done = here("fit-material", str(TRELOAR), *words, "--out", str(out))
-    assert done.returncode == 0, done.stderr
-    assert "law: " in done.stdout
-    assert (out / "material.toml").exists()
-    assert (out / "report.html").exists()
-    summary = json.loads((out / "summary.json").read_text())
-    assert "equibiaxial" in json.dumps(summary["laws"]["neo-hooke"]["fails"])

@@ -23,8 +23,3 @@ def test_walls_that_may_touch_are_the_default(command):
     found = job(command)
     assert found.self_contact
     assert not job(command, "--no-self-contact").self_contact
-
-
-def test_options_that_exclude_each_other_are_refused():
-    with pytest.raises(InputError, match="friction between walls and struts"):
-        job("simulate", "--no-self-contact", "--self-friction", "0.3")

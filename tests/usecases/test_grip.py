@@ -1,6 +1,5 @@
 """A gripper's run: its phases, a grasp with and without friction, its table of paths, its folder."""
 
-import csv
 import json
 import re
 
@@ -141,21 +140,6 @@ def test_the_printable_part_from_the_command_line(tmp_path, capsys):
     assert "Gripper" in (out / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--preset", "gripper", "--cube", "40"], "does not fit"),
-        (["--preset", "mu-1.0x"], "not a gripper"),
-        (["--preset", "gripper", "--friction", "-1"], "friction = -1 is out of bounds"),
-        (["--preset", "gripper", "--cube", "25", "25"], "same side"),
-    ],
-)
-def test_wrong_input_is_refused_in_words(tmp_path, capsys, options, words):
-    assert main(["grip", *options, "--out", str(tmp_path / "out"), "--json"]) == 2
-    assert words in capsys.readouterr().out
-    assert not (tmp_path / "out").exists()
-
-
 def squeezed(folder, *more):
     """Line and folder of a grasp by fingers of three chambers, which hold a lighter, smoother cube."""
     line = ["grip", "--gripper", str(short_gripper(folder)), "--out", str(folder / "out"), "--cube", "25"]
@@ -242,27 +226,3 @@ def short_gripper(folder):
         text = re.sub(f"(?m)^{key} = .*", f'{key} = "{value}"', text)
     (folder / "g.toml").write_text(text)
     return folder / "g.toml"
-
-
-@pytest.mark.nightly(
-    "tests/body/test_contact.py::test_a_ball_on_the_cap_alone_is_pressed_back_alike_on_a_finer_mesh"
-)
-def test_a_resolved_finger_grasps_from_the_command_line(tmp_path):
-    """Three chambers strut by strut: forces within Coulomb's bound, work into friction, frames."""
-    gripper = short_gripper(tmp_path)
-    (tmp_path / "p.csv").write_text(SQUEEZE)
-    line = ["grip", "--gripper", gripper, "--protocol", tmp_path / "p.csv", "--cube", "25"]
-    line += ["--refine", "0.4", "--no-self-contact", "--out", tmp_path / "out"]
-    assert main([str(word) for word in line]) == 0
-    rows = list(csv.DictReader((tmp_path / "out" / "grasp_25.csv").open()))
-    normal, down, lost, gap = (
-        np.array([float(r[c]) for r in rows]) for c in ("normal_N", "down_N", "lost_mJ", "deepest_mm")
-    )
-    assert normal.max() > 0.03
-    assert (np.abs(down) <= 0.5 * normal * (1 + 1e-3) + 1e-9).all()
-    assert 0 < gap.max() < 0.15
-    assert normal[-1] == 0.0
-    g = json.loads((tmp_path / "out" / "summary.json").read_text())["grasps"]["25"]
-    # Steps of 5 kPa: 9 % apart; of 10 kPa 21 %, of 2.5 kPa 2 %.
-    assert g["pressure_work_mJ"] + g["cube_work_mJ"] == pytest.approx(lost[-1], rel=0.15)
-    assert (tmp_path / "out" / "frame_25_iii.png").exists()

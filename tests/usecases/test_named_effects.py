@@ -224,30 +224,6 @@ def test_sensor_paths_are_ranked_in_the_unit_that_has_the_effect(placed, name):
         assert low <= found["angle_deg"]["0"] <= high
 
 
-def same_digits(one, other):
-    assert (one / "motion.csv").read_bytes() == (other / "motion.csv").read_bytes()
-    with np.load(one / "delta.npz") as a, np.load(other / "delta.npz") as b:
-        for name in a.files:
-            np.testing.assert_array_equal(a[name], b[name])
-
-
-@pytest.mark.nightly("tests/headless/test_resume.py::test_killed_at_any_stage_it_goes_on_to_the_same_digits")
-def test_a_run_that_was_stopped_goes_on_to_the_same_digits(placed, tmp_path):
-    """As far as it came: its mesh, and of the load steps and candidates every other."""
-    folder, found, _ = placed("weight")
-    copy = shutil.copytree(folder, tmp_path / "stopped")
-    for kind in ("state", "sweep", "whole"):
-        kept = sorted((copy / "cache").glob(f"{kind}-*"))
-        assert len(kept) == 2, "one of them is of no pressure"
-        for path in kept[::2]:
-            path.unlink()
-    # By processes of their own, beside the motion, as far as there is something left to do.
-    job = attrs.evolve(read_job(copy), workers=2)
-    assert job.effects == with_effects(90.0, gravity=1300.0).effects
-    assert ran(job, copy)["J_hat_mm"] == found["J_hat_mm"]
-    same_digits(folder, copy)
-
-
 def test_another_size_or_direction_is_another_result_and_no_weight_has_no_direction(placed, tmp_path):
     folder, found, _ = placed("weight")
     copy = shutil.copytree(folder, tmp_path / "changed")

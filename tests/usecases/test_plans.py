@@ -14,21 +14,6 @@ from mu_addon.usecases.simulate_and_place.expected import TOUCHING, Size, plan_o
 STUDY = ["--no-self-contact", "--refine", "0.35", "--times", "3"]
 SMALL = load_preset("mu-0.75x").evolve(count=3)
 MILD = "time_s,pressure_kPa\n0,0\n1,2\n2,0\n"
-SWEEP = """
-format = 1
-unit = "unit.toml"
-protocol = "mild.csv"
-stages = "simulate"
-method = "grid"
-
-[simulate]
-times = 3
-mesh = { refine = 0.35 }
-self_contact = false
-
-[vary]
-"chambers.wall_mm" = { low = 0.9, high = 1.2, steps = 2 }
-"""
 
 
 def messages_of(monkeypatch, tmp_path, words):
@@ -43,23 +28,16 @@ def messages_of(monkeypatch, tmp_path, words):
 @pytest.mark.parametrize(
     "words",
     [
-        ["fit-material", "tests/data/treloar", "--laws", "yeoh"],
         pytest.param(
             ["design", "--preset", "mu-0.75x", "--path", "alpha4"],
             marks=pytest.mark.nightly("test_a_command_does_what_it_planned"),
         ),
         ["simulate", "--unit", "unit.toml", "--protocol", "mild.csv", *STUDY],
-        pytest.param(
-            ["sweep", "sweep.toml"],
-            marks=pytest.mark.nightly(
-                "tests/usecases/test_parameter_study.py::test_every_point_is_a_row_whatever_became_of_it"
-            ),
-        ),
     ],
     ids=lambda words: words[0],
 )
 def test_a_command_does_what_it_planned(monkeypatch, tmp_path, words):
-    files = {"sweep.toml": SWEEP, "unit.toml": to_toml(SMALL), "mild.csv": MILD}
+    files = {"unit.toml": to_toml(SMALL), "mild.csv": MILD}
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     words = [str(tmp_path / word) if word in files else word for word in words]

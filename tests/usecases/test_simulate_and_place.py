@@ -196,11 +196,6 @@ def test_figures_of_another_version_are_not_kept(copied):
     assert "chosen" not in ran(attrs.evolve(JOB, stages=("design",)), folder)
 
 
-def same_digits(one, other):
-    with np.load(one / "delta.npz") as a, np.load(other / "delta.npz") as b:
-        return set(a.files) == set(b.files) and all(np.array_equal(a[n], b[n]) for n in a.files)
-
-
 def damaged(path, damage, rng):
     """Damage an entry of the cache in one of several ways."""
     whole = bytearray(path.read_bytes())
@@ -229,19 +224,6 @@ def test_damaged_states_are_solved_again_to_the_same_digits(placed, copied):
         damaged(folder / "cache" / name, DAMAGES[number], rng)
     ran(attrs.evolve(JOB, stages=("design", "simulate")), folder)
     assert (folder / "motion.csv").read_bytes() == (placed[0] / "motion.csv").read_bytes()
-
-
-@pytest.mark.nightly("test_damaged_states_are_solved_again_to_the_same_digits")
-@pytest.mark.parametrize("first", [0, 2])
-def test_a_damaged_cache_is_computed_again_to_the_same_digits(placed, copied, first):
-    """Every entry is damaged, and entries of a kind each in another way."""
-    folder, full = copied
-    rng = np.random.default_rng(first)
-    for number, path in enumerate(sorted((folder / "cache").glob("*.npz"))):
-        damaged(path, DAMAGES[(first + number) % len(DAMAGES)], rng)
-    summary = ran(JOB, folder)
-    assert summary["J_hat_mm"] == full["J_hat_mm"]
-    assert same_digits(folder, placed[0])
 
 
 def test_too_little_room_is_told_before_any_work(tmp_path, monkeypatch):

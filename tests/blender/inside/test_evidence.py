@@ -29,7 +29,7 @@ from mu_addon.measured import read_folder
 from ...lab_files import exports
 from .acting import add, refused
 from .drawing import drawn as drawn_by
-from .jobs import ended, fake, watch
+from .jobs import ended
 
 
 def diagnose(root):
@@ -128,34 +128,6 @@ def test_from_data_to_a_unit_that_has_what_was_found(blocks, tmp_path, monkeypat
     assert "Stale: made with other measured data" in drawn()
     stale = "The diagnosis is stale: made with other measured data"
     assert stale in refused(bpy.ops.mu.evidence_apply)
-
-
-def test_a_diagnosis_that_fails_and_one_that_is_stopped(blocks):
-    root = add()
-    root.mu_evidence.folder = str(blocks)
-
-    def start(how):
-        return fake(evidence.DIAGNOSIS, root, how)
-
-    for how, expected in {"reported_error": "thicker wall", "crash": "SIGSEGV", "good": "see below"}.items():
-        child = start(how)
-        ended(child)
-        assert expected in drawn(), (how, drawn())
-        assert bpy.ops.mu.evidence_dismiss() == {"FINISHED"}
-        assert expected not in drawn()
-    child = start("hang")
-    watch(lambda: child.progress)
-    assert "0.50 50%, motion" in drawn()
-    assert "mu.evidence_cancel" in drawn()
-    assert not bpy.ops.mu.evidence_diagnose.poll()
-    # The unit's own simulation is another one.
-    assert SIMULATION.child(root) is None
-    assert not bpy.ops.mu.cancel.poll()
-    assert bpy.ops.mu.evidence_cancel() == {"FINISHED"}
-    ended(child)
-    assert "Cancelled" in drawn()
-    assert not bpy.ops.mu.evidence_cancel.poll()
-    assert "there is no such file" in refused(bpy.ops.mu.evidence_open, what="report")
 
 
 def applied(folder, clogged):

@@ -23,7 +23,7 @@ from mu_addon.studies.grip import Grip
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
-from .jobs import ended, fake, watch
+from .jobs import ended
 
 PANELS = gripper_panel.CLASSES
 
@@ -140,7 +140,7 @@ def test_its_fingers_may_be_a_unit_of_ones_own(tmp_path):
     assert to_gripper(root.mu_gripper) == core
 
 
-def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
+def test_what_a_grasp_is_asked(tmp_path):
     root = held()
     props = root.mu_gripper
     props.folder, props.cube_mm, props.friction = str(tmp_path / "out"), 20.0, 0.3
@@ -155,21 +155,6 @@ def test_what_a_grasp_is_asked_and_how_it_ends(tmp_path):
     assert grasps.GRASPING.inputs(root).sides == ()
     assert "was not grasped yet" in drawn()
     assert "there is no grasp" in refused(bpy.ops.mu.grasp_show)
-
-    child = fake(grasps.GRASP, root, "hang")
-    watch(lambda: child.progress)
-    assert "0.50 50%, motion" in drawn()
-    assert "mu.grasp_cancel" in drawn()
-    assert "A grasp is running" in refused(bpy.ops.mu.grasp)
-    assert bpy.ops.mu.grasp_cancel() == {"FINISHED"}
-    ended(child)
-    assert "Cancelled" in drawn()
-    assert bpy.ops.mu.grasp_dismiss() == {"FINISHED"}
-    assert "Cancelled" not in drawn()
-    child = fake(grasps.GRASP, root, "crash")
-    ended(child)
-    assert "SIGSEGV" in drawn()
-    assert bpy.ops.mu.grasp_open(what="errors") == {"FINISHED"}
 
 
 def test_the_button_says_what_a_grasp_will_take_by_what_was_measured_here(tmp_path, monkeypatch):
@@ -298,7 +283,7 @@ def test_an_unsaved_files_grasp_goes_where_saving_finds_it(tmp_path):
     assert grasps.of(root) is not None
 
 
-@pytest.mark.nightly("test_what_a_grasp_is_asked_and_how_it_ends")
+@pytest.mark.nightly("test_a_grasp_plays_on_the_timeline")
 def test_a_coarse_grasp_from_start_to_timeline(tmp_path):
     root = held()
     props = root.mu_gripper

