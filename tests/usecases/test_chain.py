@@ -111,6 +111,9 @@ def rows_of(path):
 
 @pytest.mark.slow
 def test_a_chain_from_the_command_line_leaves_its_files_and_resumes(folder, monkeypatch):
+    (folder / "short.toml").write_text("format = 1\n[chambers]\ncount = 3\n")
+    text = CHAIN.replace('preset = "mu-1.0x"', 'file = "short.toml"').replace("refine = 0.25", "refine = 0.2")
+    (folder / "chain.toml").write_text(text)
     out = folder / "out"
     assert main(["chain", str(folder / "chain.toml"), "--out", str(out)]) == 0
     rows = rows_of(out / "tip.csv")

@@ -51,7 +51,8 @@ def for_good(request: pytest.FixtureRequest) -> bool:
     return bool(request.param)
 
 
-@pytest.mark.parametrize("step", [67, pytest.param(3, marks=pytest.mark.nightly("test_simulate"))])
+@pytest.mark.nightly("test_export")
+@pytest.mark.parametrize("step", [67, 3])
 def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """Each 67th call, to be quick."""
     monkeypatch.setattr(study, "build_solid", functools.cache(study.build_solid))
@@ -63,7 +64,7 @@ def test_simulate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int) ->
     assert inject_each(run, tmp_path, failing, 5, PARTIAL, step=step) == []
 
 
-@pytest.mark.nightly("test_simulate")
+@pytest.mark.nightly("test_export")
 @pytest.mark.parametrize("step", [251, 9])
 def test_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_light: Any, step: int) -> None:
     """Each 251st call, to be quick; `python -m benchmarks.faults calls` has every one fail."""
