@@ -126,7 +126,7 @@ def texts(out, data, protocol):
     study.folder = ""
     root.mu_evidence.folder = str(data)
     put(out / "diagnose-blocks", evidence.folder_of(root))
-    put(out / "check", printing.folder_of(root, printing.CHECK))
+    put(out / "check", printing.CHECK.folder_of(root))
     states["6 diagnosed and checked"] = drawn()
     assert bpy.ops.mu.tree_new(template="three-walls") == {"FINISHED"}
     (tree,) = (tree for tree in bpy.data.node_groups if tree.bl_idname == TREE)
