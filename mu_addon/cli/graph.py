@@ -47,4 +47,6 @@ def run(options: argparse.Namespace, context: RunContext) -> None:
 
     require_out(options)
     job = job_of_file(Path(options.file), tuple(options.node), options.node_reports)
+    # Its nodes say which of them were computed and which were taken from earlier.
+    context.words = None
     USE_CASE.start(job, Path(options.out), context)
