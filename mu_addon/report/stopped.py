@@ -17,6 +17,7 @@ from .html import facts_table, note, page, table
 
 REPORT = "report.html"
 MOST_ROWS = 20
+NO_PICTURES = "This report has no pictures: they take most of its time, and this run was asked to stop."
 
 
 def write_stopped_report(folder: Path, why: str) -> None:
@@ -37,7 +38,7 @@ def write_stopped_report(folder: Path, why: str) -> None:
     ]
     words = [
         f"This run is partial: {why}. The results below are from before the stop, and are not final.",
-        "This report has no pictures: they take most of its time, and this run was asked to stop.",
+        NO_PICTURES,
         "The same command, or `run.py resume` with this folder, continues from the finished stages.",
     ]
     whole = page(f"Stopped run: {folder.resolve().name}", "", note(words), "", sections)

@@ -78,6 +78,11 @@ class RunContext:
     _lock: FolderLock | None = None
     _kept_s: float = 0.0
 
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds of each stage, of this run and of those before it that it continues."""
+        return {**self.summary.get("seconds", {}), **self.progress.seconds}
+
     def write_report(self, stopped: str = "") -> None:
         """Write the report, if it is wanted. stopped: reason of an early stop."""
         if self.report is not None and self.wants_report:
@@ -144,8 +149,7 @@ class RunContext:
         now = time.monotonic()
         if message["state"] != "run" or now - self._kept_s > KEEP_EVERY_S:
             self._kept_s = now
-            seconds = {**self.summary.get("seconds", {}), **self.progress.seconds}
-            if seconds:
+            if seconds := self.seconds:
                 self.summary["seconds"] = seconds
             self._write_running()
 
@@ -252,7 +256,7 @@ def _stop(context: RunContext, error: MuError) -> None:
 
 
 def _write_summary(context: RunContext, state: dict[str, Any]) -> None:
-    seconds = {"seconds": {**context.summary.get("seconds", {}), **context.progress.seconds}}
+    seconds = {"seconds": context.seconds}
     # Twice, so that the state is read first and yet overrides an older one.
     context.summary = {**state, **context.summary, **state, **seconds}
     if context.folder is None:

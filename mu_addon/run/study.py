@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 _INPUT, _STAGE, _DERIVED, _SECTION = "input", "_stage", "_derived", "_section"
 _NONE: Mapping[str, Any] = MappingProxyType({})
 TELL = "tell"
+REPORT_S = 5.0
+"""Expected seconds of a report on two cores."""
 """Parameter by which a stage reports its progress: see `Tell`."""
 
 

@@ -33,7 +33,9 @@ def finished(folder: Path, context: RunContext) -> dict[str, Any] | None:
         return None
     with suppress(OSError, InputError):
         found = parse_json(file_bytes(folder / CACHE / FILE), FILE)
-        if found["asked"] == _asked(context) and found["files"] == _digests(folder):
+        # A damaged record is none.
+        whole = isinstance(found, dict) and found.keys() == {"asked", "files", "summary", "lines", "warnings"}
+        if whole and found["asked"] == _asked(context) and found["files"] == _digests(folder):
             return dict(found)
     return None
 
@@ -53,11 +55,10 @@ def remember(folder: Path, context: RunContext, warnings: Sequence[Message]) -> 
         return
     with suppress(OSError, MuError):
         make_folder(folder / CACHE)
-        seconds = {**context.summary.get("seconds", {}), **context.progress.seconds}
         record = {
             "asked": _asked(context),
             "files": _digests(folder),
-            "summary": plain(context.summary | {"seconds": seconds}),
+            "summary": plain(context.summary | {"seconds": context.seconds}),
             "lines": context.console_summary(context.summary),
             "warnings": list(warnings),
         }

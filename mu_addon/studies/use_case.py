@@ -8,12 +8,9 @@ from pathlib import Path
 from ..run.context import RunContext
 from ..run.execution import Execution
 from ..run.progress_estimate import Plan
-from ..run.study import Study
+from ..run.study import REPORT_S, Study
 from ..run.usecase import UseCase
 from . import study
-
-REPORT_S = 5.0
-"""Expected seconds of a report on two cores."""
 
 
 @cache

@@ -51,11 +51,14 @@ def test_it_is_run_again_where_anything_differs(fitted, monkeypatch):
         table = next(data.glob("*.csv"))
         table.write_text("".join(table.read_text().splitlines(keepends=True)[:-1]))
 
+    def damage_the_record():
+        (out / "cache" / "finished.json").write_text('{"asked": []}')
+
     def renew_the_program():
         monkeypatch.setattr("mu_addon.run.unchanged.package_versions", lambda: {"mu_addon": "0.2.0"})
 
     run()
-    for change in (edit_a_result, add_a_file, drop_a_row, renew_the_program):
+    for change in (edit_a_result, add_a_file, drop_a_row, damage_the_record, renew_the_program):
         assert run()[0] == set()
         change()
         assert run()[0], change.__name__

@@ -17,7 +17,7 @@ from ...errors import MuError
 from ...reading import file_bytes, parse_json
 from ...run.folder import write_run
 from ...run.progress_estimate import Plan
-from ...run.study import Study
+from ...run.study import REPORT_S, Study
 from ...run.summary import SUMMARY
 from ...studies import STUDIES, study
 from ..jobs.panel import job_state, timed
@@ -28,8 +28,6 @@ from ..shared.file_cache import FileCache
 from ..shared.wording import in_panel
 from . import study_folder, timings
 
-REPORT_S = 5.0
-"""Expected seconds of a report, on two cores."""
 _NUMBER = re.compile(r"[\d.]+")
 OF_UNIT = ("unit", "path")
 """Inputs that are the unit's own parameters."""

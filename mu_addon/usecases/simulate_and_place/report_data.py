@@ -22,6 +22,7 @@ from ...report.results import (
     ReportData,
     SideView,
 )
+from ...report.stopped import NO_PICTURES
 from ...run.cache import key
 from ...run.versions import package_versions
 from .named_effects import parameters_of
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from .named_effects import NamedEffects
     from .study import Study
 
-NO_PICTURES = "This report has no pictures: they take most of its time, and this run was asked to stop."
 FILES = {
     "study.toml": "inputs of this run",
     "unit.toml": "parameters of the unit",
